@@ -1,0 +1,265 @@
+"""Configuration: typed tables with the unit in each name, from TOML and ``--set``.
+
+``load`` reads a file (or the defaults), applies ``KEY=VALUE`` settings, and answers with one ``Config`` that is
+checked whole: an unknown key, a wrong type or an impossible value is a ``ConfigError`` that names the key.
+"""
+
+import difflib
+import tomllib
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import msgspec
+
+from lcf_edge.errors import ConfigError
+
+DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
+
+Positive = Annotated[float, msgspec.Meta(gt=0)]
+NotNegative = Annotated[float, msgspec.Meta(ge=0)]
+Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
+Count = Annotated[int, msgspec.Meta(ge=1, le=65535)]
+
+
+class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """A table of the file; unknown keys are refused."""
+
+
+class Camera(Table):
+    """What the camera is and where it sits."""
+
+    width: Count = 640
+    height: Count = 480
+    fps: Positive = 20.0  # of a video or a folder of pictures, which carry no stamps
+    intrinsics: list[float] = []  # fx, fy, cx, cy in px; empty: from the recording, else from the field of view
+    horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else tells
+    distortion_model: Literal["none", "radial-tangential", "equidistant"] = "none"
+    distortion: list[float] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
+    height_m: NotNegative = 0.3  # above the ground; 0: unknown, no ground test
+    pitch_rad: float = 0.0  # positive: looks up
+
+
+class Imu(Table):
+    """How the IMU's samples become the camera's axes."""
+
+    axes: list[list[float]] = []  # 3x3 rotation into the camera frame; empty: the recording's, else the identity
+    time_offset_s: float = 0.0  # camera time = IMU time + offset
+    gyro_noise_radps: NotNegative = 0.005  # 1 sigma of what is left after the bias
+
+
+class Vehicle(Table):
+    """What the vehicle is."""
+
+    half_width_m: Positive = 0.3
+    height_m: Positive = 2.0  # what passes above this is no threat
+    horizon_s: Positive = 4.0  # contact later than this is no threat yet
+    speed_source: Literal["auto", "odometry", "imu", "constant", "none"] = "auto"
+    speed_mps: float | None = None  # the constant
+
+
+class Filter(Table):
+    """Constants of the filter, by the paper's names; the profile sets those that are not given."""
+
+    profile: Literal["rover", "paper"] = "rover"
+    fast_threshold: Annotated[int, msgspec.Meta(ge=1, le=254)] = 25
+    fast_adaptive: bool = True  # the threshold follows the scene so that about `corners_target` are found
+    corners_target: Count = 700
+    tr_cr: NotNegative = 2.0
+    tr_s: NotNegative = 3.0
+    tr_max: NotNegative = 5.0
+    delta_px: Positive = 1.5  # δ, corner noise off the flow line
+    bl0_px: Positive = 12.0  # BL at birth
+    bl_min_px: Positive = 3.0
+    bs_px: Positive = 64.0  # BS_λ, largest radius of a circle
+    scene_depth_m: Positive = 4.0  # depth of a new landmark that no circle knows
+    appearance_max: Positive = 28.0  # mean absolute grey difference that still is the same corner
+    key_interval_s: Positive = 0.1  # least time between key frames of α
+    key_motion_px: NotNegative = 1.0  # a key frame waits for this median motion, three intervals at most
+    eps_beta_rad: Positive = 0.349  # ε_β, 20°
+    eps_v: Positive = 10.0  # ε_V
+    eps_beta_rebel_rad: Positive = 0.873  # 50°
+    eps_v_rebel: Positive = 40.0
+    eps_beta_circle_rebel_rad: Positive = 0.175  # 10°
+    eps_v_circle_rebel: Positive = 1000.0
+    involvement: Share = 0.5
+    circle_support: Count = 4  # edges that make a circle
+    psi_life_s: Positive = 0.3  # ψ expires and the region is looked at again
+
+
+PAPER = Filter(
+    profile="paper",
+    fast_adaptive=False,
+    delta_px=4.0,
+    bl0_px=25.0,
+    key_interval_s=1.0,
+    key_motion_px=0.0,
+    psi_life_s=3.0,
+)
+"""The paper's constants: 640x480, FAST-9 threshold 25, one frame a second."""
+
+ROVER = Filter()
+"""The shipped default, for 15 to 60 frames a second."""
+
+
+class Memory(Table):
+    """Capacities of the tables; nothing grows beyond them."""
+
+    budget_mib: Positive = 96.0
+    corners: Count = 1500
+    edges_normal: Count = 1500
+    edges_rebel: Count = 300
+    chains: Count = 300
+    circles_normal: Count = 96
+    circles_rebel: Count = 32
+    groups: Count = 128
+    psi: Count = 32
+
+
+class Zenoh(Table):
+    """How the Zenoh session is opened. By default: loopback only, nobody is scouted."""
+
+    mode: Literal["peer", "client", "router"] = "peer"
+    connect: list[str] = []
+    listen: list[str] = ["tcp/127.0.0.1:7447"]
+    config_file: str = ""  # a Zenoh configuration (JSON5), for TLS and access control; the keys above go on top
+
+
+class Publish(Table):
+    """What goes out, and under which names."""
+
+    prefix: str = "lcf"
+    frame_id: str = "camera"
+    robot: str = "rover"
+
+
+class Config(Table):
+    """The whole configuration."""
+
+    camera: Camera = Camera()
+    imu: Imu = Imu()
+    vehicle: Vehicle = Vehicle()
+    filter: Filter = Filter()
+    memory: Memory = Memory()
+    zenoh: Zenoh = Zenoh()
+    publish: Publish = Publish()
+
+
+def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
+    """Read a configuration.
+
+    ``path``: a TOML file; None: ``DEFAULT_PATH`` when it exists, else the defaults. ``settings``: ``KEY=VALUE``
+    with dotted keys and TOML values (a bare word is a string). Raises ``ConfigError``.
+    """
+    tree: dict[str, Any] = {}
+    origin = "--set"
+    if path is None and DEFAULT_PATH.exists():
+        path = DEFAULT_PATH
+    if path is not None:
+        origin = str(path)
+        tree = _read(path)
+    for setting in settings:
+        _apply(tree, setting)
+    return _convert(tree, origin)
+
+
+def _read(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ConfigError(f"{path}: cannot be read ({error.strerror}); name another file with -c") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+
+
+def _apply(tree: dict[str, Any], setting: str) -> None:
+    key, equals, text = setting.partition("=")
+    if not equals or not key.strip():
+        raise ConfigError(f"--set {setting}: write KEY=VALUE, for example --set vehicle.half_width_m=0.6")
+    try:
+        value = tomllib.loads(f"value = {text}")["value"]
+    except tomllib.TOMLDecodeError:
+        value = text.strip()
+    *tables, name = key.strip().split(".")
+    for table in tables:
+        tree = tree.setdefault(table, {})
+        if not isinstance(tree, dict):
+            raise ConfigError(f"--set {setting}: {table} is a value, not a table")
+    tree[name] = value
+
+
+def _convert(tree: dict[str, Any], origin: str) -> Config:
+    _refuse_unknown(tree, Config, "", origin)
+    section = tree.get("filter")
+    if isinstance(section, dict) and section.get("profile") == "paper":
+        tree = {**tree, "filter": {**msgspec.structs.asdict(PAPER), **section}}
+    try:
+        config = msgspec.convert(tree, Config)
+    except msgspec.ValidationError as error:
+        what, _, where = str(error).partition(" - at ")
+        key = where.strip("`").removeprefix("$.")
+        raise ConfigError(f"{origin}: {key or 'configuration'}: {what}") from error
+    _check(config, origin)
+    return config
+
+
+def _refuse_unknown(tree: dict[str, Any], table: type[msgspec.Struct], prefix: str, origin: str) -> None:
+    known = {field.name: field.type for field in msgspec.structs.fields(table)}
+    for name, value in tree.items():
+        if name not in known:
+            close = difflib.get_close_matches(name, known, n=1, cutoff=0.5) or _elsewhere(name)
+            hint = f"; did you mean {prefix if close[0] in known else ''}{close[0]}?" if close else ""
+            raise ConfigError(f"{origin}: unknown key {prefix}{name}{hint}")
+        if isinstance(value, dict) and isinstance(known[name], type) and issubclass(known[name], Table):
+            _refuse_unknown(value, known[name], f"{name}.", origin)
+
+
+def _elsewhere(name: str) -> list[str]:
+    """The same key in another table."""
+    every = {
+        field.name: f"{table.name}.{field.name}"
+        for table in msgspec.structs.fields(Config)
+        for field in msgspec.structs.fields(table.type)
+    }
+    return [every[found] for found in difflib.get_close_matches(name, every, n=1, cutoff=0.8)]
+
+
+def _check(config: Config, origin: str) -> None:
+    """What a type alone cannot say."""
+    camera, filters = config.camera, config.filter
+    if camera.intrinsics and len(camera.intrinsics) != 4:
+        raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
+    if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
+        raise ConfigError(f"{origin}: camera.intrinsics: focal lengths must be positive")
+    wanted = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
+    if len(camera.distortion) not in wanted:
+        raise ConfigError(
+            f"{origin}: camera.distortion: {camera.distortion_model} takes {' or '.join(map(str, wanted))} numbers"
+        )
+    axes = config.imu.axes
+    if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
+        raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
+    if axes and not _is_rotation(axes):
+        raise ConfigError(f"{origin}: imu.axes: not a rotation (rows must be orthonormal, determinant +1)")
+    if config.vehicle.speed_source == "constant" and config.vehicle.speed_mps is None:
+        raise ConfigError(f"{origin}: vehicle.speed_mps: needed with vehicle.speed_source = \"constant\"")
+    if not filters.tr_cr <= filters.tr_s <= filters.tr_max:
+        raise ConfigError(f"{origin}: filter.tr_s: trusts must be ordered tr_cr <= tr_s <= tr_max")
+
+
+def _is_rotation(rows: list[list[float]]) -> bool:
+    (a, b, c), (d, e, f), (g, h, i) = rows
+    determinant = a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)
+    dots = [sum(x * y for x, y in zip(p, q, strict=True)) - (p is q) for p in rows for q in rows]
+    return abs(determinant - 1) < 1e-3 and max(map(abs, dots)) < 1e-3
+
+
+def to_toml(config: Config) -> str:
+    """The configuration as TOML that ``load`` reads back to the same ``Config``."""
+    lines: list[str] = []
+    for table in msgspec.structs.fields(Config):
+        lines.append(f"[{table.name}]")
+        values = msgspec.structs.asdict(getattr(config, table.name))
+        lines += [f"{key} = {msgspec.json.encode(v).decode()}" for key, v in values.items() if v is not None]
+        lines.append("")
+    return "\n".join(lines)

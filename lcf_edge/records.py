@@ -1,0 +1,107 @@
+"""The records that leave the program: one NumPy type each, which is also the wire layout.
+
+The types follow ``lcf_msgs/msg/Circle`` and ``lcf_msgs/msg/PsiRegion`` in little-endian CDR: every field is
+aligned to its size, so a sequence of records is one block of memory.
+"""
+
+from dataclasses import dataclass, field
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Kind(IntEnum):
+    """What a circle summarises."""
+
+    NORMAL = 0  # C_n: follows the flow
+    REBEL = 1  # C_r: breaks it
+
+
+class Cause(IntEnum):
+    """Why a rebel circle is one."""
+
+    NONE = 0
+    CROSSING = 1  # drifts off its flow line
+    INCOMING = 2  # on a collision bearing
+    LEADING = 3  # moves towards the focus of expansion or keeps station
+
+
+class Shape(IntEnum):
+    """Type of a ψ region (the paper's Ty; 0, none, is not published)."""
+
+    CIRCLE = 1
+    RECTANGLE = 2
+
+
+CIRCLE = np.dtype(
+    [
+        ("id", "<u4"),
+        ("kind", "u1"),  # Kind
+        ("cause", "u1"),  # Cause
+        ("support", "<u2"),  # edges behind it
+        ("x", "<f4"),  # px of the input frame
+        ("y", "<f4"),
+        ("radius", "<f4"),  # px
+        ("direction", "<f4"),  # rad, of the image motion
+        ("speed", "<f4"),  # px/s
+        ("trust", "<f4"),
+        ("ttc", "<f4"),  # s, inf: none
+        ("bearing", "<f4"),  # rad, right positive, NaN: unknown
+        ("elevation", "<f4"),  # rad, up positive
+        ("range", "<f4"),  # m, NaN: unknown
+        ("lateral", "<f4"),  # m, miss to the side of the path, right positive, NaN: unknown
+    ]
+)
+"""``lcf_msgs/msg/Circle``: 52 bytes."""
+
+PSI_REGION = np.dtype(
+    {
+        "names": ["id", "shape", "x", "y", "width", "height", "trust"],
+        "formats": ["<u4", "u1", "<f4", "<f4", "<f4", "<f4", "<f4"],
+        "offsets": [0, 4, 8, 12, 16, 20, 24],
+        "itemsize": 28,
+    }
+)
+"""``lcf_msgs/msg/PsiRegion``: 28 bytes, 3 of them padding; x, y is the centre, a circle's width is 2r."""
+
+
+@dataclass(frozen=True, slots=True)
+class Sizes:
+    """Rows in use of each table after one step, and rows evicted in it because a table was full."""
+
+    corners: int = 0
+    omitted: int = 0
+    edges_normal: int = 0
+    edges_rebel: int = 0
+    chains: int = 0
+    circles_normal: int = 0
+    circles_rebel: int = 0
+    groups: int = 0
+    psi: int = 0
+    evicted: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Timing:
+    """Where the time of one frame went, µs."""
+
+    detect: int = 0
+    filter: int = 0
+    total: int = 0
+
+
+@dataclass(frozen=True, slots=True)
+class Scene:
+    """Circles and ψ regions of one frame together."""
+
+    stamp_ns: int
+    seq: int
+    image_width: int
+    image_height: int
+    vehicle_speed: float  # m/s, NaN: unknown
+    circles: npt.NDArray[np.void]  # CIRCLE
+    psi: npt.NDArray[np.void]  # PSI_REGION
+    sizes: Sizes = field(default_factory=Sizes)
+    timing: Timing = field(default_factory=Timing)
+    notes: tuple[str, ...] = ()  # what degrades the result: "no imu", "no speed", "speed drifts", "no corners"
