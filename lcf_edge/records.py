@@ -105,3 +105,16 @@ class Scene:
     sizes: Sizes = field(default_factory=Sizes)
     timing: Timing = field(default_factory=Timing)
     notes: tuple[str, ...] = ()  # what degrades the result: "no imu", "no speed", "speed drifts", "no corners"
+
+
+@dataclass(frozen=True, slots=True)
+class View:
+    """What an overlay draws of one step; positions in px of the input frame, float32."""
+
+    corners: npt.NDArray[np.float32]  # (n, 2) all corners of the frame
+    omitted: npt.NDArray[np.bool_]  # (n,) inside ψ
+    edges: npt.NDArray[np.float32]  # (m, 2) estimated normal edges, E_n
+    rebels: npt.NDArray[np.float32]  # (k, 2) estimated rebel edges, E_r
+    groups: npt.NDArray[np.float32]  # (g, 3) λ: x, y, BS
+    edge_group: npt.NDArray[np.intp]  # (m,) row of `groups` that an edge belongs to, -1: none
+    focus: npt.NDArray[np.float32]  # (2,) focus of expansion, O
