@@ -38,6 +38,7 @@ class Camera(Table):
     distortion: list[float] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
     height_m: NotNegative = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: float = 0.0  # positive: looks up
+    yaw_rad: float = 0.0  # positive: looks to the right of the direction of travel
 
 
 class Imu(Table):
@@ -69,11 +70,13 @@ class Filter(Table):
     tr_s: NotNegative = 3.0
     tr_max: NotNegative = 5.0
     delta_px: Positive = 1.5  # δ, corner noise off the flow line
+    delta_rebel_px: Positive = 3.0  # δ over the chain of key frames
     bl0_px: Positive = 12.0  # BL at birth
     bl_min_px: Positive = 3.0
     bs_px: Positive = 64.0  # BS_λ, largest radius of a circle
     scene_depth_m: Positive = 4.0  # depth of a new landmark that no circle knows
     appearance_max: Positive = 28.0  # mean absolute grey difference that still is the same corner
+    appearance_share: Positive = 0.5  # and as a share of the corner's own contrast
     key_interval_s: Positive = 0.1  # least time between key frames of α
     key_motion_px: NotNegative = 1.0  # a key frame waits for this median motion, three intervals at most
     eps_beta_rad: Positive = 0.349  # ε_β, 20°
@@ -83,7 +86,13 @@ class Filter(Table):
     eps_beta_circle_rebel_rad: Positive = 0.175  # 10°
     eps_v_circle_rebel: Positive = 1000.0
     involvement: Share = 0.5
-    circle_support: Count = 4  # edges that make a circle
+    circle_support: Count = 4  # edges that make a normal circle
+    rebel_support: Count = 3  # edges that make a rebel circle
+    rebel_link_px: Positive = 40.0  # rebels farther apart are not of one circle
+    edge_noise_px: Positive = 0.4  # 1 sigma of an edge's position
+    focus_sigma_px: NotNegative = 6.0  # uncertainty of O
+    ground_margin: Share = 0.3  # share by which the ground may be misjudged
+    pitch_sigma_rad: NotNegative = 0.015
     psi_life_s: Positive = 0.3  # ψ expires and the region is looked at again
 
 
@@ -121,7 +130,7 @@ class Zenoh(Table):
 
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
-    listen: list[str] = ["tcp/127.0.0.1:7447"]
+    listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
     config_file: str = ""  # a Zenoh configuration (JSON5), for TLS and access control; the keys above go on top
 
 

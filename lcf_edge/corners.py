@@ -1,0 +1,84 @@
+"""From a picture to corners: FAST, no more than the budget holds, spread over the picture, with their looks."""
+
+from operator import attrgetter
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.config import Filter
+from lcf_edge.filter.inputs import Corners
+from lcf_edge.lens import Lens
+
+BORDER_PX = 7  # the appearance samples must lie inside the picture
+RING_PX = ((4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3)) + (
+    (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
+)  # fmt: skip
+SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
+THRESHOLDS = (8, 90)
+
+
+class CornerDetector:
+    """FAST-9 corners of one size of picture, at most ``capacity`` a frame.
+
+    With ``fast_adaptive`` the threshold follows the scene, so that about ``corners_target`` are found; it depends on
+    the pictures so far and nothing else.
+    """
+
+    def __init__(self, settings: Filter, lens: Lens, capacity: int) -> None:
+        self._settings = settings
+        self._lens = lens
+        self._capacity = capacity
+        self.threshold = settings.fast_threshold
+        self._fast = cv2.FastFeatureDetector.create(self.threshold, True, cv2.FAST_FEATURE_DETECTOR_TYPE_9_16)
+        ring = np.array(RING_PX)
+        self._ring = (ring[:, 1] * lens.width + ring[:, 0]).astype(np.int32)
+
+    def detect(self, image: npt.NDArray[np.uint8]) -> tuple[Corners, int]:
+        """Corners of a (height, width) picture, and how many were left out because the budget was full."""
+        keypoints = self._fast.detect(image)
+        found = len(keypoints)
+        pixel = cv2.KeyPoint.convert(keypoints)
+        pixel = np.asarray(pixel, np.float32).reshape(-1, 2).astype(np.int32)
+        x, y = pixel[:, 0], pixel[:, 1]
+        inside = (x >= BORDER_PX) & (y >= BORDER_PX)
+        inside &= (x < self._lens.width - BORDER_PX) & (y < self._lens.height - BORDER_PX)
+        position = self._lens.undistort_pixels(x, y)
+        inside &= np.isfinite(position[:, 0])
+        keep = np.flatnonzero(inside)
+        evicted = 0
+        if len(keep) > self._capacity:
+            strength = np.fromiter(map(attrgetter("response"), keypoints), np.float32, found)[keep]
+            evicted = len(keep) - self._capacity
+            keep = keep[strongest_spread(pixel[keep], strength, self._capacity)]
+        pixel = pixel[keep]
+        position = position[keep]
+        base = pixel[:, 1] * np.int32(self._lens.width) + pixel[:, 0]
+        looks = np.take(image.reshape(-1), base[:, None] + self._ring).astype(np.int16)
+        mean = (looks.sum(axis=1, keepdims=True, dtype=np.int32) >> 4).astype(np.int16)
+        appearance = np.clip(looks - mean + np.int16(128), 0, 255).astype(np.uint8)
+        if self._settings.fast_adaptive:
+            self._adapt(found)
+        return Corners(pixel, position, appearance), evicted
+
+    def _adapt(self, found: int) -> None:
+        """Next frame's threshold: corner counts fall roughly with its 1.5th power."""
+        ratio = (max(found, 1) / self._settings.corners_target) ** 0.4
+        wanted = self.threshold * min(max(ratio, 0.6), 1.6)
+        threshold = int(min(max(round(wanted), THRESHOLDS[0]), THRESHOLDS[1]))
+        if abs(wanted - self.threshold) > 0.08 * self.threshold and threshold != self.threshold:
+            self.threshold = threshold
+            self._fast.setThreshold(threshold)
+
+
+def strongest_spread(
+    pixel: npt.NDArray[np.int32], strength: npt.NDArray[np.float32], capacity: int
+) -> npt.NDArray[np.intp]:
+    """Rows of the ``capacity`` corners to keep: the strongest of every square, then the second strongest, and on."""
+    square = (pixel[:, 1] // SPREAD_PX) * 65536 + pixel[:, 0] // SPREAD_PX
+    order = np.lexsort((-strength, square))
+    ordered = square[order]
+    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]])
+    rank = np.arange(len(order)) - np.repeat(starts, np.diff(np.r_[starts, len(order)]))
+    best = np.lexsort((-strength[order], rank))[:capacity]
+    return np.sort(order[best])

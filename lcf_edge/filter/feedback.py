@@ -1,0 +1,82 @@
+"""Feedback: circles that are fully trusted become ψ, and ψ gives way to whatever breaks the flow."""
+
+import numpy as np
+
+from lcf_edge.config import Filter
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.line_expert import inside_psi
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, PsiTable
+from lcf_edge.records import Shape
+
+RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
+MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
+
+
+class Feedback:
+    """Writes, moves and ends ψ regions."""
+
+    def __init__(self, settings: Filter) -> None:
+        self._settings = settings
+        self._ids = Ids()
+
+    def ignored(self, psi: PsiTable, circles: CircleTable) -> Mask:
+        """Normal circles under an active ψ; bool (capacity,)."""
+        under = np.zeros(circles.capacity, np.bool_)
+        under[psi.circle[psi.active & (psi.circle >= 0)]] = True
+        return under
+
+    def write(self, psi: PsiTable, circles: CircleTable, harmless: Mask) -> int:
+        """Normal circles at Tr_max write ψ, their trust falls back to Tr_s; answers evictions.
+
+        ``harmless``: bool (capacity,), circles that may be ignored.
+        """
+        settings = self._settings
+        ready = circles.active & harmless & (circles.trust >= settings.tr_max) & ~self.ignored(psi, circles)
+        rows = np.flatnonzero(ready)
+        places = np.flatnonzero(~psi.active)[: len(rows)]
+        evicted = len(rows) - len(places)
+        rows = rows[np.argsort(-circles.support[rows], kind="stable")][: len(places)]
+        width, height = circles.width[rows], circles.height[rows]
+        diameter = 2 * circles.radius[rows]
+        rectangle = width * height < RECTANGLE_FITS * np.pi / 4 * diameter * diameter
+        psi.active[places] = True
+        psi.shape[places] = np.where(rectangle, Shape.RECTANGLE, Shape.CIRCLE)
+        psi.x[places], psi.y[places] = circles.x[rows], circles.y[rows]
+        psi.width[places] = np.where(rectangle, width, diameter)
+        psi.height[places] = np.where(rectangle, height, diameter)
+        psi.trust[places] = circles.trust[rows]
+        psi.expansion[places] = circles.expansion[rows]
+        psi.life_s[places] = settings.psi_life_s
+        psi.circle[places] = rows
+        psi.id[places] = self._ids.take(len(places))
+        circles.trust[rows] = settings.tr_s
+        return evicted
+
+    def advance(self, psi: PsiTable, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
+        """ψ moves with its circle's prediction and grows with it, and expires."""
+        psi.life_s -= np.float32(dt_s)
+        orphan = ~circles.active[np.maximum(psi.circle, 0)] | (psi.circle < 0)
+        psi.active &= (psi.life_s > 0) & ~orphan
+        growth = psi.expansion * np.float32(dt_s)
+        psi.x += (psi.x - np.float32(focus[0])) * growth
+        psi.y += (psi.y - np.float32(focus[1])) * growth
+        psi.width *= 1 + growth
+        psi.height *= 1 + growth
+
+    def give_way(self, psi: PsiTable, x: Floats, y: Floats, reach: Floats) -> None:
+        """End the ψ regions that come within ``reach`` px of points that break the flow; float32 (n,) each."""
+        if not len(x) or not psi.active.any():
+            return
+        dx, dy = np.abs(x[:, None] - psi.x), np.abs(y[:, None] - psi.y)
+        away_circle = np.hypot(dx, dy) - psi.width / 2
+        away_rectangle = np.hypot(np.maximum(dx - psi.width / 2, 0), np.maximum(dy - psi.height / 2, 0))
+        away = np.where(psi.shape == Shape.CIRCLE, away_circle, away_rectangle)
+        psi.active &= ~(away <= reach[:, None]).any(axis=0)
+
+
+def hold(edges: EdgeTable, psi: PsiTable, key_number: int) -> None:
+    """Mark the normal edges under ψ: they are predicted without being looked for, and their history starts anew."""
+    n = edges.count
+    holder = inside_psi(psi, edges.x[:n], edges.y[:n])
+    edges.held[:n] = (holder != NO_CIRCLE) & ~edges.rebel[:n] & (edges.links[:n] == 0)
+    edges.born_key[:n][edges.held[:n]] = key_number

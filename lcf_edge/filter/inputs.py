@@ -1,0 +1,40 @@
+"""What one step of the filter takes."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+APPEARANCE_SAMPLES = 16
+
+
+@dataclass(frozen=True, slots=True)
+class Corners:
+    """The corners of one frame (the paper's Edge).
+
+    ``pixel``: int32 (n, 2), x and y in the input frame. ``position``: float32 (n, 2), px of the ideal pinhole, lens
+    distortion removed. ``appearance``: uint8 (n, 16), grey samples around the corner, their mean moved to 128.
+    """
+
+    pixel: npt.NDArray[np.int32]
+    position: npt.NDArray[np.float32]
+    appearance: npt.NDArray[np.uint8]
+
+    def __len__(self) -> int:
+        return len(self.pixel)
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """How the vehicle moved since the last frame.
+
+    ``dt_s``: t_f, from capture stamps. ``rotation``: float64 (3, 3), takes a direction from the last exposure's camera
+    axes to this one's. ``rotation_sigma_rad``: its uncertainty. ``speed_mps``: V_ν, NaN: unknown.
+    ``yaw_rate_radps``: turning left is positive.
+    """
+
+    dt_s: float
+    rotation: npt.NDArray[np.float64]
+    rotation_sigma_rad: float
+    speed_mps: float
+    yaw_rate_radps: float

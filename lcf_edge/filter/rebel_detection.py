@@ -1,0 +1,221 @@
+"""α: over three key frames, which edges break the flow, and how.
+
+What stands still moves, between a key frame and now, along the line through the focus of expansion by a share
+μ = ΔZ/Z of its distance r from it; Z lies between the nearest depth that is looked at and, below the horizon, the
+ground. Whatever leaves that segment of a line moves by itself (a *mover*); what stays on it but will be met within
+the horizon inside the vehicle's width, and stands above the ground, is *incoming*.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.filter.flow import KeyFrames, Pinhole, line_distance, wrap
+from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
+
+NEAREST_M = 0.25  # depth below which nothing is expected to stand
+STILL_M = 1e-3  # a displacement below this has no direction
+LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
+BASELINE_LEAST_S = 0.12
+BASELINE_SURE_S = 0.2  # a history this long tells what moves from what stands
+
+
+@dataclass(frozen=True, slots=True)
+class Surroundings:
+    """What the vehicle is and how it moves at this instant; ``focus``: O, px; ``horizon_y``: px."""
+
+    pinhole: Pinhole
+    focus: tuple[float, float]
+    horizon_y: float
+    camera_height_m: float  # 0: unknown
+    half_width_m: float
+    height_m: float
+    horizon_s: float
+    speed_mps: float  # NaN: unknown
+    yaw_rate_radps: float
+    noise_px: float  # 1 sigma of an edge's position
+    delta_px: float  # δ
+    focus_sigma_px: float
+    ground_margin: float  # share by which the ground may be misjudged
+    pitch_sigma_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class Links:
+    """Edges seen from a key frame; float32 (n,): where they were (``x``, ``y``, derotated to now, px), the focus of
+    the displacement since (``focus_x``, ``focus_y``, px), its forward part (``depth_m``), time and uncertainty."""
+
+    x: Floats
+    y: Floats
+    focus_x: Floats
+    focus_y: Floats
+    depth_m: Floats
+    elapsed_s: Floats
+    sigma_px: Floats
+
+
+def links_since(
+    edges: EdgeTable, rows: Rows, key: npt.NDArray[np.int64], keys: KeyFrames, around: Surroundings
+) -> Links:
+    """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
+    pinhole = around.pinhole
+    slot_h = np.array([pinhole.homography(r) for r in keys.rotation]).reshape(KEYS, 9).astype(np.float32)
+    displacement = keys.displacement
+    moves = np.abs(displacement[:, 2]) > STILL_M
+    depth = np.where(moves, displacement[:, 2], 1.0)
+    focus_x = np.where(moves, pinhole.cx + pinhole.fx * displacement[:, 0] / depth, around.focus[0])
+    focus_y = np.where(moves, pinhole.cy + pinhole.fy * displacement[:, 1] / depth, around.focus[1])
+    per_slot = np.stack(
+        [focus_x, focus_y, displacement[:, 2], keys.elapsed_s, keys.sigma_rad * pinhole.focal]
+    ).astype(np.float32)
+    slot = key % KEYS
+    h = slot_h[slot].T
+    kx, ky = edges.key_x[slot, rows], edges.key_y[slot, rows]
+    scale = 1 / (h[6] * kx + h[7] * ky + h[8])
+    fx, fy, dz, elapsed, sigma = per_slot[:, slot]
+    return Links(
+        (h[0] * kx + h[1] * ky + h[2]) * scale, (h[3] * kx + h[4] * ky + h[5]) * scale, fx, fy, dz, elapsed, sigma
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Verdict:
+    """What the links say; (n,) each.
+
+    ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where it should be. ``over``: px
+    beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it stands still. ``mover``,
+    ``incoming``: bool.
+    """
+
+    drift: Floats
+    short: Floats
+    over: Floats
+    expansion: Floats
+    range_m: Floats
+    lateral_m: Floats
+    ttc_s: Floats
+    mover: Mask
+    incoming: Mask
+
+
+def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
+    """Hold edges at ``x``, ``y`` (float32 (n,), px) against the flow of what stands still.
+
+    From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r. The lateral miss is measured from the arc that speed and
+    yaw rate give.
+    """
+    pinhole, focal = around.pinhole, np.float32(around.pinhole.focal)
+    ax, ay = links.x - links.focus_x, links.y - links.focus_y
+    r = np.maximum(np.hypot(ax, ay), np.float32(1))
+    mx, my = x - links.x, y - links.y
+    outward = (mx * ax + my * ay) / r
+    drift = (my * ax - mx * ay) / r
+    sign = np.where(links.depth_m < 0, np.float32(-1), np.float32(1))
+    travelled = np.abs(links.depth_m)
+    outward = outward * sign
+    mu = outward / r
+
+    below = y - np.float32(around.horizon_y)
+    slack = np.float32(focal * around.pitch_sigma_rad)
+    reach = np.float32(around.camera_height_m) * focal
+    ground_far = below - slack  # px below the horizon if the camera looks as far down as it may
+    ground_near = below + slack
+    if around.camera_height_m > 0:
+        least_mu = travelled * np.maximum(ground_far, 0) / (reach * np.float32(1 + around.ground_margin))
+        ground_mu = travelled * np.maximum(ground_near, 0) / reach
+    else:
+        least_mu = np.zeros_like(mu)
+        ground_mu = np.zeros_like(mu)
+    short = r * least_mu - outward
+    over = outward - r * travelled / np.float32(NEAREST_M)
+    tolerance = around.delta_px + np.float32(around.focus_sigma_px) * np.abs(mu) + links.sigma_px
+    mover = (np.abs(drift) > tolerance) | (short > tolerance) | (over > tolerance)
+
+    closing = np.maximum(mu, np.float32(1e-6))
+    range_m = travelled / closing
+    speed = np.float32(around.speed_mps)
+    lateral = (x - np.float32(pinhole.cx)) / np.float32(pinhole.fx) - np.float32(
+        (around.focus[0] - pinhole.cx) / pinhole.fx
+    )
+    lateral_m = miss(lateral * range_m, range_m, around)
+    ttc = range_m / np.maximum(speed, np.float32(1e-3))
+    height_m = np.float32(around.camera_height_m) - below / focal * range_m  # above the ground
+    noise = np.float32(2 * around.noise_px)
+    incoming = (
+        ~mover
+        & (sign > 0)
+        & (ttc < around.horizon_s)
+        & (np.abs(lateral_m) < around.half_width_m)
+        & (outward > noise + links.sigma_px)
+        & (outward - r * ground_mu * np.float32(1 + around.ground_margin) > noise)
+        & (height_m < around.height_m)
+    )
+    return Verdict(
+        drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming
+    )
+
+
+def miss(right_m: Floats, ahead_m: Floats, around: Surroundings) -> Floats:
+    """Distance of points from the vehicle's path, m, right positive: from the arc of speed and yaw rate."""
+    speed = around.speed_mps
+    if not np.isfinite(speed) or abs(around.yaw_rate_radps) < 1e-3 * max(abs(speed), 0.05):
+        return right_m
+    radius = np.float32(speed / around.yaw_rate_radps)  # of the arc, its centre to the left when positive
+    distance = np.hypot(right_m + radius, ahead_m)
+    return (distance - np.abs(radius)) * np.sign(radius)
+
+
+def agree(
+    whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float
+) -> Mask:
+    """Whether the younger link of each chain says the same as the whole chain (bounded, consistent deviation).
+
+    The rate of the deviation over the recent link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
+    """
+    verdict = np.ones(len(whole_s), np.bool_)
+    mover = whole.mover
+    slack = np.float32(2 * noise_px) / recent_s
+    strongest = np.argmax(np.stack([np.abs(whole.drift), whole.short, whole.over]), axis=0)
+    pick = np.arange(len(whole_s))
+    old = np.stack([whole.drift, whole.short, whole.over])[strongest, pick] / whole_s
+    new = np.stack([recent.drift, recent.short, recent.over])[strongest, pick] / recent_s
+    sign = np.sign(old)
+    old, new = old * sign, new * sign
+    same = (new + slack > old / LINK_RATIO) & (new - slack < old * LINK_RATIO)
+    verdict[mover] = same[mover]
+    closing = (recent.expansion > whole.expansion / LINK_RATIO) & (
+        recent.expansion < whole.expansion * LINK_RATIO
+    )
+    verdict[~mover] = closing[~mover]
+    return verdict
+
+
+def give_birth(edges: EdgeTable, rows: Rows, first: Links, second: Links) -> None:
+    """A chain becomes a rebel edge (eq. Intialrebelpara): DL, V, β, O from the key positions L1, L2, L3 = L.
+
+    DL = ∠(L3-L1) - ∠(L2-L1), V = |L3-L2|/t, β = ∠(L3-L1), O = L1.
+    """
+    x, y = edges.x[rows], edges.y[rows]
+    beta = np.arctan2(y - first.y, x - first.x)
+    before = np.arctan2(second.y - first.y, second.x - first.x)
+    long_enough = np.hypot(second.x - first.x, second.y - first.y) > 2
+    edges.deviation[rows] = np.where(long_enough, np.clip(wrap(beta - before), -0.5, 0.5), 0)
+    edges.speed[rows] = np.hypot(x - second.x, y - second.y) / second.elapsed_s
+    edges.beta[rows] = beta
+    edges.origin_x[rows], edges.origin_y[rows] = first.x, first.y
+    edges.rebel[rows] = True
+    edges.links[rows] = 0
+
+
+__all__ = [
+    "Links",
+    "Surroundings",
+    "Verdict",
+    "agree",
+    "give_birth",
+    "judge",
+    "line_distance",
+    "links_since",
+    "miss",
+]
