@@ -1,0 +1,243 @@
+"""ROS 2 messages as bytes: Common Data Representation (OMG DDSI-RTPS 2.5, section 10; plain CDR, version 1).
+
+A payload is four bytes of encapsulation (``00 01 00 00``: little-endian) and the fields in order, each
+aligned to its own size from the end of those four bytes. Read are both byte orders, written is little-endian.
+Every length is compared with the bytes that are left before anything of that length is made.
+"""
+
+import struct
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.errors import LcfError
+from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+
+Vector = tuple[float, float, float]
+
+LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+
+_BYTE_ORDERS: dict[int, Literal["<", ">"]] = {0x0000: ">", 0x0001: "<"}
+
+
+class CdrError(LcfError):
+    """Bytes that are not the message they should be."""
+
+
+@dataclass(frozen=True, slots=True)
+class Header:
+    """``std_msgs/msg/Header``."""
+
+    stamp_ns: int
+    frame_id: str
+
+
+@dataclass(frozen=True, slots=True)
+class Image:
+    """``sensor_msgs/msg/Image``; ``data`` looks into the payload."""
+
+    header: Header
+    height: int  # px
+    width: int
+    encoding: str
+    is_bigendian: bool
+    step: int  # bytes from row to row
+    data: memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class CompressedImage:
+    """``sensor_msgs/msg/CompressedImage``; ``data`` looks into the payload."""
+
+    header: Header
+    format: str
+    data: memoryview
+
+
+@dataclass(frozen=True, slots=True)
+class Imu:
+    """``sensor_msgs/msg/Imu`` without its orientation; None: the sender has no such value."""
+
+    header: Header
+    gyro: Vector | None  # rad/s
+    accel: Vector | None  # m/s²
+
+
+@dataclass(frozen=True, slots=True)
+class Twist:
+    """Velocities of ``nav_msgs/msg/Odometry`` or ``geometry_msgs/msg/TwistStamped``: x forward, z up."""
+
+    header: Header
+    linear: Vector  # m/s
+    angular: Vector  # rad/s
+
+
+@dataclass(frozen=True, slots=True)
+class CameraInfo:
+    """``sensor_msgs/msg/CameraInfo`` up to its matrix K."""
+
+    header: Header
+    height: int  # px
+    width: int
+    distortion_model: str
+    d: tuple[float, ...]
+    k: tuple[float, ...]  # 3x3, row by row
+
+
+def decode_header(payload: bytes | memoryview) -> Header:
+    """The header with which a message of any stamped type begins. Raises ``CdrError``."""
+    return _Reader(payload).header()
+
+
+def decode_image(payload: bytes | memoryview) -> Image:
+    """``sensor_msgs/msg/Image``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    header = reader.header()
+    height, width = reader.scalars("II")
+    encoding = reader.string()
+    (is_bigendian,) = reader.scalars("B")
+    (step,) = reader.scalars("I")
+    return Image(header, height, width, encoding, bool(is_bigendian), step, reader.octets())
+
+
+def decode_compressed_image(payload: bytes | memoryview) -> CompressedImage:
+    """``sensor_msgs/msg/CompressedImage``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    return CompressedImage(reader.header(), reader.string(), reader.octets())
+
+
+def decode_imu(payload: bytes | memoryview) -> Imu:
+    """``sensor_msgs/msg/Imu``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    header = reader.header()
+    reader.scalars("13d")  # orientation and its covariance
+    gyro, gyro_covariance = reader.vector(), reader.scalars("9d")
+    accel, accel_covariance = reader.vector(), reader.scalars("9d")
+    return Imu(
+        header, gyro if gyro_covariance[0] != -1 else None, accel if accel_covariance[0] != -1 else None
+    )
+
+
+def decode_odometry(payload: bytes | memoryview) -> Twist:
+    """The twist of ``nav_msgs/msg/Odometry``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    header = reader.header()
+    reader.string()  # child_frame_id
+    reader.scalars("43d")  # pose and its covariance
+    return Twist(header, reader.vector(), reader.vector())
+
+
+def decode_twist_stamped(payload: bytes | memoryview) -> Twist:
+    """``geometry_msgs/msg/TwistStamped``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    return Twist(reader.header(), reader.vector(), reader.vector())
+
+
+def decode_camera_info(payload: bytes | memoryview) -> CameraInfo:
+    """``sensor_msgs/msg/CameraInfo``. Raises ``CdrError``."""
+    reader = _Reader(payload)
+    header = reader.header()
+    height, width = reader.scalars("II")
+    model = reader.string()
+    d = reader.sequence(np.dtype(np.float64), align=8)
+    return CameraInfo(header, height, width, model, tuple(d.tolist()), reader.scalars("9d"))
+
+
+def encode_scene(scene: Scene, frame_id: str) -> bytes:
+    """``lcf_msgs/msg/Scene``; sizes, timing and notes stay behind. Raises ``CdrError``."""
+    sec, nanosec = divmod(scene.stamp_ns, 1_000_000_000)
+    try:
+        name = frame_id.encode() + b"\0"
+        parts = (
+            LITTLE_ENDIAN,
+            struct.pack("<iII", sec, nanosec, len(name)),
+            name,
+            b"\0" * (-(12 + len(name)) % 8),
+            struct.pack("<QIIf", scene.seq, scene.image_width, scene.image_height, scene.vehicle_speed),
+            _records(scene.circles, CIRCLE),
+            _records(scene.psi, PSI_REGION),
+        )
+    except (struct.error, OverflowError, UnicodeEncodeError) as error:
+        raise CdrError(f"scene {scene.seq}: a value does not fit its field ({error})") from error
+    return b"".join(parts)
+
+
+def decode_scene(payload: bytes | memoryview) -> Scene:
+    """``lcf_msgs/msg/Scene``; circles and ψ are read-only views of a little-endian payload.
+
+    Sizes, timing and notes, which are not sent, have their defaults. Raises ``CdrError``.
+    """
+    reader = _Reader(payload)
+    header = reader.header()
+    seq, width, height, speed = reader.scalars("QIIf")
+    circles, psi = reader.sequence(CIRCLE, align=4), reader.sequence(PSI_REGION, align=4)
+    return Scene(header.stamp_ns, seq, width, height, speed, circles, psi)
+
+
+def _records(rows: npt.NDArray[np.void], dtype: np.dtype[np.void]) -> bytes:
+    """A sequence of fixed-size records; what lies between their fields is zero, not what memory held."""
+    block = np.zeros(len(rows), dtype)
+    for name in dtype.names or ():
+        block[name] = rows[name]
+    return struct.pack("<I", len(block)) + block.tobytes()
+
+
+class _Reader:
+    """A place in a payload."""
+
+    def __init__(self, payload: bytes | memoryview) -> None:
+        if len(payload) < 4:
+            raise CdrError("CDR: shorter than its encapsulation header")
+        kind = int.from_bytes(payload[:2], "big")
+        if kind not in _BYTE_ORDERS:
+            raise CdrError(f"CDR: encapsulation {kind:#06x} is not plain CDR")
+        self._order = _BYTE_ORDERS[kind]
+        self._data = memoryview(payload).toreadonly()[4:]
+        self._at = 0
+
+    def header(self) -> Header:
+        sec, nanosec = self.scalars("iI")
+        return Header(sec * 1_000_000_000 + nanosec, self.string())
+
+    def scalars(self, fields: str) -> tuple[Any, ...]:
+        """Fields in the notation of ``struct``, none of which is wider than the one before it."""
+        first = struct.calcsize(f"<{fields.lstrip('0123456789')[0]}")
+        layout = struct.Struct(self._order + fields)
+        start = self._take(layout.size, align=first)
+        return layout.unpack_from(self._data, start)
+
+    def vector(self) -> Vector:
+        x, y, z = self.scalars("3d")
+        return x, y, z
+
+    def string(self) -> str:
+        """A string with its closing NUL, or without one and empty."""
+        try:
+            return str(self.octets(), "utf-8").removesuffix("\0")
+        except UnicodeDecodeError as error:
+            raise CdrError("CDR: a string is not UTF-8") from error
+
+    def octets(self) -> memoryview:
+        (count,) = self.scalars("I")
+        start = self._take(count, align=1)
+        return self._data[start : start + count]
+
+    def sequence(self, dtype: np.dtype[Any], align: int) -> npt.NDArray[Any]:
+        (count,) = self.scalars("I")
+        if not count:  # then nothing is aligned either
+            return np.empty(0, dtype)
+        start = self._take(count * dtype.itemsize, align)
+        rows = np.frombuffer(self._data, dtype.newbyteorder(self._order), count, start)
+        return rows.astype(dtype, copy=False)
+
+    def _take(self, size: int, align: int) -> int:
+        """Start of the next ``size`` bytes."""
+        start = self._at + -self._at % align
+        if size > len(self._data) - start:
+            raise CdrError(
+                f"CDR: {size} bytes are wanted at {start}, {max(0, len(self._data) - start)} are left"
+            )
+        self._at = start + size
+        return start

@@ -1,0 +1,39 @@
+"""Names of lens distortion models in recordings, and what they are called here."""
+
+from typing import Literal
+
+Model = Literal["none", "radial-tangential", "equidistant"]
+
+MODELS: dict[str, Model] = {
+    "": "none",
+    "none": "none",
+    "radial-tangential": "radial-tangential",
+    "radtan": "radial-tangential",
+    "plumb_bob": "radial-tangential",
+    "rational_polynomial": "radial-tangential",
+    "brown-conrady": "radial-tangential",
+    "equidistant": "equidistant",
+    "equi": "equidistant",
+    "fisheye": "equidistant",
+    "kannala-brandt": "equidistant",
+}
+
+
+def distortion(name: str, coefficients: tuple[float, ...]) -> tuple[Model, tuple[float, ...]]:
+    """Model and coefficients as ``Lens`` takes them; a model whose coefficients are all zero is none.
+
+    The rational model is the radial-tangential one where its denominator is 1. Raises ``ValueError`` that
+    says what is wrong.
+    """
+    model = MODELS.get(name.lower())
+    if model is None:
+        raise ValueError(f"{name} is none of {', '.join(filter(None, MODELS))}")
+    if model == "none" or not any(coefficients):
+        return "none", ()
+    wanted = (4,) if model == "equidistant" else (4, 5)
+    used = coefficients[: wanted[-1]]
+    if any(coefficients[wanted[-1] :]):
+        raise ValueError(f"{name} with {len(coefficients)} coefficients is not supported")
+    if len(used) not in wanted:
+        raise ValueError(f"{name} takes {' or '.join(map(str, wanted))} coefficients")
+    return model, used
