@@ -8,7 +8,7 @@ No clock, no I/O; memory is two fixed rings of samples.
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
-from math import asin, cos, hypot, inf, isfinite, nan, sin, sqrt
+from math import asin, cos, expm1, hypot, inf, isfinite, nan, sin, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -53,6 +53,7 @@ _LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # only while next to nothing but gravity acts
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
 _SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes
 _SIGMA_ODOMETRY_MPS = 0.05
+_SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
 
 
@@ -64,7 +65,8 @@ class EgoMotion:
     rotation: Floats  # (3, 3), a direction in the previous camera axes → in the present ones
     rotation_sigma_rad: float  # 1 sigma of the rotation's angle
     speed_mps: float  # forward, mean over the interval, NaN: unknown
-    yaw_rate_radps: float  # turning left positive, mean over the interval
+    yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
+    path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
     gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: never stood still yet
     notes: tuple[str, ...]  # first frame, no imu, imu gap, rotation from odometry, no speed, speed drifts
 
@@ -99,6 +101,7 @@ class EgoMotionEstimator:
         self._odometry = _Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = _InertialSpeed(imu.gyro_noise_radps)
         self._bias_known = False
+        self._path_yaw_radps = 0.0
         self._stamp_ns: int | None = None
 
     def add_imu(self, sample: ImuSample) -> None:
@@ -169,7 +172,21 @@ class EgoMotionEstimator:
             self._inertial.lose()
         speed_mps = self._choose_speed(span, odometry_mps, notes)
         pitch_rad = self._inertial.pitch_rad
-        return EgoMotion(span.dt_s, rotation, sigma_rad, speed_mps, yaw_rate_radps, pitch_rad, tuple(notes))
+        if isfinite(odometry_yaw_radps):
+            self._path_yaw_radps = odometry_yaw_radps
+        else:
+            share = -expm1(-span.dt_s / _SHAKE_S)
+            self._path_yaw_radps += share * (yaw_rate_radps - self._path_yaw_radps)
+        return EgoMotion(
+            span.dt_s,
+            rotation,
+            sigma_rad,
+            speed_mps,
+            yaw_rate_radps,
+            self._path_yaw_radps,
+            pitch_rad,
+            tuple(notes),
+        )
 
     def _learn_rest(self, span: _Span, gap_limit_s: float, odometry_mps: float) -> bool:
         """Whether the vehicle stands still; then the gyro's mean is its bias, the accelerometer's is up."""

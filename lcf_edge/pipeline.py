@@ -55,7 +55,7 @@ class Pipeline:
         detected = time.perf_counter_ns()
         ego = self._motion.advance(frame.stamp_ns)
         motion = Motion(
-            max(ego.dt_s, LEAST_DT_S), ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.yaw_rate_radps
+            max(ego.dt_s, LEAST_DT_S), ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.path_yaw_rate_radps
         )
         before = time.perf_counter_ns()
         step = self._filter.step(corners, motion)

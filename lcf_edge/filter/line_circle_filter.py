@@ -33,6 +33,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
 
 PITCH_MEMORY_S = 1.0  # shaking faster than this does not change where the vehicle goes
+YAW_MEMORY_S = 0.3
 REFINE_LEAST = 25  # edges that a correction of the rotation needs
 PENDING = 2  # links of a chain that waits for its third key frame
 
@@ -96,6 +97,7 @@ class LineCircleFilter:
 
     def step(self, corners: Corners, motion: Motion) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive."""
+        self._dt = np.float32(motion.dt_s)
         around = self._derotate(motion)
         corner_x = np.ascontiguousarray(corners.position[:, 0])
         corner_y = np.ascontiguousarray(corners.position[:, 1])
@@ -136,7 +138,7 @@ class LineCircleFilter:
 
     def _derotate(self, motion: Motion) -> Surroundings:
         speed = motion.speed_mps
-        self._turn(motion.rotation, motion.dt_s)
+        self._turn(motion.rotation, motion.yaw_rate_radps, motion.dt_s)
         self._keys.advance(
             motion.rotation,
             self._forward,
@@ -151,10 +153,7 @@ class LineCircleFilter:
         self.normal.x += (self.normal.x - fx) * growth
         self.normal.y += (self.normal.y - fy) * growth
         self.normal.radius *= 1 + growth
-        step = self.rebel.speed * np.float32(motion.dt_s)
-        self.rebel.x += step * np.cos(self.rebel.beta)
-        self.rebel.y += step * np.sin(self.rebel.beta)
-        self.rebel.ttc -= np.float32(motion.dt_s)
+        self._rebel_circles.predict(self.rebel, motion.dt_s)
         return Surroundings(
             pinhole=self._pinhole,
             focus=self.focus,
@@ -172,14 +171,17 @@ class LineCircleFilter:
             pitch_sigma_rad=self.settings.pitch_sigma_rad,
         )
 
-    def _turn(self, rotation: Matrix, dt_s: float) -> None:
-        """A turn takes the heading along; pitch and roll are the camera's shaking."""
-        shaken = rotation @ self._forward
-        shaken /= shaken[2]
+    def _turn(self, rotation: Matrix, yaw_rate_radps: float, dt_s: float) -> None:
+        """Where the vehicle heads, in the camera's axes: shaking turns the camera and not the heading, a turn both."""
         mounted = self._mounted / self._mounted[2]
-        forget = -math.expm1(-dt_s / PITCH_MEMORY_S)
-        pitch = shaken[1] + forget * (mounted[1] - shaken[1])
-        forward = np.array([mounted[0], pitch, 1.0])
+        forward = self._forward / self._forward[2]
+        shaken = rotation @ forward
+        shaken /= shaken[2]
+        shaken[0] -= yaw_rate_radps * dt_s  # a left turn moves the picture to the right
+        keep_x, keep_y = math.exp(-dt_s / YAW_MEMORY_S), math.exp(-dt_s / PITCH_MEMORY_S)
+        forward = np.array(
+            [mounted[0] + keep_x * (shaken[0] - mounted[0]), mounted[1] + keep_y * (shaken[1] - mounted[1]), 1.0]
+        )
         self._forward = forward / np.linalg.norm(forward)
 
     def _carry(self, rotation: Matrix) -> None:
@@ -432,8 +434,23 @@ class LineCircleFilter:
         edges.trust[rows] = self._tr_new
         edges.appearance[rows] = corners.appearance[free]
         edges.born_key[rows] = self._keys.number
+        self._join_rebels(rows)
         edges.matched[rows] = True
         return evicted
+
+    def _join_rebels(self, rows: slice) -> None:
+        """New landmarks inside a rebel circle are expected to move as it does: they start in α with its motion."""
+        edges = self.edges
+        x, y = edges.x[rows], edges.y[rows]
+        circle, vx, vy = self._rebel_circles.motion_at(self.rebel, x, y)
+        joins = np.flatnonzero(circle >= 0)
+        at = joins + rows.start
+        vx, vy = vx[joins], vy[joins]
+        edges.links[at] = 1
+        edges.beta[at] = np.arctan2(vy, vx)
+        edges.speed[at] = np.hypot(vx, vy)
+        edges.origin_x[at], edges.origin_y[at] = x[joins], y[joins]
+        edges.bl[at] = np.maximum(np.float32(0.5 * self.settings.bl0_px), np.float32(0.25) * edges.speed[at] * self._dt)
 
     def _first_speed(self, x: Floats, y: Floats, r: Floats, around: Surroundings) -> Floats:
         """V of a new landmark: what its λ group's circle implies, else the ground, else a configured depth."""
@@ -513,7 +530,8 @@ class LineCircleFilter:
             ok = agree(part, first.elapsed_s[suspects], recent, second.elapsed_s, settings.edge_noise_px)
             fail = those[~ok]
             edges.links[fail] = 0
-            edges.born_key[fail] = keys.number
+            torn = those[~ok & part.mover]  # not one landmark: its history is worth nothing
+            edges.born_key[torn] = keys.number
             born = those[ok]
             room = edges.rebel_capacity - int(np.count_nonzero(edges.rebel[:n]))
             evicted = max(0, len(born) - room)
@@ -595,5 +613,5 @@ def _no_rebels() -> Rebels:
         none,
         none,
         Links(*[none] * 7),
-        Verdict(*[none] * 7, no, no),
+        Verdict(*[none] * 8, no, no),
     )

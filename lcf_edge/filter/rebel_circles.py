@@ -18,6 +18,8 @@ VELOCITY_NOISE_PXPS = 10.0  # 1 sigma of a rebel's velocity over its links
 LOOMS_PER_S = 1.0  # fastest expansion of one object, 1/s
 STILL_PXPS = 15.0  # slower circles have no direction
 MEMBER_MARGIN_PX = 8.0
+COAST_S = 1.0  # what is this near grows too fast to be followed corner by corner, and must not be forgotten
+LEAST_TTC_S = 0.05
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,43 @@ class RebelCircles:
         self._tr_new = newborn_trust(settings)
         self._ids = Ids()
 
+    def predict(self, circles: CircleTable, dt_s: float) -> None:
+        """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
+
+        Without a time to contact, the centre goes on as it went.
+        """
+        dt = np.float32(dt_s)
+        ttc = circles.ttc
+        looming = np.isfinite(ttc) & (ttc > LEAST_TTC_S) & circles.active
+        tau = np.where(looming, ttc, np.float32(1e6))
+        grow = np.minimum(tau / np.maximum(tau - dt, np.float32(LEAST_TTC_S)), np.float32(1.5))
+        step = circles.speed * dt * grow
+        circles.x += step * np.cos(circles.beta)
+        circles.y += step * np.sin(circles.beta)
+        circles.speed *= grow * grow
+        circles.radius[:] = np.where(looming, circles.radius * grow, circles.radius)
+        circles.ttc -= dt
+
+    def motion_at(self, circles: CircleTable, x: Floats, y: Floats) -> tuple[npt.NDArray[np.intp], Floats, Floats]:
+        """Circle that holds each point (-1: none) and the image velocity there, px/s: the circle's own plus looming.
+
+        Only circles from Tr_s up speak for what is inside them.
+        """
+        rows = np.flatnonzero(circles.active & (circles.trust >= self._settings.tr_s))
+        if not len(rows) or not len(x):
+            none = np.zeros(len(x), np.float32)
+            return np.full(len(x), NO_CIRCLE), none, none
+        dx, dy = x[:, None] - circles.x[rows], y[:, None] - circles.y[rows]
+        away = np.hypot(dx, dy) - circles.radius[rows] - np.float32(MEMBER_MARGIN_PX)
+        nearest = np.argmin(away, axis=1)
+        pick = np.arange(len(x))
+        held = away[pick, nearest] < 0
+        row = rows[nearest]
+        rate = np.where(circles.ttc[row] > LEAST_TTC_S, 1 / np.maximum(circles.ttc[row], np.float32(LEAST_TTC_S)), 0)
+        vx = circles.speed[row] * np.cos(circles.beta[row]) + rate * dx[pick, nearest]
+        vy = circles.speed[row] * np.sin(circles.beta[row]) + rate * dy[pick, nearest]
+        return np.where(held, row, NO_CIRCLE), vx.astype(np.float32), vy.astype(np.float32)
+
     def update(
         self, edges: EdgeTable, circles: CircleTable, rebels: Rebels, around: Surroundings, speed_mps: float
     ) -> int:
@@ -54,7 +93,9 @@ class RebelCircles:
             if len(size):
                 evicted = self._meet(edges, circles, rebels, label, size, around, updated)
         missed = live & circles.active & ~updated
-        circles.trust[missed] -= 1
+        coasts = (circles.ttc < COAST_S) & (circles.ttc > -COAST_S) & (circles.trust >= settings.tr_s)
+        circles.trust[missed & ~coasts] -= 1
+        circles.active &= circles.ttc > 0
         circles.active &= circles.trust >= settings.tr_cr
         release(edges, circles, rebel=True)
         return evicted

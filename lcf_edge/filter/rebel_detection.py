@@ -83,11 +83,12 @@ def links_since(
 class Verdict:
     """What the links say; (n,) each.
 
-    ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where it should be. ``over``: px
+    ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where it should be. ``over``: px
     beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it stands still. ``mover``,
     ``incoming``: bool.
     """
 
+    r: Floats
     drift: Floats
     short: Floats
     over: Floats
@@ -152,7 +153,7 @@ def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
         & (height_m < around.height_m)
     )
     return Verdict(
-        drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming
+        r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming
     )
 
 
@@ -184,8 +185,9 @@ def agree(
     old, new = old * sign, new * sign
     same = (new + slack > old / LINK_RATIO) & (new - slack < old * LINK_RATIO)
     verdict[mover] = same[mover]
-    closing = (recent.expansion > whole.expansion / LINK_RATIO) & (
-        recent.expansion < whole.expansion * LINK_RATIO
+    slack = np.float32(3 * noise_px) / (recent_s * recent.r)
+    closing = (recent.expansion + slack > whole.expansion / LINK_RATIO) & (
+        recent.expansion - slack < whole.expansion * LINK_RATIO
     )
     verdict[~mover] = closing[~mover]
     return verdict

@@ -1,0 +1,1 @@
+"""Measurements: `score` compares results with the truth of rendered drives."""

@@ -1,0 +1,32 @@
+"""Where results go: JSON lines (``results``), a two-panel video (``overlay``), a plot (``size_plot``)."""
+
+from pathlib import Path
+
+from lcf_edge.errors import LcfError, UsageError
+
+
+class SinkError(LcfError):
+    """An output that cannot be written."""
+
+
+def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> None:
+    """Refuse an output before work begins, without touching what the file may hold.
+
+    Raises ``UsageError`` when the name does not end in one of ``suffixes``, ``SinkError`` when the file
+    cannot be written.
+    """
+    if suffixes and path.suffix.lower() not in suffixes:
+        raise UsageError(f"{path}: the name must end in {' or '.join(suffixes)}")
+    is_new = not path.exists()
+    try:
+        with path.open("ab"):
+            pass
+        if is_new:
+            path.unlink()
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def cannot_write(path: Path | str, error: OSError) -> SinkError:
+    """The error of a file that cannot be written."""
+    return SinkError(f"{path}: cannot be written ({error.strerror}); name another file or free the disk")

@@ -1,0 +1,252 @@
+"""The overlay shows each thing in its colour, in its panel, and the video holds every frame."""
+
+from collections.abc import Callable
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from lcf_edge.errors import UsageError
+from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene, Shape, View
+from lcf_edge.sinks import SinkError
+from lcf_edge.sinks.overlay import BLUE, GREEN, RED, WHITE, YELLOW, Colour, Picture, VideoSink, draw
+
+WIDTH, HEIGHT = 320, 240
+NO_POINTS = np.zeros((0, 2), np.float32)
+
+
+def points(*rows: tuple[float, ...]) -> npt.NDArray[np.float32]:
+    return np.array(rows, np.float32)
+
+
+def circle(**fields: Any) -> npt.NDArray[np.void]:
+    row = np.zeros(1, CIRCLE)
+    row["ttc"] = np.inf
+    for name, value in fields.items():
+        row[name] = value
+    return row
+
+
+def region(shape: Shape, x: float, y: float, width: float, height: float) -> npt.NDArray[np.void]:
+    return np.array([(1, shape, x, y, width, height, 5)], PSI_REGION)
+
+
+def picture(
+    *,
+    circles: npt.NDArray[np.void] | None = None,
+    psi: npt.NDArray[np.void] | None = None,
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+    notes: tuple[str, ...] = (),
+    **view: Any,
+) -> Picture:
+    width, height = size
+    scene = Scene(
+        stamp_ns=1_000_000_000,
+        seq=1,
+        image_width=width,
+        image_height=height,
+        vehicle_speed=1.0,
+        circles=np.zeros(0, CIRCLE) if circles is None else circles,
+        psi=np.zeros(0, PSI_REGION) if psi is None else psi,
+        notes=notes,
+    )
+    parts = {
+        "corners": NO_POINTS,
+        "omitted": np.zeros(0, np.bool_),
+        "edges": NO_POINTS,
+        "rebels": NO_POINTS,
+        "groups": np.zeros((0, 3), np.float32),
+        "edge_group": np.zeros(0, np.intp),
+        "focus": points((WIDTH - 20.0, 20.0))[0],
+    }
+    outcome: Any = SimpleNamespace(scene=scene, view=View(**{**parts, **view}))
+    return draw(np.full((height, width), 60, np.uint8), outcome)
+
+
+def has(panels: Picture, x: int, y: int, colour: Colour) -> bool:
+    """The colour stands within a pixel of (x, y)."""
+    patch = panels[y - 1 : y + 2, x - 1 : x + 2].astype(int)
+    return bool((np.abs(patch - colour).max(axis=2) < 60).any())
+
+
+LEFT_OFFSET, RIGHT_OFFSET = 0, WIDTH
+
+SHOWN: dict[str, tuple[Callable[[], Picture], int, int, Colour]] = {
+    "corner": (
+        lambda: picture(corners=points((50, 60)), omitted=np.array([False])),
+        LEFT_OFFSET + 50,
+        60,
+        YELLOW,
+    ),
+    "omitted corner": (
+        lambda: picture(corners=points((50, 60)), omitted=np.array([True])),
+        LEFT_OFFSET + 50,
+        60,
+        RED,
+    ),
+    "edge": (
+        lambda: picture(edges=points((50, 60)), edge_group=np.array([-1])),
+        LEFT_OFFSET + 53,
+        60,
+        BLUE,
+    ),
+    "group line": (
+        lambda: picture(edges=points((50, 60)), edge_group=np.array([0]), groups=points((90, 60, 64))),
+        LEFT_OFFSET + 80,
+        60,
+        GREEN,
+    ),
+    "psi circle": (
+        lambda: picture(psi=region(Shape.CIRCLE, 100, 100, 80, 80)),
+        LEFT_OFFSET + 140,
+        100,
+        YELLOW,
+    ),
+    "psi rectangle": (
+        lambda: picture(psi=region(Shape.RECTANGLE, 100, 100, 80, 40)),
+        LEFT_OFFSET + 70,
+        120,
+        YELLOW,
+    ),
+    "normal circle": (
+        lambda: picture(circles=circle(kind=Kind.NORMAL, x=100, y=100, radius=30)),
+        RIGHT_OFFSET + 130,
+        100,
+        GREEN,
+    ),
+    "rebel circle": (
+        lambda: picture(circles=circle(kind=Kind.REBEL, x=100, y=100, radius=30)),
+        RIGHT_OFFSET + 70,
+        100,
+        RED,
+    ),
+    "rebel edge": (lambda: picture(rebels=points((50, 60))), RIGHT_OFFSET + 47, 60, RED),
+    "focus": (lambda: picture(focus=points((160, 120))[0]), RIGHT_OFFSET + 160, 120, WHITE),
+}
+
+
+@pytest.mark.parametrize("thing", SHOWN)
+def test_each_thing_has_its_place_and_colour(thing: str) -> None:
+    drawn, x, y, colour = SHOWN[thing]
+    panels = drawn()
+    assert panels.shape == (HEIGHT, 2 * WIDTH, 3)
+    assert panels.dtype == np.uint8
+    assert has(panels, x, y, colour)
+    assert not has(panels, (x + WIDTH) % (2 * WIDTH), y, colour), "in the other panel too"
+    assert not has(picture(), x, y, colour), "there without the thing"
+
+
+def text_pixels(panels: Picture, reference: Picture) -> npt.NDArray[np.intp]:
+    """(n, 2) row, column of what differs."""
+    return np.argwhere((panels != reference).any(axis=2))
+
+
+def test_cause_and_time_to_contact_stand_beside_the_rebel_circle() -> None:
+    def drawn(cause: Cause, ttc: float) -> Picture:
+        return picture(circles=circle(kind=Kind.REBEL, cause=cause, x=100, y=100, radius=20, ttc=ttc))
+
+    for other in (drawn(Cause.INCOMING, 2.1), drawn(Cause.CROSSING, 3.4), drawn(Cause.CROSSING, np.inf)):
+        changed = text_pixels(drawn(Cause.CROSSING, 2.1), other)
+        assert len(changed) > 10
+        rows, columns = changed.T
+        assert 50 < rows.min() < rows.max() < 80  # above the circle
+        assert WIDTH + 40 < columns.min() < columns.max() < WIDTH + 160
+
+
+@pytest.mark.parametrize(("x", "y"), [(-10, -10), (WIDTH + 5, 4), (3, HEIGHT), (WIDTH, HEIGHT)])
+def test_a_label_never_leaves_its_panel(x: float, y: float) -> None:
+    """Whole inside: as many pixels of it as in the middle of the picture."""
+
+    def letters(x: float, y: float) -> int:
+        rebel = {"kind": Kind.REBEL, "x": x, "y": y, "radius": 1}
+        one, other = (picture(circles=circle(**rebel, cause=Cause.CROSSING, ttc=ttc)) for ttc in (1.1, 8.8))
+        changed = text_pixels(one, other)
+        assert (changed[:, 1] >= WIDTH).all(), "spilled into the left panel"
+        return len(changed)
+
+    assert letters(x, y) == pytest.approx(letters(160, 120), rel=0.5)
+
+
+def test_labels_of_neighbours_do_not_cover_each_other() -> None:
+    rebel = {"kind": Kind.REBEL, "cause": Cause.CROSSING, "y": 100, "radius": 15}
+    alone = [picture(circles=circle(**rebel, x=x, ttc=1)) for x in (100, 110)]
+    both = picture(circles=np.concatenate([circle(**rebel, x=x, ttc=1) for x in (100, 110)]))
+    empty = picture()
+    above = np.s_[60:82, WIDTH:]
+    assert (text_pixels(both[above], empty[above]).size) < 1.2 * text_pixels(
+        alone[0][above], empty[above]
+    ).size
+
+
+def test_notes_stand_in_the_caption() -> None:
+    changed = text_pixels(picture(notes=("no imu",)), picture())
+    assert len(changed) > 10
+    assert changed[:, 0].min() >= HEIGHT - 20
+
+
+@settings(max_examples=40, deadline=None)
+@given(
+    x=st.floats(width=32),
+    y=st.floats(width=32),
+    radius=st.floats(width=32),
+    ttc=st.floats(width=32),
+    size=st.sampled_from([(1, 1), (33, 7), (64, 48), (320, 240)]),
+)
+def test_no_value_breaks_the_drawing(
+    x: float, y: float, radius: float, ttc: float, size: tuple[int, int]
+) -> None:
+    circles = np.concatenate([circle(kind=kind, x=x, y=y, radius=radius, ttc=ttc) for kind in Kind])
+    panels = picture(
+        circles=circles,
+        psi=np.concatenate([region(shape, x, y, radius, radius) for shape in Shape]),
+        corners=points((x, y)),
+        omitted=np.array([False]),
+        edges=points((x, y)),
+        edge_group=np.array([0]),
+        groups=points((y, x, radius)),
+        rebels=points((x, y)),
+        focus=points((x, y))[0],
+        size=size,
+    )
+    assert panels.shape == (size[1], 2 * size[0], 3)
+
+
+@pytest.mark.parametrize("height", [48, 47])
+def test_the_video_holds_every_frame(tmp_path: Path, height: int) -> None:
+    path = tmp_path / "overlay.mp4"
+    with VideoSink(path, 29.97, (128, height)) as video:
+        for grey in range(0, 240, 20):
+            video.write(np.full((height, 128, 3), grey, np.uint8))
+    capture = cv2.VideoCapture(str(path))
+    assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(29.97)
+    pictures = [frame for got, frame in iter(capture.read, (False, None)) if got]
+    capture.release()
+    assert [frame.shape for frame in pictures] == [(48 - height % 2 * 2, 128, 3)] * 12
+    assert [frame.mean() for frame in pictures] == pytest.approx(range(0, 240, 20), abs=4)
+
+
+def test_a_video_under_a_wrong_name_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"overlay\.avi: the name must end in \.mp4"):
+        VideoSink(tmp_path / "overlay.avi", 20, (64, 48))
+
+
+def test_a_video_that_cannot_be_written_is_named(tmp_path: Path) -> None:
+    with pytest.raises(SinkError, match=r"nowhere/overlay\.mp4: cannot be written \(No such file"):
+        VideoSink(tmp_path / "nowhere" / "overlay.mp4", 20, (64, 48))
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
+def test_a_full_disk_does_not_pass_for_a_video(tmp_path: Path) -> None:
+    path = tmp_path / "overlay.mp4"
+    path.symlink_to("/dev/full")
+    with (
+        pytest.raises(SinkError, match=r"overlay\.mp4: the video cannot be written"),
+        VideoSink(path, 20, (64, 48)) as video,
+    ):
+        video.write(np.zeros((48, 64, 3), np.uint8))
