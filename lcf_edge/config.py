@@ -72,12 +72,13 @@ class Filter(Table):
     delta_px: Positive = 1.5  # δ, corner noise off the flow line
     delta_rebel_px: Positive = 3.0  # δ over the chain of key frames
     bl0_px: Positive = 12.0  # BL at birth
+    leap_px: Positive = 40.0  # farthest that a landmark may move between its first two frames
     bl_min_px: Positive = 3.0
     bs_px: Positive = 64.0  # BS_λ, largest radius of a circle
     scene_depth_m: Positive = 4.0  # depth of a new landmark that no circle knows
     appearance_max: Positive = 28.0  # mean absolute grey difference that still is the same corner
     appearance_share: Positive = 0.5  # and as a share of the corner's own contrast
-    key_interval_s: Positive = 0.1  # least time between key frames of α
+    key_interval_s: Positive = 0.05  # least time between key frames of α
     key_motion_px: NotNegative = 1.0  # a key frame waits for this median motion, three intervals at most
     eps_beta_rad: Positive = 0.349  # ε_β, 20°
     eps_v: Positive = 10.0  # ε_V

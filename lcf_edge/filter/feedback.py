@@ -1,14 +1,17 @@
 """Feedback: circles that are fully trusted become ψ, and ψ gives way to whatever breaks the flow."""
 
 import numpy as np
+import numpy.typing as npt
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.line_expert import inside_psi
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, PsiTable
+from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable
 from lcf_edge.records import Shape
 
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
+SEEN_SHARE = 0.6  # of the edges under ψ must have a corner where they are predicted
+NEW_RATIO = 1.5  # and there may be so many corners for each
+SPARE_CORNERS = 2
 MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 
 
@@ -73,10 +76,21 @@ class Feedback:
         away = np.where(psi.shape == Shape.CIRCLE, away_circle, away_rectangle)
         psi.active &= ~(away <= reach[:, None]).any(axis=0)
 
+    def end_surprised(
+        self,
+        psi: PsiTable,
+        holder_of_corner: npt.NDArray[np.int32],
+        holder_of_edge: npt.NDArray[np.int32],
+        seen: Mask,
+    ) -> None:
+        """End the ψ regions whose corners are not where, or not as many as, the edges under them let expect.
 
-def hold(edges: EdgeTable, psi: PsiTable, key_number: int) -> None:
-    """Mark the normal edges under ψ: they are predicted without being looked for, and their history starts anew."""
-    n = edges.count
-    holder = inside_psi(psi, edges.x[:n], edges.y[:n])
-    edges.held[:n] = (holder != NO_CIRCLE) & ~edges.rebel[:n] & (edges.links[:n] == 0)
-    edges.born_key[:n][edges.held[:n]] = key_number
+        ``holder_of_corner`` (c,), ``holder_of_edge`` (e,): rows of ψ. ``seen``: bool (e,), whether a corner lies at
+        an edge's prediction. This look costs a few places in an index, and lets nothing walk through ψ unseen.
+        """
+        corners = np.bincount(holder_of_corner, minlength=psi.capacity)
+        edges = np.bincount(holder_of_edge, minlength=psi.capacity)
+        explained = np.bincount(holder_of_edge[seen], minlength=psi.capacity)
+        gone = explained < SEEN_SHARE * edges - SPARE_CORNERS
+        new = corners > NEW_RATIO * edges + SPARE_CORNERS
+        psi.active &= ~(gone | new)

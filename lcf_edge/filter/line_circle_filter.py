@@ -10,10 +10,10 @@ from lcf_edge.config import Config
 from lcf_edge.filter import edge_expert
 from lcf_edge.filter.circles import newborn_trust
 from lcf_edge.filter.edge_expert import Estimate, Relation
-from lcf_edge.filter.feedback import MARGIN_PX, Feedback, hold
+from lcf_edge.filter.feedback import MARGIN_PX, Feedback
 from lcf_edge.filter.flow import KeyFrames, Matrix, Pinhole, carry, line_distance, wrap
 from lcf_edge.filter.inputs import Corners, Motion
-from lcf_edge.filter.line_expert import Groups, omit
+from lcf_edge.filter.line_expert import Groups, inside_psi
 from lcf_edge.filter.matching import DISTANCE_COST, GATES_PX, CornerIndex, difference, likeness_needed, one_to_one
 from lcf_edge.filter.normal_circles import NormalCircles
 from lcf_edge.filter.rebel_circles import RebelCircles, Rebels
@@ -101,13 +101,12 @@ class LineCircleFilter:
         around = self._derotate(motion)
         corner_x = np.ascontiguousarray(corners.position[:, 0])
         corner_y = np.ascontiguousarray(corners.position[:, 1])
-        omitted = omit(corner_x, corner_y, self.psi)
-        hold(self.edges, self.psi, self._keys.number)
+        estimate = self._predict(motion)
+        omitted = self._omit(corners, corner_x, corner_y, estimate)
         evicted = self.groups.collect(self.normal, self.rebel, self.settings.tr_cr)
 
         kept = np.flatnonzero(~omitted)
         self._index.fill(corners.pixel[kept])
-        estimate = self._predict(motion)
         edge, corner = self._match(estimate, corners.pixel, corners.appearance, kept, corner_x, corner_y, motion)
         estimate = self._refine(estimate, edge, corner_x[corner], corner_y[corner], motion)
         free = self._update_edges(estimate, edge, corner, kept, corners, corner_x, corner_y, motion)
@@ -196,7 +195,27 @@ class LineCircleFilter:
             table.x[:], table.y[:] = carry(h, table.x, table.y)
         self.rebel.beta += roll
 
-    # -- step 1: predictions and matches -------------------------------------------------------------------------------
+    # -- step 1: predictions, the Line expert, and matches -----------------------------------------------------------
+
+    def _omit(self, corners: Corners, corner_x: Floats, corner_y: Floats, estimate: Estimate) -> Mask:
+        """Corners inside ψ, after ending the regions where something is not as predicted."""
+        edges, n, psi = self.edges, self.edges.count, self.psi
+        edges.held[:n] = False
+        if not psi.active.any():
+            return np.zeros(len(corners), np.bool_)
+        holder = inside_psi(psi, corner_x, corner_y)
+        edge_holder = inside_psi(psi, estimate.x, estimate.y)
+        edge_holder[edges.rebel[:n] | (edges.links[:n] > 0)] = NO_CIRCLE
+        held = np.flatnonzero(edge_holder != NO_CIRCLE)
+        inside = np.flatnonzero(holder != NO_CIRCLE)
+        raw = self._lens.distort(np.stack([estimate.x[held], estimate.y[held]], axis=1))
+        self._index.fill(corners.pixel[inside])
+        seen = self._index.any_near(raw)
+        self._feedback.end_surprised(psi, holder[inside], edge_holder[held], seen)
+        omitted = (holder != NO_CIRCLE) & psi.active[holder]
+        edges.held[:n] = (edge_holder != NO_CIRCLE) & psi.active[edge_holder]
+        edges.born_key[:n][edges.held[:n]] = self._keys.number  # what is only predicted is no history
+        return omitted
 
     def _predict(self, motion: Motion) -> Estimate:
         """E': normal edges go out along their flow line, rebels and chains as they went."""
@@ -231,12 +250,14 @@ class LineCircleFilter:
         used = np.zeros(len(pixel), np.bool_)
         used[first[1]] = True
         wanted[first[0]] = False
-        wanted &= ~edges.rebel[:n] & (edges.links[:n] == 0) & (edges.trust[:n] >= self.settings.tr_s)
+        wanted &= ~edges.rebel[:n] & (edges.links[:n] == 0)
         left = np.flatnonzero(~used[kept])
         if not wanted.any() or not len(left):
             return first
         self._index.fill(pixel[kept[left]])
-        reach = np.maximum(gate, np.float32(self.settings.bl0_px) + widen)
+        young = edges.trust[:n] < self.settings.tr_s
+        reach = np.where(young, np.float32(self.settings.leap_px), np.float32(self.settings.bl0_px)) + widen
+        reach = np.minimum(np.maximum(gate, reach), np.float32(GATES_PX[-1]))
         second = self._pair(edges.x[:n], edges.y[:n], reach, wanted, pixel[kept[left]], appearance, kept[left], np.float32(0.5) * likely)
         return np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
 

@@ -3,10 +3,8 @@
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, Floats, Mask, PsiTable
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, Floats, PsiTable
 from lcf_edge.records import Shape
-
-LABEL_SHIFT = 2  # λ labels are painted at a quarter of the resolution
 
 
 def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
@@ -89,7 +87,3 @@ class Groups:
         best[held] = last[held]
         return best
 
-
-def omit(corners_x: Floats, corners_y: Floats, psi: PsiTable) -> Mask:
-    """Corners that the Line expert leaves out; bool (n,)."""
-    return inside_psi(psi, corners_x, corners_y) != NO_CIRCLE

@@ -26,6 +26,7 @@ class CornerIndex:
         self._cells = np.full((rows, self._columns), -1, np.int16)
         self._flat = self._cells.reshape(-1)
         self._width, self._height = width, height
+        self._near = self._disc(2)
         self._offsets = [self._disc(radius) for radius in GATES_PX]
 
     @property
@@ -69,6 +70,16 @@ class CornerIndex:
         if not who:
             return np.empty(0, np.intp), np.empty(0, np.intp)
         return np.concatenate(who), np.concatenate(what)
+
+
+    def any_near(self, raw: Floats) -> npt.NDArray[np.bool_]:
+        """Whether a corner lies within about 3 px of each point; float32 (n, 2) px, NaN or outside: no."""
+        x, y = raw[:, 0], raw[:, 1]
+        inside = (x >= 0) & (y >= 0) & (x <= self._width - 1) & (y <= self._height - 1)
+        cell = self._cell(np.rint(x[inside]).astype(np.int32), np.rint(y[inside]).astype(np.int32))
+        found = np.zeros(len(raw), np.bool_)
+        found[inside] = (self._flat[cell[:, None] + self._near] >= 0).any(axis=1)
+        return found
 
 
 def difference(

@@ -17,7 +17,7 @@ from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
-BASELINE_LEAST_S = 0.12
+BASELINE_LEAST_S = 0.08
 BASELINE_SURE_S = 0.2  # a history this long tells what moves from what stands
 
 

@@ -13,7 +13,7 @@ Rows = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.float32]
 
-KEYS = 6  # key frames that an edge remembers
+KEYS = 11  # key frames that an edge remembers
 NO_CIRCLE = -1
 
 _EDGE_FIELDS = ("x", "y", "beta", "speed", "bl", "trust", "deviation", "origin_x", "origin_y")
