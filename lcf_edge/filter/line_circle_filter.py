@@ -153,6 +153,8 @@ class LineCircleFilter:
         self.normal.y += (self.normal.y - fy) * growth
         self.normal.radius *= 1 + growth
         self._rebel_circles.predict(self.rebel, motion.dt_s)
+        for circles in (self.normal, self.rebel):
+            circles.active &= self._in_frame(circles.x, circles.y)
         return Surroundings(
             pinhole=self._pinhole,
             focus=self.focus,
@@ -423,11 +425,15 @@ class LineCircleFilter:
     def _delete_edges(self) -> None:
         """Edges whose trust ran out, or that left the frame."""
         edges, n = self.edges, self.edges.count
-        raw = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
-        inside = (raw[:, 0] >= 0) & (raw[:, 1] >= 0)
-        inside &= (raw[:, 0] <= self._lens.width - 1) & (raw[:, 1] <= self._lens.height - 1)
-        dead = ~(inside & (edges.trust[:n] >= self.settings.tr_cr))  # NaN is outside
+        dead = ~(self._in_frame(edges.x[:n], edges.y[:n]) & (edges.trust[:n] >= self.settings.tr_cr))
         edges.remove(dead)
+
+    def _in_frame(self, x: Floats, y: Floats) -> Mask:
+        """Whether positions of the ideal pinhole lie in the picture; bool (n,)."""
+        raw = self._lens.distort(np.stack([x, y], axis=1))
+        inside = (raw >= 0).all(axis=1)  # NaN is outside
+        inside &= (raw[:, 0] <= self._lens.width - 1) & (raw[:, 1] <= self._lens.height - 1)
+        return inside
 
     def _add_edges(
         self, free: Rows, corners: Corners, corner_x: Floats, corner_y: Floats, around: Surroundings

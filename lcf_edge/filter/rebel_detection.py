@@ -17,6 +17,7 @@ from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
+DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
 BASELINE_LEAST_S = 0.08
 BASELINE_SURE_S = 0.2  # a history this long tells what moves from what stands
 
@@ -143,10 +144,13 @@ def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
     ttc = range_m / np.maximum(speed, np.float32(1e-3))
     height_m = np.float32(around.camera_height_m) - below / focal * range_m  # above the ground
     noise = np.float32(2 * around.noise_px)
+    slowest = np.maximum(outward - np.float32(np.sqrt(2) * around.noise_px) - links.sigma_px, 0)
+    sure = slowest * np.float32(DOUBT * around.horizon_s) * speed > travelled * r
     incoming = (
         ~mover
         & (sign > 0)
         & (ttc < around.horizon_s)
+        & sure
         & (np.abs(lateral_m) < around.half_width_m)
         & (outward > noise + links.sigma_px)
         & (outward - r * ground_mu * np.float32(1 + around.ground_margin) > noise)
