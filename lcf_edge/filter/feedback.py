@@ -12,6 +12,7 @@ RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share o
 SEEN_SHARE = 0.6  # of the edges under ψ must have a corner where they are predicted
 NEW_RATIO = 1.5  # and there may be so many corners for each
 SPARE_CORNERS = 2
+PSI_LEAST_FRAMES = 3.5
 MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 
 
@@ -28,7 +29,7 @@ class Feedback:
         under[psi.circle[psi.active & (psi.circle >= 0)]] = True
         return under
 
-    def write(self, psi: PsiTable, circles: CircleTable, harmless: Mask) -> int:
+    def write(self, psi: PsiTable, circles: CircleTable, harmless: Mask, dt_s: float) -> int:
         """Normal circles at Tr_max write ψ, their trust falls back to Tr_s; answers evictions.
 
         ``harmless``: bool (capacity,), circles that may be ignored.
@@ -49,7 +50,7 @@ class Feedback:
         psi.height[places] = np.where(rectangle, height, diameter)
         psi.trust[places] = circles.trust[rows]
         psi.expansion[places] = circles.expansion[rows]
-        psi.life_s[places] = settings.psi_life_s
+        psi.life_s[places] = max(settings.psi_life_s, PSI_LEAST_FRAMES * dt_s)
         psi.circle[places] = rows
         psi.id[places] = self._ids.take(len(places))
         circles.trust[rows] = settings.tr_s

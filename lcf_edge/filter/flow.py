@@ -71,15 +71,18 @@ class KeyFrames:
         self.since_s = 0.0  # time since the last one
 
     def advance(
-        self, rotation: Matrix, forward: npt.NDArray[np.float64], speed_mps: float, dt_s: float, sigma_rad: float
+        self, rotation: Matrix, forward: npt.NDArray[np.float64], speed_mps: float, dt_s: float
     ) -> None:
         """Account for the motion of one frame interval; ``forward``: (3,) unit direction of travel in camera axes."""
         step = 0.5 * speed_mps * dt_s * (forward + rotation @ forward)  # chord of the arc
         self.rotation[:] = rotation @ self.rotation
         self.displacement[:] = self.displacement @ rotation.T + step
         self.elapsed_s += dt_s
-        self.sigma_rad[:] = np.hypot(self.sigma_rad, sigma_rad)
         self.since_s += dt_s
+
+    def blur(self, sigma_rad: float) -> None:
+        """Account for what the rotation of the last interval leaves uncertain."""
+        self.sigma_rad[:] = np.hypot(self.sigma_rad, sigma_rad)
 
     def correct(self, rotation: Matrix) -> None:
         """Apply a small rotation that the flow has shown to be missing in the last interval."""

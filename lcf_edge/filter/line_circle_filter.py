@@ -108,7 +108,8 @@ class LineCircleFilter:
         kept = np.flatnonzero(~omitted)
         self._index.fill(corners.pixel[kept])
         edge, corner = self._match(estimate, corners.pixel, corners.appearance, kept, corner_x, corner_y, motion)
-        estimate = self._refine(estimate, edge, corner_x[corner], corner_y[corner], motion)
+        estimate, self._sigma_rad = self._refine(estimate, edge, corner_x[corner], corner_y[corner], motion)
+        self._keys.blur(self._sigma_rad)
         free = self._update_edges(estimate, edge, corner, kept, corners, corner_x, corner_y, motion)
         self._delete_edges()
         evicted += self._add_edges(free, corners, corner_x, corner_y, around)
@@ -143,7 +144,6 @@ class LineCircleFilter:
             self._forward,
             speed if math.isfinite(speed) else 1.0,
             motion.dt_s,
-            motion.rotation_sigma_rad,
         )
         self._carry(motion.rotation)
         self._feedback.advance(self.psi, self.normal, self.focus, motion.dt_s)
@@ -244,7 +244,7 @@ class LineCircleFilter:
     ) -> tuple[Rows, Rows]:
         """Edges and corners that are the same landmark: near L' first, then, for the rest, near L."""
         edges, n = self.edges, self.edges.count
-        widen = np.float32(3 * motion.rotation_sigma_rad * self._pinhole.focal)
+        widen = np.float32(min(3 * motion.rotation_sigma_rad * self._pinhole.focal, self.settings.leap_px))
         gate = np.minimum(edges.bl[:n] + widen, np.float32(GATES_PX[-1]))
         wanted = ~edges.held[:n]
         likely = likeness_needed(edges.appearance[:n], self.settings.appearance_max, self.settings.appearance_share)
@@ -290,16 +290,19 @@ class LineCircleFilter:
         best = one_to_one(edge, what, cost, len(x), len(pixel))
         return edge[best], corner[what[best]]
 
-    def _refine(self, estimate: Estimate, edge: Rows, x: Floats, y: Floats, motion: Motion) -> Estimate:
+    def _refine(
+        self, estimate: Estimate, edge: Rows, x: Floats, y: Floats, motion: Motion
+    ) -> tuple[Estimate, float]:
         """Take out the rotation that the gyro missed: the one that puts trusted edges back on their flow lines.
 
         Weighted least squares over the distances from the flow lines, which depend on rotation alone; the gyro's
-        uncertainty is the prior, so that with a good gyro or few edges nothing happens.
+        uncertainty is the prior, so that with a good gyro or few edges nothing happens. Answers the predictions, and
+        what is left of the uncertainty in rad.
         """
         edges = self.edges
         steady = ~edges.rebel[edge] & (edges.links[edge] == 0) & (edges.trust[edge] >= self.settings.tr_s)
         if np.count_nonzero(steady) < REFINE_LEAST or motion.rotation_sigma_rad <= 0:
-            return estimate
+            return estimate, motion.rotation_sigma_rad
         rows, x, y = edge[steady], x[steady], y[steady]
         beta = estimate.beta[rows]
         off = line_distance(x - estimate.x[rows], y - estimate.y[rows], beta)
@@ -321,14 +324,16 @@ class LineCircleFilter:
             rest = np.abs(off - turn.astype(np.float32) @ a)
             weight = 1 / np.square(1 + np.square(rest / (2 * noise)))
             wa = a * weight
-            turn = np.linalg.solve((wa @ a.T).astype(np.float64) + prior, (wa @ off).astype(np.float64))
+            information = (wa @ a.T).astype(np.float64) + prior
+            turn = np.linalg.solve(information, (wa @ off).astype(np.float64))
         w = turn
         rotation = np.array([[1, -w[2], w[1]], [w[2], 1, -w[0]], [-w[1], w[0], 1]])
         self._keys.correct(rotation)
         self._carry(rotation)
         h = pinhole.homography(rotation)
         ex, ey = carry(h, estimate.x, estimate.y)
-        return Estimate(ex, ey, estimate.speed, estimate.beta)
+        sigma = float(noise * np.sqrt(np.diag(np.linalg.inv(information))[:2].max()))  # of pitch and yaw
+        return Estimate(ex, ey, estimate.speed, estimate.beta), sigma
 
     # -- step 2: Circle expert, edges -----------------------------------------------------------------------------------
 
@@ -346,7 +351,7 @@ class LineCircleFilter:
         """Classify the pairs, update or predict every edge; answers the corners that are left as new landmarks."""
         edges, n, settings = self.edges, self.edges.count, self.settings
         cx, cy = corner_x[corner], corner_y[corner]
-        delta = np.float32(settings.delta_px + 2 * motion.rotation_sigma_rad * self._pinhole.focal)
+        delta = np.float32(settings.delta_px + 2 * self._sigma_rad * self._pinhole.focal)
         at = Estimate(estimate.x[edge], estimate.y[edge], estimate.speed[edge], estimate.beta[edge])
         relation = edge_expert.classify(
             edges.x[edge], edges.y[edge], at, cx, cy, edges.bl[edge], delta, motion.dt_s, settings.eps_beta_rad
@@ -598,7 +603,7 @@ class LineCircleFilter:
         reach = np.concatenate(
             [np.full(int(np.count_nonzero(breaking)), np.float32(MARGIN_PX)), self.rebel.radius[active] + np.float32(2 * MARGIN_PX)]
         )
-        evicted += self._feedback.write(self.psi, self.normal, self._harmless(around) & self._looked_at())
+        evicted += self._feedback.write(self.psi, self.normal, self._harmless(around) & self._looked_at(), motion.dt_s)
         self._feedback.give_way(self.psi, x, y, reach)
         return evicted
 

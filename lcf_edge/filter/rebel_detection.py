@@ -17,6 +17,7 @@ from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
+GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
 DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
 BASELINE_LEAST_S = 0.08
 BASELINE_SURE_S = 0.2  # a history this long tells what moves from what stands
@@ -124,7 +125,7 @@ def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
     ground_far = below - slack  # px below the horizon if the camera looks as far down as it may
     ground_near = below + slack
     if around.camera_height_m > 0:
-        least_mu = travelled * np.maximum(ground_far, 0) / (reach * np.float32(1 + around.ground_margin))
+        least_mu = travelled * np.maximum(ground_far, 0) / (reach * np.float32(1 + GROUND_DIPS))
         ground_mu = travelled * np.maximum(ground_near, 0) / reach
     else:
         least_mu = np.zeros_like(mu)
