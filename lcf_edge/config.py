@@ -1,12 +1,13 @@
 """Configuration: typed tables with the unit in each name, from TOML and ``--set``.
 
-``load`` reads a file (or the defaults), applies ``KEY=VALUE`` settings, and answers with one ``Config`` that is
-checked whole: an unknown key, a wrong type or an impossible value is a ``ConfigError`` that names the key.
+``load`` reads a file (or the defaults), applies ``KEY=VALUE`` settings, and answers with one ``Config`` that
+is checked whole: an unknown key, a wrong type or an impossible value is a ``ConfigError`` that names the key.
 """
 
-import difflib
+import math
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from difflib import SequenceMatcher
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -15,41 +16,44 @@ import msgspec
 from lcf_edge.errors import ConfigError
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
+LARGEST_FILE_BYTES = 2**20
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
 Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
-Count = Annotated[int, msgspec.Meta(ge=1, le=65535)]
+Count = Annotated[int, msgspec.Meta(ge=1, le=32767)]  # rows are told apart by 16 bits
+Side = Annotated[int, msgspec.Meta(ge=1, le=16384)]
+Tilt = Annotated[float, msgspec.Meta(gt=-1.5, lt=1.5)]
 
 
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of the file; unknown keys are refused."""
 
 
-class Camera(Table):
+class Camera(Table, frozen=True):
     """What the camera is and where it sits."""
 
-    width: Count = 640
-    height: Count = 480
-    fps: Positive = 20.0  # of a video or a folder of pictures, which carry no stamps
-    intrinsics: list[float] = []  # fx, fy, cx, cy in px; empty: from the recording, else from the field of view
+    width: Side = 640
+    height: Side = 480
+    fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # of pictures that carry no stamps
+    intrinsics: list[float] = []  # fx, fy, cx, cy in px; empty: the recording's, else by the field of view
     horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else tells
     distortion_model: Literal["none", "radial-tangential", "equidistant"] = "none"
     distortion: list[float] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
     height_m: NotNegative = 0.3  # above the ground; 0: unknown, no ground test
-    pitch_rad: float = 0.0  # positive: looks up
-    yaw_rad: float = 0.0  # positive: looks to the right of the direction of travel
+    pitch_rad: Tilt = 0.0  # positive: looks up
+    yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
 
 
-class Imu(Table):
+class Imu(Table, frozen=True):
     """How the IMU's samples become the camera's axes."""
 
-    axes: list[list[float]] = []  # 3x3 rotation into the camera frame; empty: the recording's, else the identity
-    time_offset_s: float = 0.0  # camera time = IMU time + offset
+    axes: list[list[float]] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity
+    time_offset_s: Annotated[float, msgspec.Meta(ge=-4e9, le=4e9)] = 0.0  # camera time = IMU time + offset
     gyro_noise_radps: NotNegative = 0.005  # 1 sigma of what is left after the bias
 
 
-class Vehicle(Table):
+class Vehicle(Table, frozen=True):
     """What the vehicle is."""
 
     half_width_m: Positive = 0.3
@@ -59,7 +63,7 @@ class Vehicle(Table):
     speed_mps: float | None = None  # the constant
 
 
-class Filter(Table):
+class Filter(Table, frozen=True):
     """Constants of the filter, by the paper's names; the profile sets those that are not given."""
 
     profile: Literal["rover", "paper"] = "rover"
@@ -70,7 +74,7 @@ class Filter(Table):
     tr_s: NotNegative = 3.0
     tr_max: NotNegative = 5.0
     delta_px: Positive = 1.5  # δ, corner noise off the flow line
-    delta_rebel_px: Positive = 3.0  # δ over the chain of key frames
+    delta_rebel_px: Positive = 4.0  # δ over the chain of key frames
     bl0_px: Positive = 12.0  # BL at birth
     leap_px: Positive = 40.0  # farthest that a landmark may move between its first two frames
     bl_min_px: Positive = 3.0
@@ -89,8 +93,9 @@ class Filter(Table):
     involvement: Share = 0.5
     circle_support: Count = 4  # edges that make a normal circle
     rebel_support: Count = 3  # edges that make a rebel circle
+    rebel_share: Share = 0.25  # of the edges in a rebel circle must be rebels
     rebel_link_px: Positive = 40.0  # rebels farther apart are not of one circle
-    edge_noise_px: Positive = 0.4  # 1 sigma of an edge's position
+    edge_noise_px: Positive = 0.8  # 1 sigma of an edge's position
     focus_sigma_px: NotNegative = 6.0  # uncertainty of O
     ground_margin: Share = 0.3  # share by which the ground may be misjudged
     pitch_sigma_rad: NotNegative = 0.015
@@ -112,7 +117,7 @@ ROVER = Filter()
 """The shipped default, for 15 to 60 frames a second."""
 
 
-class Memory(Table):
+class Memory(Table, frozen=True):
     """Capacities of the tables; nothing grows beyond them."""
 
     budget_mib: Positive = 96.0
@@ -126,16 +131,16 @@ class Memory(Table):
     psi: Count = 32
 
 
-class Zenoh(Table):
+class Zenoh(Table, frozen=True):
     """How the Zenoh session is opened. By default: loopback only, nobody is scouted."""
 
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
     listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
-    config_file: str = ""  # a Zenoh configuration (JSON5), for TLS and access control; the keys above go on top
+    config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above go on top
 
 
-class Publish(Table):
+class Publish(Table, frozen=True):
     """What goes out, and under which names."""
 
     prefix: str = "lcf"
@@ -143,7 +148,7 @@ class Publish(Table):
     robot: str = "rover"
 
 
-class Config(Table):
+class Config(Table, frozen=True):
     """The whole configuration."""
 
     camera: Camera = Camera()
@@ -158,27 +163,33 @@ class Config(Table):
 def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
     """Read a configuration.
 
-    ``path``: a TOML file; None: ``DEFAULT_PATH`` when it exists, else the defaults. ``settings``: ``KEY=VALUE``
-    with dotted keys and TOML values (a bare word is a string). Raises ``ConfigError``.
+    ``path``: a TOML file; None: ``DEFAULT_PATH`` when it exists, else the defaults. ``settings``:
+    ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). Raises ``ConfigError``.
     """
-    tree: dict[str, Any] = {}
-    origin = "--set"
-    if path is None and DEFAULT_PATH.exists():
-        path = DEFAULT_PATH
-    if path is not None:
-        origin = str(path)
-        tree = _read(path)
+    file = _read(path or DEFAULT_PATH, needed=path is not None)
+    _typed(file, str(path or DEFAULT_PATH))
+    over: dict[str, Any] = {}
     for setting in settings:
-        _apply(tree, setting)
-    return _convert(tree, origin)
+        _apply(over, setting)
+    _typed(over, "--set")
+    config = _typed({name: file.get(name, {}) | over.get(name, {}) for name in file | over}, "configuration")
+    _check(config, " with ".join([str(path or DEFAULT_PATH)] * bool(file) + ["--set"] * bool(over)))
+    return config
 
 
-def _read(path: Path) -> dict[str, Any]:
+def _read(path: Path, *, needed: bool) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        with path.open("rb") as file:
+            data = file.read(LARGEST_FILE_BYTES + 1)
     except OSError as error:
+        if isinstance(error, FileNotFoundError) and not needed:
+            return {}
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); name another file with -c") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+    if len(data) > LARGEST_FILE_BYTES:
+        raise ConfigError(f"{path}: too large for a configuration; name another file with -c")
+    try:
+        return tomllib.loads(data.decode())
+    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, endless nesting
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
 
 
@@ -186,9 +197,11 @@ def _apply(tree: dict[str, Any], setting: str) -> None:
     key, equals, text = setting.partition("=")
     if not equals or not key.strip():
         raise ConfigError(f"--set {setting}: write KEY=VALUE, for example --set vehicle.half_width_m=0.6")
+    if not setting.isprintable():
+        raise ConfigError(f"--set {setting!a}: characters that cannot be printed; leave them out")
     try:
         value = tomllib.loads(f"value = {text}")["value"]
-    except tomllib.TOMLDecodeError:
+    except (ValueError, RecursionError):
         value = text.strip()
     *tables, name = key.strip().split(".")
     for table in tables:
@@ -198,63 +211,79 @@ def _apply(tree: dict[str, Any], setting: str) -> None:
     tree[name] = value
 
 
-def _convert(tree: dict[str, Any], origin: str) -> Config:
+def _typed(tree: dict[str, Any], origin: str) -> Config:
+    """The tree with the defaults for what it does not say; refuses unknown keys and wrong types."""
     _refuse_unknown(tree, Config, "", origin)
     section = tree.get("filter")
     if isinstance(section, dict) and section.get("profile") == "paper":
         tree = {**tree, "filter": {**msgspec.structs.asdict(PAPER), **section}}
     try:
-        config = msgspec.convert(tree, Config)
+        return msgspec.convert(tree, Config)
     except msgspec.ValidationError as error:
         what, _, where = str(error).partition(" - at ")
         key = where.strip("`").removeprefix("$.")
         raise ConfigError(f"{origin}: {key or 'configuration'}: {what}") from error
-    _check(config, origin)
-    return config
 
 
 def _refuse_unknown(tree: dict[str, Any], table: type[msgspec.Struct], prefix: str, origin: str) -> None:
     known = {field.name: field.type for field in msgspec.structs.fields(table)}
     for name, value in tree.items():
         if name not in known:
-            close = difflib.get_close_matches(name, known, n=1, cutoff=0.5) or _elsewhere(name)
-            hint = f"; did you mean {prefix if close[0] in known else ''}{close[0]}?" if close else ""
-            raise ConfigError(f"{origin}: unknown key {prefix}{name}{hint}")
+            raise ConfigError(f"{origin}: unknown key {prefix}{name}{_hint(name, prefix)}")
         if isinstance(value, dict) and isinstance(known[name], type) and issubclass(known[name], Table):
             _refuse_unknown(value, known[name], f"{name}.", origin)
 
 
-def _elsewhere(name: str) -> list[str]:
-    """The same key in another table."""
-    every = {
-        field.name: f"{table.name}.{field.name}"
+def _hint(name: str, prefix: str) -> str:
+    """The closest valid key, also of another table."""
+    keys = [(field.name, "") for field in msgspec.structs.fields(Config)]
+    keys += [
+        (field.name, f"{table.name}.")
         for table in msgspec.structs.fields(Config)
         for field in msgspec.structs.fields(table.type)
-    }
-    return [every[found] for found in difflib.get_close_matches(name, every, n=1, cutoff=0.8)]
+    ]
+
+    def closeness(key: tuple[str, str]) -> float:
+        same_table = 0.2  # a wrong table is a rarer slip than a wrong letter
+        return SequenceMatcher(None, name, key[0]).ratio() + same_table * (key[1] == prefix)
+
+    closest = max(keys, key=closeness)
+    return f"; did you mean {closest[1]}{closest[0]}?" if closeness(closest) > 0.7 else ""
 
 
 def _check(config: Config, origin: str) -> None:
     """What a type alone cannot say."""
     camera, filters = config.camera, config.filter
+    for table, values in msgspec.to_builtins(config).items():
+        for key, value in values.items():
+            if not all(map(math.isfinite, _numbers(value))):
+                raise ConfigError(f"{origin}: {table}.{key}: must be finite, not {value}")
     if camera.intrinsics and len(camera.intrinsics) != 4:
         raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
         raise ConfigError(f"{origin}: camera.intrinsics: focal lengths must be positive")
     wanted = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
     if len(camera.distortion) not in wanted:
-        raise ConfigError(
-            f"{origin}: camera.distortion: {camera.distortion_model} takes {' or '.join(map(str, wanted))} numbers"
-        )
+        counts = " or ".join(map(str, wanted))
+        raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
         raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
     if axes and not _is_rotation(axes):
         raise ConfigError(f"{origin}: imu.axes: not a rotation (rows must be orthonormal, determinant +1)")
     if config.vehicle.speed_source == "constant" and config.vehicle.speed_mps is None:
-        raise ConfigError(f"{origin}: vehicle.speed_mps: needed with vehicle.speed_source = \"constant\"")
+        raise ConfigError(f"{origin}: vehicle.speed_mps: needed with vehicle.speed_source=constant")
     if not filters.tr_cr <= filters.tr_s <= filters.tr_max:
         raise ConfigError(f"{origin}: filter.tr_s: trusts must be ordered tr_cr <= tr_s <= tr_max")
+
+
+def _numbers(value: Any) -> Iterator[float]:
+    """The numbers in a value, lists of lists included."""
+    if isinstance(value, list):
+        for item in value:
+            yield from _numbers(item)
+    elif isinstance(value, int | float):
+        yield value
 
 
 def _is_rotation(rows: list[list[float]]) -> bool:
@@ -270,6 +299,11 @@ def to_toml(config: Config) -> str:
     for table in msgspec.structs.fields(Config):
         lines.append(f"[{table.name}]")
         values = msgspec.structs.asdict(getattr(config, table.name))
-        lines += [f"{key} = {msgspec.json.encode(v).decode()}" for key, v in values.items() if v is not None]
+        lines += [f"{key} = {_to_toml(value)}" for key, value in values.items() if value is not None]
         lines.append("")
     return "\n".join(lines)
+
+
+def _to_toml(value: Any) -> str:
+    """JSON of what a key can hold is TOML, but for one character."""
+    return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")

@@ -1,4 +1,4 @@
-"""From a picture to corners: FAST, no more than the budget holds, spread over the picture, with their looks."""
+"""From a picture to corners: FAST, no more than the budget holds, spread over the picture, with looks."""
 
 from operator import attrgetter
 
@@ -11,7 +11,8 @@ from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 
 BORDER_PX = 7  # the appearance samples must lie inside the picture
-RING_PX = ((4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3)) + (
+RING_PX = (
+    (4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3),
     (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
 )  # fmt: skip
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
@@ -21,8 +22,8 @@ THRESHOLDS = (8, 90)
 class CornerDetector:
     """FAST-9 corners of one size of picture, at most ``capacity`` a frame.
 
-    With ``fast_adaptive`` the threshold follows the scene, so that about ``corners_target`` are found; it depends on
-    the pictures so far and nothing else.
+    With ``fast_adaptive`` the threshold follows the scene, so that about ``corners_target`` are found; it
+    depends on the pictures so far and nothing else.
     """
 
     def __init__(self, settings: Filter, lens: Lens, capacity: int) -> None:
@@ -38,8 +39,7 @@ class CornerDetector:
         """Corners of a (height, width) picture, and how many were left out because the budget was full."""
         keypoints = self._fast.detect(image)
         found = len(keypoints)
-        pixel = cv2.KeyPoint.convert(keypoints)
-        pixel = np.asarray(pixel, np.float32).reshape(-1, 2).astype(np.int32)
+        pixel = np.asarray(cv2.KeyPoint.convert(keypoints), np.float32).reshape(-1, 2).astype(np.int32)
         x, y = pixel[:, 0], pixel[:, 1]
         inside = (x >= BORDER_PX) & (y >= BORDER_PX)
         inside &= (x < self._lens.width - BORDER_PX) & (y < self._lens.height - BORDER_PX)
@@ -74,7 +74,10 @@ class CornerDetector:
 def strongest_spread(
     pixel: npt.NDArray[np.int32], strength: npt.NDArray[np.float32], capacity: int
 ) -> npt.NDArray[np.intp]:
-    """Rows of the ``capacity`` corners to keep: the strongest of every square, then the second strongest, and on."""
+    """Rows of the ``capacity`` corners to keep: the strongest of every square, then the second, and on.
+
+    ``pixel``: int32 (n, 2), ``strength``: float32 (n,). Answers rows, ascending.
+    """
     square = (pixel[:, 1] // SPREAD_PX) * 65536 + pixel[:, 0] // SPREAD_PX
     order = np.lexsort((-strength, square))
     ordered = square[order]

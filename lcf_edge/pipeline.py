@@ -1,21 +1,27 @@
 """One frame in, one scene out: corners, ego-motion, filter; live and replay alike."""
 
 import time
+from collections import Counter, deque
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
-from lcf_edge.ego_motion import EgoMotionEstimator
+from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
+from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.lens import Lens
 from lcf_edge.recordings import Recording
-from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Sizes, Timing, View
+from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
 LEAST_DT_S = 1e-3
+
+Records = np.ndarray[Any, np.dtype[np.void]]
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +33,10 @@ class Outcome:
 
 
 class Pipeline:
-    """Corners, ego-motion and filter for one camera. Positions that leave it are px of the input frame."""
+    """Corners, ego-motion and filter for one camera. Positions that leave it are px of the input frame.
+
+    Raises ``ConfigError`` when the tables alone need more than ``memory.budget_mib``.
+    """
 
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
@@ -35,18 +44,35 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._filter = LineCircleFilter(config, lens)
+        self._refuse_excess(config.memory.budget_mib)
+
+    def _refuse_excess(self, budget_mib: float) -> None:
+        tables = self.table_bytes()
+        needed_mib = sum(tables.values()) / 2**20
+        if needed_mib > budget_mib:
+            name, size = max(tables.items(), key=lambda table: table[1])
+            raise ConfigError(
+                f"memory.budget_mib: the tables need {needed_mib:.2f} MiB, the budget is {budget_mib:g}; "
+                f"most goes to {name} ({size / 2**20:.2f}): lower the other keys of memory, or take smaller "
+                "pictures"
+            )
 
     def table_bytes(self) -> dict[str, int]:
-        """Bytes of each preallocated table."""
-        return self._filter.table_bytes()
+        """Bytes of each table that is allocated once and kept."""
+        lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.bends else {}
+        return {**self._filter.table_bytes(), **lens}
 
-    def add_imu(self, sample: ImuSample) -> None:
-        """Take an inertial sample, in stamp order."""
-        self._motion.add_imu(sample)
+    @property
+    def refused(self) -> Counter[str]:
+        """IMU and speed samples that were not used, by reason."""
+        return self._motion.refused
 
-    def add_speed(self, sample: SpeedSample) -> None:
-        """Take a speed, in stamp order."""
-        self._motion.add_speed(sample)
+    def add(self, sample: ImuSample | SpeedSample) -> None:
+        """Take an inertial sample or a speed, each kind in stamp order."""
+        if isinstance(sample, ImuSample):
+            self._motion.add_imu(sample)
+        else:
+            self._motion.add_speed(sample)
 
     def process(self, frame: Frame) -> Outcome:
         """Run the filter on one frame."""
@@ -55,14 +81,18 @@ class Pipeline:
         detected = time.perf_counter_ns()
         ego = self._motion.advance(frame.stamp_ns)
         motion = Motion(
-            max(ego.dt_s, LEAST_DT_S), ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.path_yaw_rate_radps
+            max(ego.dt_s, LEAST_DT_S),
+            ego.rotation,
+            ego.rotation_sigma_rad,
+            ego.speed_mps,
+            ego.path_yaw_rate_radps,
         )
         before = time.perf_counter_ns()
         step = self._filter.step(corners, motion)
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
         notes = ego.notes if len(corners) else (*ego.notes, "no corners")
-        sizes = step.sizes
+        sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
         done = time.perf_counter_ns()
         scene = Scene(
             stamp_ns=frame.stamp_ns,
@@ -72,14 +102,18 @@ class Pipeline:
             vehicle_speed=ego.speed_mps,
             circles=circles,
             psi=psi,
-            sizes=Sizes(**{**{f: getattr(sizes, f) for f in sizes.__slots__}, "evicted": sizes.evicted + cut}),
-            timing=Timing((detected - started) // 1000, (filtered - before) // 1000, (done - started) // 1000),
+            sizes=sizes,
+            timing=Timing(
+                detect=(detected - started) // 1000,
+                filter=(filtered - before) // 1000,
+                total=(done - started) // 1000,
+            ),
             notes=notes,
         )
         return Outcome(scene, self._view(corners.pixel.astype(np.float32), step.omitted))
 
-    def _circles(self) -> "np.ndarray":
-        parts = []
+    def _circles(self) -> Records:
+        parts: list[Records] = []
         for kind, table in ((Kind.REBEL, self._filter.rebel), (Kind.NORMAL, self._filter.normal)):
             rows = np.flatnonzero(table.active & (table.trust >= self._config.filter.tr_s))
             part = np.zeros(len(rows), CIRCLE)
@@ -91,23 +125,25 @@ class Pipeline:
             part["speed"], part["trust"] = table.speed[rows], table.trust[rows]
             bearing, elevation = self._lens.bearing(table.x[rows], table.y[rows])
             part["bearing"], part["elevation"] = bearing, elevation
+            part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
             if kind is Kind.REBEL:
-                part["ttc"], part["range"], part["lateral"] = table.ttc[rows], table.range[rows], table.lateral[rows]
-            else:
-                part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
+                for field in ("ttc", "range", "lateral"):
+                    part[field] = getattr(table, field)[rows]
             parts.append(part[np.isfinite(part["x"])])
         return np.concatenate(parts)
 
-    def _psi(self) -> "np.ndarray":
+    def _psi(self) -> Records:
         table = self._filter.psi
         rows = np.flatnonzero(table.active)
         part = np.zeros(len(rows), PSI_REGION)
         place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
-        part["id"], part["shape"], part["x"], part["y"] = table.id[rows], table.shape[rows], place[:, 0], place[:, 1]
-        part["width"], part["height"], part["trust"] = table.width[rows], table.height[rows], table.trust[rows]
-        return part[np.isfinite(part["x"])]
+        part["x"], part["y"] = place[:, 0], place[:, 1]
+        for field in ("id", "shape", "width", "height", "trust"):
+            part[field] = getattr(table, field)[rows]
+        in_reach: Records = part[np.isfinite(part["x"])]
+        return in_reach
 
-    def _view(self, pixel: "np.ndarray", omitted: "np.ndarray") -> View:
+    def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
         edges, n, groups = self._filter.edges, self._filter.edges.count, self._filter.groups
         rebel = edges.rebel[:n]
         place = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
@@ -129,25 +165,29 @@ class Pipeline:
 
 
 def run(recording: Recording, config: Config) -> Iterator[tuple[Frame, Outcome]]:
-    """Feed a recording through the pipeline; answers each frame with its outcome."""
+    """Feed a recording through the pipeline; answers each frame with its outcome.
+
+    At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises
+    ``RecordingError``, ``ConfigError``.
+    """
     pipeline: Pipeline | None = None
-    waiting: list[ImuSample | SpeedSample] = []
+    waiting: deque[ImuSample | SpeedSample] = deque(maxlen=IMU_CAPACITY + SPEED_CAPACITY)
     for event in recording:
         if isinstance(event, Frame):
             if pipeline is None:
                 height, width = event.image.shape
-                use_own = recording.lens is not None and not config.camera.intrinsics
-                lens = recording.lens if use_own else None
-                lens = lens.scaled(width, height) if lens else Lens.from_config(config.camera, width, height)
+                if recording.lens is None or config.camera.intrinsics:
+                    lens = Lens.from_config(config.camera, width, height)
+                else:
+                    lens = recording.lens.scaled(width, height)
                 pipeline = Pipeline(config, lens)
                 for sample in waiting:
-                    (pipeline.add_imu if isinstance(sample, ImuSample) else pipeline.add_speed)(sample)
+                    pipeline.add(sample)
                 waiting.clear()
             yield event, pipeline.process(event)
         elif pipeline is None:
             waiting.append(event)
-        elif isinstance(event, ImuSample):
-            pipeline.add_imu(event)
         else:
-            pipeline.add_speed(event)
-
+            pipeline.add(event)
+    if pipeline is not None:
+        recording.skipped.update(pipeline.refused)

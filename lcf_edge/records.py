@@ -104,7 +104,7 @@ class Scene:
     psi: npt.NDArray[np.void]  # PSI_REGION
     sizes: Sizes = field(default_factory=Sizes)
     timing: Timing = field(default_factory=Timing)
-    notes: tuple[str, ...] = ()  # what degrades the result: "no imu", "no speed", "speed drifts", "no corners"
+    notes: tuple[str, ...] = ()  # what degrades the result: "no imu", "no speed", "no corners", …
 
 
 @dataclass(frozen=True, slots=True)

@@ -138,6 +138,7 @@ class RebelCircles:
         extent_x = np.sqrt(mean(dx * dx))
         extent_y = np.sqrt(mean(dy * dy))
         beta, speed = np.arctan2(cvy, cvx), np.hypot(cvx, cvy)
+        crowded = size < settings.rebel_share * (size + self._normal_inside(edges, cx, cy, radius))
 
         active = np.flatnonzero(circles.active)
         distance = np.hypot(x[:, None] - circles.x, y[:, None] - circles.y)
@@ -146,6 +147,7 @@ class RebelCircles:
         circle_of = (
             involve(label, owner, inside, size, settings.involvement) if len(active) else np.full(len(size), NO_CIRCLE)
         )
+        circle_of[crowded] = NO_CIRCLE  # a few odd ones in a crowd that flows are mistakes, not an object
         known = circle_of >= 0
         rows = circle_of[known]
         turn = np.abs(wrap(beta[known] - circles.beta[rows]))
@@ -157,7 +159,7 @@ class RebelCircles:
         )
         updated[rows] = True
 
-        new = np.flatnonzero(~known)
+        new = np.flatnonzero(~known & ~crowded)
         new = new[np.argsort(-size[new], kind="stable")]
         places, evicted = claim(edges, circles, len(new), self._tr_new, rebel=True)
         new = new[: len(places)]
@@ -181,6 +183,13 @@ class RebelCircles:
         edges.circle[rebels.rows] = NO_CIRCLE
         edges.circle[rebels.rows[grouped]] = row_of[label]
         return evicted
+
+    def _normal_inside(self, edges: EdgeTable, x: Floats, y: Floats, radius: Floats) -> npt.NDArray[np.intp]:
+        """Edges that were seen to follow the flow inside each circle; int (groups,)."""
+        n = edges.count
+        rows = np.flatnonzero(edges.matched[:n] & ~edges.rebel[:n] & (edges.links[:n] == 0) & (edges.trust[:n] >= 4))
+        away2 = np.square(edges.x[rows, None] - x) + np.square(edges.y[rows, None] - y)
+        return np.count_nonzero(away2 < radius * radius, axis=0)
 
     def _contact(
         self,
