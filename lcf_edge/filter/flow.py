@@ -40,12 +40,14 @@ class Pinhole:
         return 0.5 * (self.fx + self.fy)
 
     def homography(self, rotation: Matrix) -> Matrix:
-        """H = K·R·K⁻¹: carries image positions of distant points through a rotation of the camera."""
-        k = np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
-        inverse = np.array(
-            [[1 / self.fx, 0.0, -self.cx / self.fx], [0.0, 1 / self.fy, -self.cy / self.fy], [0.0, 0.0, 1.0]]
-        )
-        return k @ rotation @ inverse
+        """H = K·R·K⁻¹: carries image positions of distant points through a rotation; (…, 3, 3)."""
+        h = np.array(rotation)
+        h[..., 0, :] = self.fx * h[..., 0, :] + self.cx * h[..., 2, :]
+        h[..., 1, :] = self.fy * h[..., 1, :] + self.cy * h[..., 2, :]
+        h[..., :, 0] /= self.fx
+        h[..., :, 1] /= self.fy
+        h[..., :, 2] -= self.cx * h[..., :, 0] + self.cy * h[..., :, 1]
+        return h
 
 
 def carry(h: Matrix, x: Floats, y: Floats) -> tuple[Floats, Floats]:

@@ -14,7 +14,7 @@ from lcf_edge.filter.feedback import MARGIN_PX, Feedback
 from lcf_edge.filter.flow import KeyFrames, Matrix, Pinhole, carry, line_distance, wrap
 from lcf_edge.filter.inputs import Corners, Motion
 from lcf_edge.filter.line_expert import Groups, inside_psi
-from lcf_edge.filter.matching import DISTANCE_COST, GATES_PX, CornerIndex, difference, likeness_needed, one_to_one
+from lcf_edge.filter.matching import DISTANCE_COST, CornerIndex, difference, likeness_needed, one_to_one
 from lcf_edge.filter.normal_circles import NormalCircles
 from lcf_edge.filter.rebel_circles import RebelCircles, Rebels
 from lcf_edge.filter.rebel_detection import (
@@ -35,6 +35,7 @@ from lcf_edge.records import Sizes
 PITCH_MEMORY_S = 1.0  # shaking faster than this does not change where the vehicle goes
 YAW_MEMORY_S = 0.3
 REFINE_LEAST = 25  # edges that a correction of the rotation needs
+REFINE_MOST = 200  # and that are enough
 PENDING = 2  # links of a chain that waits for its third key frame
 
 
@@ -205,19 +206,29 @@ class LineCircleFilter:
         edges.held[:n] = False
         if not psi.active.any():
             return np.zeros(len(corners), np.bool_)
-        holder = inside_psi(psi, corner_x, corner_y)
-        edge_holder = inside_psi(psi, estimate.x, estimate.y)
+        both = inside_psi(psi, np.concatenate([corner_x, estimate.x]), np.concatenate([corner_y, estimate.y]))
+        holder, edge_holder = both[: len(corners)], both[len(corners) :]
         edge_holder[edges.rebel[:n] | (edges.links[:n] > 0)] = NO_CIRCLE
         held = np.flatnonzero(edge_holder != NO_CIRCLE)
         inside = np.flatnonzero(holder != NO_CIRCLE)
-        raw = self._lens.distort(np.stack([estimate.x[held], estimate.y[held]], axis=1))
-        self._index.fill(corners.pixel[inside])
-        seen = self._index.any_near(raw)
+        seen = self._seen(held, estimate, corners.pixel[inside])
         self._feedback.end_surprised(psi, holder[inside], edge_holder[held], seen)
         omitted = (holder != NO_CIRCLE) & psi.active[holder]
         edges.held[:n] = (edge_holder != NO_CIRCLE) & psi.active[edge_holder]
         edges.born_key[:n][edges.held[:n]] = self._keys.number  # what is only predicted is no history
         return omitted
+
+    def _seen(self, held: Rows, estimate: Estimate, pixel: npt.NDArray[np.int32]) -> Mask:
+        """Whether one of the corners lies where each held edge is predicted, whatever it looks like; bool (h,)."""
+        raw = self._lens.distort(np.stack([estimate.x[held], estimate.y[held]], axis=1))
+        inside = np.flatnonzero(self._in_picture(raw))
+        self._index.fill(pixel)
+        reach = np.float32(self.settings.bl_min_px)
+        who, what = self._index.candidates(raw[inside, 0], raw[inside, 1], reach)
+        near = (np.abs(raw[inside[who]] - pixel[what]) <= reach).all(axis=1)
+        seen = np.zeros(len(held), np.bool_)
+        seen[inside[who[near]]] = True
+        return seen
 
     def _predict(self, motion: Motion) -> Estimate:
         """E': normal edges go out along their flow line, rebels and chains as they went."""
@@ -245,7 +256,7 @@ class LineCircleFilter:
         """Edges and corners that are the same landmark: near L' first, then, for the rest, near L."""
         edges, n = self.edges, self.edges.count
         widen = np.float32(min(3 * motion.rotation_sigma_rad * self._pinhole.focal, self.settings.leap_px))
-        gate = np.minimum(edges.bl[:n] + widen, np.float32(GATES_PX[-1]))
+        gate = edges.bl[:n] + widen
         wanted = ~edges.held[:n]
         likely = likeness_needed(edges.appearance[:n], self.settings.appearance_max, self.settings.appearance_share)
         first = self._pair(estimate.x, estimate.y, gate, wanted, pixel[kept], appearance, kept, likely)
@@ -259,7 +270,7 @@ class LineCircleFilter:
         self._index.fill(pixel[kept[left]])
         young = edges.trust[:n] < self.settings.tr_s
         reach = np.where(young, np.float32(self.settings.leap_px), np.float32(self.settings.bl0_px)) + widen
-        reach = np.minimum(np.maximum(gate, reach), np.float32(GATES_PX[-1]))
+        reach = np.maximum(gate, reach)
         second = self._pair(edges.x[:n], edges.y[:n], reach, wanted, pixel[kept[left]], appearance, kept[left], np.float32(0.5) * likely)
         return np.concatenate([first[0], second[0]]), np.concatenate([first[1], second[1]])
 
@@ -276,15 +287,15 @@ class LineCircleFilter:
     ) -> tuple[Rows, Rows]:
         """One-to-one pairs of the ``wanted`` edges, looked for at (x, y), and the corners in the index."""
         raw = self._lens.distort(np.stack([x, y], axis=1))
-        seen = wanted & np.isfinite(raw).all(axis=1)
-        seen &= (raw[:, 0] >= 0) & (raw[:, 1] >= 0)
-        seen &= (raw[:, 0] <= self._lens.width - 1) & (raw[:, 1] <= self._lens.height - 1)
-        rows = np.flatnonzero(seen)
+        rows = np.flatnonzero(wanted & self._in_picture(raw))
         who, what = self._index.candidates(raw[rows, 0], raw[rows, 1], gate[rows])
         edge = rows[who]
-        away = np.hypot(raw[edge, 0] - pixel[what, 0], raw[edge, 1] - pixel[what, 1])
+        off = raw[edge] - pixel[what]
+        away = np.hypot(off[:, 0], off[:, 1])
+        near = np.flatnonzero(away <= gate[edge])
+        edge, what, away = edge[near], what[near], away[near]
         looks = difference(self.edges.appearance[edge], appearance[corner[what]])
-        good = (looks < likely[edge]) & (away <= gate[edge])
+        good = np.flatnonzero(looks < likely[edge])
         edge, what = edge[good], what[good]
         cost = looks[good] + np.float32(DISTANCE_COST) * away[good]
         best = one_to_one(edge, what, cost, len(x), len(pixel))
@@ -301,9 +312,11 @@ class LineCircleFilter:
         """
         edges = self.edges
         steady = ~edges.rebel[edge] & (edges.links[edge] == 0) & (edges.trust[edge] >= self.settings.tr_s)
-        if np.count_nonzero(steady) < REFINE_LEAST or motion.rotation_sigma_rad <= 0:
+        sample = np.flatnonzero(steady)
+        if len(sample) < REFINE_LEAST or motion.rotation_sigma_rad <= 0:
             return estimate, motion.rotation_sigma_rad
-        rows, x, y = edge[steady], x[steady], y[steady]
+        sample = sample[:: 1 + len(sample) // REFINE_MOST]
+        rows, x, y = edge[sample], x[sample], y[sample]
         beta = estimate.beta[rows]
         off = line_distance(x - estimate.x[rows], y - estimate.y[rows], beta)
         pinhole = self._pinhole
@@ -435,10 +448,12 @@ class LineCircleFilter:
 
     def _in_frame(self, x: Floats, y: Floats) -> Mask:
         """Whether positions of the ideal pinhole lie in the picture; bool (n,)."""
-        raw = self._lens.distort(np.stack([x, y], axis=1))
-        inside = (raw >= 0).all(axis=1)  # NaN is outside
-        inside &= (raw[:, 0] <= self._lens.width - 1) & (raw[:, 1] <= self._lens.height - 1)
-        return inside
+        return self._in_picture(self._lens.distort(np.stack([x, y], axis=1)))
+
+    def _in_picture(self, raw: Floats) -> Mask:
+        """Whether px of the input frame lie in it; float32 (n, 2), NaN is outside."""
+        x, y = raw[:, 0], raw[:, 1]
+        return (x >= 0) & (y >= 0) & (x <= self._lens.width - 1) & (y <= self._lens.height - 1)
 
     def _add_edges(
         self, free: Rows, corners: Corners, corner_x: Floats, corner_y: Floats, around: Surroundings

@@ -12,15 +12,20 @@ def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
 
     ``x``, ``y``: float32 (n,) px. Answers int32 (n,). Where regions overlap, the last row.
     """
+    rows = np.flatnonzero(psi.active)
     holder = np.full(len(x), NO_CIRCLE, np.int32)
-    for row in np.flatnonzero(psi.active):  # a few dozen at most, each a whole-array test
-        dx, dy = x - psi.x[row], y - psi.y[row]
-        half_width, half_height = 0.5 * psi.width[row], 0.5 * psi.height[row]
-        if psi.shape[row] == Shape.CIRCLE:
-            inside = dx * dx + dy * dy < half_width * half_width
-        else:
-            inside = (np.abs(dx) < half_width) & (np.abs(dy) < half_height)
-        holder[inside] = row
+    if not len(rows) or not len(x):
+        return holder
+    dx, dy = np.abs(x[:, None] - psi.x[rows]), np.abs(y[:, None] - psi.y[rows])
+    half_width, half_height = 0.5 * psi.width[rows], 0.5 * psi.height[rows]
+    inside = np.where(
+        psi.shape[rows] == Shape.CIRCLE,
+        dx * dx + dy * dy < half_width * half_width,
+        (dx < half_width) & (dy < half_height),
+    )
+    last = len(rows) - 1 - np.argmax(inside[:, ::-1], axis=1)
+    held = inside.any(axis=1)
+    holder[held] = rows[last[held]]
     return holder
 
 

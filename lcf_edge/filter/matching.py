@@ -7,79 +7,59 @@ import numpy.typing as npt
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
 from lcf_edge.filter.tables import Floats, Rows
 
-CELL_SHIFT = 1  # cells of 2x2 px: FAST with non-maximum suppression leaves at most one corner in each
-GATES_PX = (4, 8, 14, 26, 50)  # a prediction is looked for in the smallest of these that holds its gate
+CELL_SHIFT = 3  # cells of 8x8 px hold a corner or two
 DISTANCE_COST = 0.4  # grey levels a px, so that of equal looks the nearest wins
 LIKENESS_FLOOR = 3.0  # grey levels of camera noise
 _ROUNDS = 3
 
 Pairs = tuple[Rows, Rows]
+Indices = npt.NDArray[np.intp]
 
 
 class CornerIndex:
-    """Every corner of a frame in a half-resolution picture of row numbers."""
+    """Corners sorted by cell, row after row: those near a place are a few runs of neighbours in that order.
+
+    What a look-up costs follows from the corners that it finds, not from the size of the gate or of the picture.
+    """
 
     def __init__(self, width: int, height: int) -> None:
-        self._margin = (GATES_PX[-1] >> CELL_SHIFT) + 2
-        self._columns = (width >> CELL_SHIFT) + 1 + 2 * self._margin
-        rows = (height >> CELL_SHIFT) + 1 + 2 * self._margin
-        self._cells = np.full((rows, self._columns), -1, np.int16)
-        self._flat = self._cells.reshape(-1)
-        self._width, self._height = width, height
-        self._near = self._disc(2)
-        self._offsets = [self._disc(radius) for radius in GATES_PX]
+        self._columns = (width >> CELL_SHIFT) + 1
+        self._rows = (height >> CELL_SHIFT) + 1
+        self._start = np.zeros(self._columns * self._rows + 1, np.intp)  # of each cell's run
+        self._order = np.empty(0, np.intp)
 
     @property
     def nbytes(self) -> int:
         """Bytes that the index occupies, for good."""
-        return self._cells.nbytes + sum(o.nbytes for o in self._offsets)
-
-    def _disc(self, radius_px: int) -> npt.NDArray[np.int32]:
-        """Cell offsets that cover a disc around any position in the centre cell, nearest first."""
-        reach = (radius_px >> CELL_SHIFT) + 1
-        v, u = np.mgrid[-reach : reach + 1, -reach : reach + 1]
-        near = np.hypot(u, v) * 2 <= radius_px + 1.5
-        u, v = u[near], v[near]
-        order = np.argsort(u * u + v * v, kind="stable")
-        return (v * self._columns + u)[order].astype(np.int32)
+        return self._start.nbytes
 
     def fill(self, pixel: npt.NDArray[np.int32]) -> None:
-        """Enter the corners; ``pixel``: int32 (n, 2), n < 32768."""
-        self._flat.fill(-1)
-        self._flat[self._cell(pixel[:, 0], pixel[:, 1])] = np.arange(len(pixel), dtype=np.int16)
+        """Enter the corners of a frame; ``pixel``: int32 (n, 2), inside it."""
+        cell = (pixel[:, 1] >> CELL_SHIFT) * self._columns + (pixel[:, 0] >> CELL_SHIFT)
+        self._order = np.argsort(cell, kind="stable")
+        np.cumsum(np.bincount(cell, minlength=len(self._start) - 1), out=self._start[1:])
 
-    def _cell(self, x: npt.NDArray[np.int32], y: npt.NDArray[np.int32]) -> npt.NDArray[np.int32]:
-        cell = ((y >> CELL_SHIFT) + self._margin) * self._columns + (x >> CELL_SHIFT) + self._margin
-        return cell.astype(np.int32, copy=False)
+    def candidates(self, x: Floats, y: Floats, gate: Floats | np.float32) -> Pairs:
+        """All (place, corner) pairs whose cells meet the square of half side ``gate`` around each place.
 
-    def candidates(self, x: Floats, y: Floats, gate: Floats) -> Pairs:
-        """All (prediction, corner) pairs whose cells lie within each prediction's gate.
-
-        ``x``, ``y``: float32 (n,) px of the input frame, inside it. ``gate``: float32 (n,) px.
+        ``x``, ``y``: float32 (n,) px of the input frame, inside it. ``gate``: px, float32 (n,) or one for all.
         """
-        cell = self._cell(np.rint(x).astype(np.int32), np.rint(y).astype(np.int32))
-        size = np.searchsorted(np.asarray(GATES_PX[:-1], np.float32), gate)
-        who: list[Rows] = []
-        what: list[Rows] = []
-        for gate_class in np.unique(size):
-            rows = np.flatnonzero(size == gate_class)
-            found = self._flat[cell[rows, None] + self._offsets[gate_class]]
-            hits = np.flatnonzero(found.reshape(-1) >= 0)
-            who.append(rows[hits // len(self._offsets[gate_class])])
-            what.append(found.reshape(-1)[hits].astype(np.intp))
-        if not who:
-            return np.empty(0, np.intp), np.empty(0, np.intp)
-        return np.concatenate(who), np.concatenate(what)
+        left = np.maximum(x - gate, 0).astype(np.intp) >> CELL_SHIFT
+        right = np.minimum((x + gate).astype(np.intp) >> CELL_SHIFT, self._columns - 1)
+        top = np.maximum(y - gate, 0).astype(np.intp) >> CELL_SHIFT
+        bottom = np.minimum((y + gate).astype(np.intp) >> CELL_SHIFT, self._rows - 1)
+        who, row = _runs(top, bottom + 1 - top)
+        base = row * self._columns
+        first = self._start[base + left[who]]
+        which, place = _runs(first, self._start[base + right[who] + 1] - first)
+        return who[which], self._order[place]
 
 
-    def any_near(self, raw: Floats) -> npt.NDArray[np.bool_]:
-        """Whether a corner lies within about 3 px of each point; float32 (n, 2) px, NaN or outside: no."""
-        x, y = raw[:, 0], raw[:, 1]
-        inside = (x >= 0) & (y >= 0) & (x <= self._width - 1) & (y <= self._height - 1)
-        cell = self._cell(np.rint(x[inside]).astype(np.int32), np.rint(y[inside]).astype(np.int32))
-        found = np.zeros(len(raw), np.bool_)
-        found[inside] = (self._flat[cell[:, None] + self._near] >= 0).any(axis=1)
-        return found
+def _runs(first: Indices, length: Indices) -> tuple[Indices, Indices]:
+    """All numbers of the runs first, first + 1, … of each ``length``, and the run that each belongs to."""
+    run = np.repeat(np.arange(len(length)), length)
+    offset = first - np.cumsum(length) + length
+    return run, offset[run] + np.arange(len(run))
 
 
 def difference(

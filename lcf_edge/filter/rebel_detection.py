@@ -62,7 +62,7 @@ def links_since(
 ) -> Links:
     """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
     pinhole = around.pinhole
-    slot_h = np.array([pinhole.homography(r) for r in keys.rotation]).reshape(KEYS, 9).astype(np.float32)
+    slot_h = pinhole.homography(keys.rotation).reshape(KEYS, 9).astype(np.float32)
     displacement = keys.displacement
     moves = np.abs(displacement[:, 2]) > STILL_M
     depth = np.where(moves, displacement[:, 2], 1.0)
@@ -72,7 +72,7 @@ def links_since(
         [focus_x, focus_y, displacement[:, 2], keys.elapsed_s, keys.sigma_rad * pinhole.focal]
     ).astype(np.float32)
     slot = key % KEYS
-    h = slot_h[slot].T
+    h = slot_h.T[:, slot]
     kx, ky = edges.key_x[slot, rows], edges.key_y[slot, rows]
     scale = 1 / (h[6] * kx + h[7] * ky + h[8])
     fx, fy, dz, elapsed, sigma = per_slot[:, slot]
