@@ -115,9 +115,7 @@ def decode_imu(payload: bytes | memoryview) -> Imu:
     reader.scalars("13d")  # orientation and its covariance
     gyro, gyro_covariance = reader.vector(), reader.scalars("9d")
     accel, accel_covariance = reader.vector(), reader.scalars("9d")
-    return Imu(
-        header, gyro if gyro_covariance[0] != -1 else None, accel if accel_covariance[0] != -1 else None
-    )
+    return Imu(header, gyro if gyro_covariance[0] != -1 else None, accel if accel_covariance[0] != -1 else None)
 
 
 def decode_odometry(payload: bytes | memoryview) -> Twist:
@@ -236,8 +234,6 @@ class _Reader:
         """Start of the next ``size`` bytes."""
         start = self._at + -self._at % align
         if size > len(self._data) - start:
-            raise CdrError(
-                f"CDR: {size} bytes are wanted at {start}, {max(0, len(self._data) - start)} are left"
-            )
+            raise CdrError(f"CDR: {size} bytes are wanted at {start}, {max(0, len(self._data) - start)} are left")
         self._at = start + size
         return start

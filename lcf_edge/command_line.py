@@ -72,26 +72,16 @@ def _parser() -> argparse.ArgumentParser:
         help="set one key, as in vehicle.half_width_m=0.6",
     )
 
-    demo = commands.add_parser(
-        "demo", allow_abbrev=False, help="see the filter work on a drive that it renders itself"
-    )
-    demo.add_argument(
-        "--out", type=Path, default=Path("demo-out"), metavar="DIR", help="where to write (%(default)s)"
-    )
-    demo.add_argument(
-        "--seconds", type=_demo_seconds, default=10.0, metavar="N", help="length of the drive (10)"
-    )
+    demo = commands.add_parser("demo", allow_abbrev=False, help="see the filter work on a drive that it renders itself")
+    demo.add_argument("--out", type=Path, default=Path("demo-out"), metavar="DIR", help="where to write (%(default)s)")
+    demo.add_argument("--seconds", type=_demo_seconds, default=10.0, metavar="N", help="length of the drive (10)")
     demo.set_defaults(run=_demo)
 
     replay = commands.add_parser(
         "replay", allow_abbrev=False, parents=[settings], help="run the filter over a recording"
     )
-    replay.add_argument(
-        "recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or pictures"
-    )
-    replay.add_argument(
-        "-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output"
-    )
+    replay.add_argument("recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or pictures")
+    replay.add_argument("-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output")
     replay.add_argument("--video", type=Path, metavar="FILE.mp4", help="what the filter saw, two panels")
     replay.add_argument("--plot", type=Path, metavar="FILE.png", help="rows in use of each table")
     replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
@@ -132,9 +122,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     config = _load(arguments)
     from lcf_edge.commands.replay import Outputs, replay  # noqa: PLC0415
 
-    outputs = Outputs(
-        arguments.results, arguments.video, arguments.plot, arguments.publish, arguments.realtime
-    )
+    outputs = Outputs(arguments.results, arguments.video, arguments.plot, arguments.publish, arguments.realtime)
     summary = replay(arguments.recording, config, outputs, lambda text: _say(f"lcf-edge: warning: {text}"))
     if arguments.results == "-":
         print(*summary, sep="\n", file=sys.stderr)

@@ -31,6 +31,7 @@ class CornerDetector:
         self._lens = lens
         self._capacity = capacity
         self.threshold = settings.fast_threshold
+        self._too_many: bool | None = None  # in the last frame
         self._fast = cv2.FastFeatureDetector.create(self.threshold, True, cv2.FAST_FEATURE_DETECTOR_TYPE_9_16)
         ring = np.array(RING_PX)
         self._ring = (ring[:, 1] * lens.width + ring[:, 0]).astype(np.int32)
@@ -62,11 +63,17 @@ class CornerDetector:
         return Corners(pixel, position, appearance), evicted
 
     def _adapt(self, found: int) -> None:
-        """Next frame's threshold: corner counts fall roughly with its 1.5th power."""
-        ratio = (max(found, 1) / self._settings.corners_target) ** 0.4
-        wanted = self.threshold * min(max(ratio, 0.6), 1.6)
+        """Next frame's threshold.
+
+        Corner counts fall with its 1.5th to 8th power: a step suits 2.5, and 5 when the last one went too far.
+        """
+        ratio = max(found, 1) / self._settings.corners_target
+        swung = self._too_many not in {None, ratio > 1}
+        self._too_many = ratio > 1
+        power = 0.2 if swung else 0.4
+        wanted = self.threshold * min(max(ratio**power, 0.6), 1.6)
         threshold = int(min(max(round(wanted), THRESHOLDS[0]), THRESHOLDS[1]))
-        if abs(wanted - self.threshold) > 0.08 * self.threshold and threshold != self.threshold:
+        if abs(wanted - self.threshold) > 0.2 * power * self.threshold and threshold != self.threshold:
             self.threshold = threshold
             self._fast.setThreshold(threshold)
 

@@ -15,7 +15,8 @@ from lcf_edge.corners import CornerDetector
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
-from lcf_edge.lens import Lens
+from lcf_edge.filter.tables import CircleTable, Mask, PsiTable, Rows
+from lcf_edge.lens import Lens, Points
 from lcf_edge.recordings import Recording
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
@@ -115,33 +116,36 @@ class Pipeline:
     def _circles(self) -> Records:
         parts: list[Records] = []
         for kind, table in ((Kind.REBEL, self._filter.rebel), (Kind.NORMAL, self._filter.normal)):
-            rows = np.flatnonzero(table.active & (table.trust >= self._config.filter.tr_s))
+            rows, place = self._placed(table, table.active & (table.trust >= self._config.filter.tr_s))
             part = np.zeros(len(rows), CIRCLE)
             part["id"], part["kind"], part["cause"] = table.id[rows], kind, table.cause[rows]
             part["support"] = np.minimum(table.support[rows], 65535)
-            place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
             part["x"], part["y"] = place[:, 0], place[:, 1]
             part["radius"], part["direction"] = table.radius[rows], table.beta[rows]
             part["speed"], part["trust"] = table.speed[rows], table.trust[rows]
-            bearing, elevation = self._lens.bearing(table.x[rows], table.y[rows])
-            part["bearing"], part["elevation"] = bearing, elevation
+            part["bearing"], part["elevation"] = self._lens.bearing(table.x[rows], table.y[rows])
             part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
             if kind is Kind.REBEL:
                 for field in ("ttc", "range", "lateral"):
                     part[field] = getattr(table, field)[rows]
-            parts.append(part[np.isfinite(part["x"])])
+            parts.append(part)
         return np.concatenate(parts)
 
     def _psi(self) -> Records:
         table = self._filter.psi
-        rows = np.flatnonzero(table.active)
+        rows, place = self._placed(table, table.active)
         part = np.zeros(len(rows), PSI_REGION)
-        place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
         part["x"], part["y"] = place[:, 0], place[:, 1]
         for field in ("id", "shape", "width", "height", "trust"):
             part[field] = getattr(table, field)[rows]
-        in_reach: Records = part[np.isfinite(part["x"])]
-        return in_reach
+        return part
+
+    def _placed(self, table: CircleTable | PsiTable, wanted: Mask) -> tuple[Rows, Points]:
+        """The wanted rows that the lens can place, and where in the input frame, px."""
+        rows = np.flatnonzero(wanted)
+        place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
+        seen = np.isfinite(place[:, 0])
+        return rows[seen], place[seen]
 
     def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
         edges, n, groups = self._filter.edges, self._filter.edges.count, self._filter.groups

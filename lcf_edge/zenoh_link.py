@@ -120,9 +120,7 @@ class ScenePublisher:
     def wait_for_subscriber(self, timeout_s: float) -> bool:
         """Wait until somebody subscribes; False when nobody did in time."""
         matched = threading.Event()
-        with self._publisher.declare_matching_listener(
-            lambda status: matched.set() if status.matching else None
-        ):
+        with self._publisher.declare_matching_listener(lambda status: matched.set() if status.matching else None):
             return matched.wait(timeout_s)
 
 

@@ -155,9 +155,7 @@ def _render(drive: scenes.Drive, folder: Path) -> None:
     except OSError as error:
         raise cannot_write(folder, error) from error
     except BrokenProcessPool as error:
-        raise LcfError(
-            f"{folder}: the rendering process was ended from outside; free memory, try again"
-        ) from error
+        raise LcfError(f"{folder}: the rendering process was ended from outside; free memory, try again") from error
 
 
 def _open_link() -> tuple[zenoh.Session, str]:

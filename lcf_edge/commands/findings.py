@@ -36,9 +36,7 @@ def trusted_rebels(scene: Scene, trust: float) -> list[tuple[float, float, Cause
     return [(float(row["x"]), float(row["y"]), Cause(row["cause"])) for row in rows]
 
 
-def findings(
-    truths: Iterable[Truth], rebels: Mapping[int, Sequence[tuple[float, float, Cause]]]
-) -> list[Finding]:
+def findings(truths: Iterable[Truth], rebels: Mapping[int, Sequence[tuple[float, float, Cause]]]) -> list[Finding]:
     """Each threat that was in sight for ``GRACE_S`` or longer.
 
     ``rebels``: ``trusted_rebels`` by frame number.

@@ -4,7 +4,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.config import Filter
-from lcf_edge.filter.edge_expert import update_position
+from lcf_edge.filter.edge_equations import update_position
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members

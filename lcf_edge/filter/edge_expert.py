@@ -1,123 +1,263 @@
-"""Circle expert, edges: predict, classify (λ*1 to λ*5), update."""
+"""Circle expert, edges: predicts E', finds their corners, classifies (λ*), updates, adds and deletes edges."""
 
-from dataclasses import dataclass
-from enum import IntEnum
+import math
 
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.flow import line_distance, wrap
-from lcf_edge.filter.tables import Floats
+from lcf_edge.config import Filter
+from lcf_edge.filter.circles import newborn_trust
+from lcf_edge.filter.derotation import LEAST_EDGES, MOST_EDGES
+from lcf_edge.filter.edge_equations import (
+    TRUST_CHANGE,
+    UNMATCHED,
+    Estimate,
+    Relation,
+    change_trust,
+    classify,
+    predict,
+    update_deviation,
+    update_gate,
+    update_position,
+    update_speed,
+)
+from lcf_edge.filter.flow import line_distance
+from lcf_edge.filter.inputs import Corners, Motion
+from lcf_edge.filter.line_expert import Groups
+from lcf_edge.filter.matching import Found, Matcher, likeness_needed
+from lcf_edge.filter.rebel_circles import RebelCircles
+from lcf_edge.filter.situation import Situation
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
-CORNER_NOISE_PX = 0.7  # below this a displacement has no direction
-
-
-class Relation(IntEnum):
-    """λ*: how a corner relates to an estimated edge (section Edge Classifications)."""
-
-    BEYOND = 1  # outside the gate, but within the error span
-    FOLLOWS = 2  # in the gate, on the line, as predicted
-    DISAGREES = 3  # in the gate, on the line, but not in speed or direction
-    BREAKS = 4  # off the line
-    STAYS = 5  # near where the edge was, on the line
-
-
-TRUST_CHANGE = np.array([0, -1, +1, -1, 0, -1], np.float32)
-"""Change of Tr for λ*1 to λ*5; index 0 is unused (no match is -1 as well, see ``UNMATCHED``)."""
-
-UNMATCHED = np.float32(-1)
-
-
-@dataclass(frozen=True, slots=True)
-class Estimate:
-    """Predicted edges E'; float32 (n,): L' (``x``, ``y``, px), V' (``speed``, px/s), and the direction taken (rad)."""
-
-    x: Floats
-    y: Floats
-    speed: Floats
-    beta: Floats
+LEAST_CORR = 0.25
+DEVIATION_MOST_RAD = 0.5  # DL is bounded
+ORIGIN_LEAST_PX = 2.0  # an edge nearer to its origin has no direction from it
 
 
-def predict(
-    x: Floats, y: Floats, beta: Floats, speed: Floats, expected_speed: Floats, dt_s: float
-) -> Estimate:
-    """L' = L + V'·t_f along β; V' = ½(V + expected V) (section Edge Classifications, below eq. of E_n)."""
-    halfway = np.float32(0.5) * (speed + expected_speed)
-    step = halfway * np.float32(dt_s)
-    return Estimate(x + step * np.cos(beta), y + step * np.sin(beta), halfway, beta)
+class EdgeExpert:
+    """Works on the table of edges (E_n, E_r and the chains of α)."""
 
+    def __init__(self, settings: Filter, matcher: Matcher, edges: EdgeTable, normal: CircleTable) -> None:
+        self._settings = settings
+        self._matcher = matcher
+        self._edges = edges
+        self._normal = normal
+        self._tr_new = newborn_trust(settings)
 
-def classify(
-    x: Floats,
-    y: Floats,
-    estimate: Estimate,
-    corner_x: Floats,
-    corner_y: Floats,
-    bl: Floats,
-    delta_px: Floats | float,
-    dt_s: float,
-    eps_beta_rad: float,
-) -> npt.NDArray[np.int8]:
-    """λ* class of each pair of an edge and a corner, int8 (n,), in the order 2, 3, 1, 5, 4.
+    def predict(self, around: Situation, dt_s: float) -> Estimate:
+        """E': normal edges go out along their flow line, rebels and chains as they went.
 
-    ``x``, ``y``: L, where the edge was (derotated), px. ``bl``: BL, px. ``delta_px``: δ. All float32 (n,).
-    Speed agrees when the corner lies within half of BL of L' along the line, direction when the corner moved along
-    the flow within ``eps_beta_rad`` (displacements below corner noise have none).
-    """
-    ahead_x, ahead_y = corner_x - estimate.x, corner_y - estimate.y
-    moved_x, moved_y = corner_x - x, corner_y - y
-    cos, sin = np.cos(estimate.beta), np.sin(estimate.beta)
-    in_gate = np.hypot(ahead_x, ahead_y) <= bl
-    near_previous = np.hypot(moved_x, moved_y) <= bl
-    on_line = np.abs(line_distance(moved_x, moved_y, estimate.beta)) <= delta_px
-    along = np.abs(ahead_x * cos + ahead_y * sin)
-    moved = np.hypot(moved_x, moved_y)
-    turn = np.abs(wrap(np.arctan2(moved_y, moved_x) - np.where(estimate.speed < 0, estimate.beta + np.float32(np.pi), estimate.beta)))
-    noise = np.maximum(np.float32(CORNER_NOISE_PX), np.asarray(delta_px, np.float32))
-    agrees = (along <= np.maximum(np.float32(0.5) * bl, noise)) & ((moved <= 2 * noise) | (turn <= eps_beta_rad))
-    return np.select(
-        [in_gate & on_line & agrees, in_gate & on_line, on_line & near_previous, on_line],
-        [np.int8(Relation.FOLLOWS), np.int8(Relation.DISAGREES), np.int8(Relation.STAYS), np.int8(Relation.BEYOND)],
-        np.int8(Relation.BREAKS),
-    )
+        A newborn takes half of its speed from its circle; an edge that has proven itself, from itself: pulled
+        towards a circle of another depth, it would run beside its corner.
+        """
+        edges, n = self._edges, self._edges.count
+        x, y, speed = edges.x[:n], edges.y[:n], edges.speed[:n]
+        dx, dy = x - np.float32(around.focus[0]), y - np.float32(around.focus[1])
+        own_way = edges.rebel[:n] | (edges.links[:n] > 0)
+        edges.beta[:n] = np.where(own_way, edges.beta[:n], np.arctan2(dy, dx))
+        circle = edges.circle[:n]
+        newborn = (circle >= 0) & ~own_way & (edges.trust[:n] < self._settings.tr_s)
+        expected = np.where(newborn, self._normal.expansion.take(circle, mode="clip") * np.hypot(dx, dy), speed)
+        heading = edges.beta[:n] + np.where(edges.rebel[:n], edges.deviation[:n], 0)
+        return predict(x, y, heading, speed, expected, dt_s)
 
+    def find(self, estimate: Estimate, corners: Corners, kept: Rows, slack_px: float) -> Found:
+        """Edges and corners that are the same landmark: near L' first, then, for the rest, near L.
 
-def update_position(trust: Floats, tr_cr: float, predicted: Floats, measured: Floats) -> Floats:
-    """L = ((Tr - Tr_cr)·L' + L_edge) / ((Tr - Tr_cr) + 1) (eq. EnEstimation, first line); any coordinate, px."""
-    weight = np.maximum(trust - np.float32(tr_cr), 0)
-    return (weight * predicted + measured) / (weight + 1)
+        ``kept``: corners outside ψ. ``slack_px``: by which the camera's rotation is uncertain.
+        """
+        edges, n, settings = self._edges, self._edges.count, self._settings
+        slack = np.float32(min(slack_px, settings.leap_px))
+        gate = edges.bl[:n] + slack
+        wanted = ~edges.held[:n]
+        looks = edges.appearance[:n]
+        likely = likeness_needed(looks, settings.appearance_max, settings.appearance_share)
+        first = self._matcher.pair(estimate.x, estimate.y, looks, gate, likely, wanted, corners, kept)
+        used = np.zeros(len(corners), np.bool_)
+        used[first.corner] = True
+        wanted[first.edge] = False
+        wanted &= ~edges.rebel[:n] & (edges.links[:n] == 0)
+        left = kept[~used[kept]]
+        if not wanted.any() or not len(left):
+            return first
+        young = edges.trust[:n] < settings.tr_s
+        reach = np.maximum(gate, np.where(young, np.float32(settings.leap_px), np.float32(settings.bl0_px)) + slack)
+        half = np.float32(0.5) * likely  # a wider look needs a better likeness
+        second = self._matcher.pair(edges.x[:n], edges.y[:n], looks, reach, half, wanted, corners, left)
+        return Found(np.concatenate([first.edge, second.edge]), np.concatenate([first.corner, second.corner]))
 
+    def off_line(
+        self, estimate: Estimate, found: Found, x: Floats, y: Floats
+    ) -> tuple[Floats, Floats, Floats, Floats] | None:
+        """Trusted normal edges that tell about the camera's rotation: corners x, y, px off the flow line, β."""
+        edges = self._edges
+        rows = found.edge
+        steady = ~edges.rebel[rows] & (edges.links[rows] == 0) & (edges.trust[rows] >= self._settings.tr_s)
+        sample = np.flatnonzero(steady)
+        if len(sample) < LEAST_EDGES:
+            return None
+        sample = sample[:: 1 + len(sample) // MOST_EDGES]
+        rows, x, y = rows[sample], x[found.corner[sample]], y[found.corner[sample]]
+        beta = estimate.beta[rows]
+        return x, y, line_distance(x - estimate.x[rows], y - estimate.y[rows], beta), beta
 
-def update_speed(
-    trust: Floats, tr_cr: float, estimate: Estimate, corner_x: Floats, corner_y: Floats, dt_s: float
-) -> Floats:
-    """V = V' ± distance/t_f, plus when the corner lies beyond L' along the line (eq. EnEstimation, second line).
+    def update(
+        self,
+        estimate: Estimate,
+        found: Found,
+        corners: Corners,
+        x: Floats,
+        y: Floats,
+        motion: Motion,
+        rotation_px: float,
+    ) -> Mask:
+        """Classify the pairs, update or predict every edge; answers the corners that are taken, bool (corners,).
 
-    The printed equation squares pixels and starts from V_ν; the residual along the line has the unit of a speed. It
-    enters with the weight that the corner has in L, 1/((Tr - Tr_cr) + 1): with its full weight the corner noise of
-    one frame, divided by t_f, would be the noise of V.
-    """
-    along = (corner_x - estimate.x) * np.cos(estimate.beta) + (corner_y - estimate.y) * np.sin(estimate.beta)
-    return estimate.speed + along / (np.float32(dt_s) * (np.maximum(trust - np.float32(tr_cr), 0) + 1))
+        ``x``, ``y``: corners, px. ``rotation_px``: what is left uncertain of the rotation.
+        """
+        edges, n, settings = self._edges, self._edges.count, self._settings
+        edge, corner = found.edge, found.corner
+        at = estimate.take(edge)
+        delta = np.float32(settings.delta_px + 2 * rotation_px)
+        before_x, before_y = edges.x[edge], edges.y[edge]
+        relation = classify(before_x, before_y, at, x[corner], y[corner], edges.bl[edge], delta, settings.eps_beta_rad)
+        relation[edges.rebel[edge] | (edges.links[edge] > 0)] = Relation.FOLLOWS  # λ*r: no flow line to leave
 
+        # No match, λ*1, λ*4 and λ*5: the edge goes on as predicted.
+        change = np.full(n, UNMATCHED)
+        change[edges.held[:n]] = 0
+        change[edge] = TRUST_CHANGE[relation]
+        edges.x[:n], edges.y[:n], edges.speed[:n] = estimate.x, estimate.y, estimate.speed
+        edges.matched[:n] = False
 
-def update_gate(
-    bl: Floats, speed: Floats, estimate_speed: Floats, corr: Floats, dt_s: float, least_px: float, most_px: float
-) -> Floats:
-    """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
-    wanted = np.abs(estimate_speed - speed) * np.float32(dt_s) / corr
-    return np.clip(np.float32(0.5) * (wanted + bl), np.float32(least_px), np.float32(most_px))
+        follows = (relation == Relation.FOLLOWS) | (relation == Relation.DISAGREES)
+        rows, seen = edge[follows], corner[follows]
+        self._include(rows, at.take(follows), x[seen], y[seen], motion.dt_s)
+        edges.appearance[rows] = corners.appearance[seen]
+        edges.matched[rows] = True
+        edges.trust[:n] = change_trust(edges.trust[:n], change, settings.tr_max)
 
+        strays = np.flatnonzero((relation == Relation.BREAKS) | (relation == Relation.STAYS))
+        strays = strays[: edges.capacity - n]
+        self._stray(edge[strays], corner[strays], before_x[strays], before_y[strays], corners, x, y, motion.dt_s)
+        taken = np.zeros(len(corners), np.bool_)
+        taken[seen] = True
+        taken[corner[strays]] = True
+        return taken
 
-def update_deviation(deviation: Floats, beta: Floats, beta_before: Floats) -> Floats:
-    """DL follows the turn of β (eq. of DL), rad.
+    def _include(self, rows: Rows, at: Estimate, x: Floats, y: Floats, dt_s: float) -> None:
+        """L, V, BL of edges whose corner was found (eq. EnEstimation); β and DL of rebels and chains."""
+        edges, settings = self._edges, self._settings
+        trust = edges.trust[rows]
+        edges.x[rows] = update_position(trust, settings.tr_cr, at.x, x)
+        edges.y[rows] = update_position(trust, settings.tr_cr, at.y, y)
+        edges.speed[rows] = update_speed(trust, settings.tr_cr, at, x, y, dt_s)
+        circle = edges.circle[rows]
+        grouped = (circle >= 0) & ~edges.rebel[rows]
+        corr = np.where(grouped, np.maximum(self._normal.corr.take(circle, mode="clip"), np.float32(LEAST_CORR)), 1)
+        edges.bl[rows] = update_gate(
+            edges.bl[rows], edges.speed[rows], at.speed, corr, dt_s, settings.bl_min_px, settings.bl0_px
+        )
+        rows = rows[edges.rebel[rows] | (edges.links[rows] > 0)]
+        dx, dy = edges.x[rows] - edges.origin_x[rows], edges.y[rows] - edges.origin_y[rows]
+        before = edges.beta[rows]
+        beta = np.where(np.hypot(dx, dy) > ORIGIN_LEAST_PX, np.arctan2(dy, dx), before)
+        deviation = update_deviation(edges.deviation[rows], beta, before)
+        edges.deviation[rows] = np.clip(deviation, -DEVIATION_MOST_RAD, DEVIATION_MOST_RAD)
+        edges.beta[rows] = beta
 
-    As printed, DL(k) = DL(k-1) - [Δβ - DL(k-1)], an error in DL doubles at every step; with the sign of the bracket
-    turned and half its weight it halves.
-    """
-    return wrap(deviation + np.float32(0.5) * wrap(wrap(beta - beta_before) - deviation))
+    def _stray(
+        self,
+        edge: Rows,
+        corner: Rows,
+        x0: Floats,
+        y0: Floats,
+        corners: Corners,
+        x: Floats,
+        y: Floats,
+        dt_s: float,
+    ) -> None:
+        """λ*4 and λ*5: the corner goes to α, with the history of the edge whose law it broke."""
+        edges = self._edges
+        rows = edges.duplicate(edge)
+        x1, y1 = x[corner], y[corner]
+        edges.x[rows], edges.y[rows] = x1, y1
+        edges.beta[rows] = np.arctan2(y1 - y0, x1 - x0)
+        edges.speed[rows] = np.hypot(x1 - x0, y1 - y0) / np.float32(dt_s)
+        edges.origin_x[rows], edges.origin_y[rows] = x0, y0
+        edges.deviation[rows] = 0
+        edges.trust[rows] = self._tr_new
+        edges.bl[rows] = 0.5 * self._settings.bl0_px
+        edges.links[rows] = 1
+        edges.circle[rows] = NO_CIRCLE
+        edges.matched[rows] = True
+        edges.appearance[rows] = corners.appearance[corner]
 
+    def delete(self) -> None:
+        """Edges whose trust ran out, or that left the frame."""
+        edges, n = self._edges, self._edges.count
+        inside = self._matcher.in_frame(edges.x[:n], edges.y[:n])
+        edges.remove(~inside | (edges.trust[:n] < self._settings.tr_cr))
 
-def change_trust(trust: Floats, change: Floats | np.float32, tr_max: float) -> Floats:
-    """Tr + change, at most Tr_max."""
-    return np.minimum(trust + change, np.float32(tr_max))
+    def add(
+        self,
+        free: Rows,
+        corners: Corners,
+        x: Floats,
+        y: Floats,
+        around: Situation,
+        groups: Groups,
+        key_number: int,
+    ) -> tuple[slice, int]:
+        """Corners that no edge claims are new landmarks (λ*1 among them); answers their rows and the evictions.
+
+        When the table is full, newborns take the place of edges that are trusted less than they are.
+        """
+        edges, settings = self._edges, self._settings
+        room = min(edges.normal_room(), edges.capacity - edges.count)
+        evicted = max(0, len(free) - room)
+        if evicted:
+            n = edges.count
+            weak = edges.least_trusted(~edges.rebel[:n] & (edges.trust[:n] < self._tr_new), evicted)
+            dead = np.zeros(n, np.bool_)
+            dead[weak] = True
+            edges.remove(dead)
+            free = free[: max(0, room) + len(weak)]
+        rows = edges.append(len(free))
+        x, y = x[free], y[free]
+        dx, dy = x - np.float32(around.focus[0]), y - np.float32(around.focus[1])
+        edges.x[rows], edges.y[rows] = x, y
+        edges.beta[rows] = np.arctan2(dy, dx)
+        edges.speed[rows] = self._first_expansion(x, y, around, groups) * np.hypot(dx, dy)
+        edges.bl[rows] = settings.bl0_px
+        edges.trust[rows] = self._tr_new
+        edges.appearance[rows] = corners.appearance[free]
+        edges.born_key[rows] = key_number
+        edges.matched[rows] = True
+        return rows, evicted
+
+    def _first_expansion(self, x: Floats, y: Floats, around: Situation, groups: Groups) -> npt.NDArray[np.float32]:
+        """V/r of new landmarks: what the circle of their λ group implies, else the ground, else a configured depth."""
+        speed = around.speed_mps if math.isfinite(around.speed_mps) else 0.0
+        expansion = np.full(len(x), speed / self._settings.scene_depth_m, np.float32)
+        if around.camera_height_m > 0:
+            below = np.maximum(y - np.float32(around.horizon_y), 0)
+            ground = np.float32(speed / (around.camera_height_m * around.pinhole.focal)) * below
+            expansion = np.where(np.abs(ground) > np.abs(expansion), ground, expansion)
+        circle = groups.circle_at(x, y)
+        known = circle >= 0
+        expansion[known] = self._normal.expansion[circle[known]]
+        return expansion
+
+    def join_rebels(self, rows: slice, circles: CircleTable, rebel_circles: RebelCircles, dt_s: float) -> None:
+        """New landmarks inside a rebel circle are expected to move as it does: they start in α with its motion."""
+        edges = self._edges
+        circle, vx, vy = rebel_circles.motion_at(circles, edges.x[rows], edges.y[rows])
+        joins = np.flatnonzero(circle >= 0)
+        at = joins + rows.start
+        vx, vy = vx[joins], vy[joins]
+        edges.links[at] = 1
+        edges.beta[at] = np.arctan2(vy, vx)
+        edges.speed[at] = np.hypot(vx, vy)
+        edges.origin_x[at], edges.origin_y[at] = edges.x[at], edges.y[at]
+        edges.bl[at] = np.maximum(0.5 * self._settings.bl0_px, 0.25 * edges.speed[at] * np.float32(dt_s))

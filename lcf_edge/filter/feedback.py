@@ -1,17 +1,13 @@
 """Feedback: circles that are fully trusted become ψ, and ψ gives way to whatever breaks the flow."""
 
 import numpy as np
-import numpy.typing as npt
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable
+from lcf_edge.filter.tables import CircleTable, EdgeTable, Mask, PsiTable
 from lcf_edge.records import Shape
 
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
-SEEN_SHARE = 0.6  # of the edges under ψ must have a corner where they are predicted
-NEW_RATIO = 1.5  # and there may be so many corners for each
-SPARE_CORNERS = 2
 PSI_LEAST_FRAMES = 3.5
 MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 
@@ -67,31 +63,18 @@ class Feedback:
         psi.width *= 1 + growth
         psi.height *= 1 + growth
 
-    def give_way(self, psi: PsiTable, x: Floats, y: Floats, reach: Floats) -> None:
-        """End the ψ regions that come within ``reach`` px of points that break the flow; float32 (n,) each."""
-        if not len(x) or not psi.active.any():
+    def give_way(self, psi: PsiTable, edges: EdgeTable, rebel: CircleTable) -> None:
+        """End the ψ regions that come near a rebel edge, a chain of α or a rebel circle."""
+        if not psi.active.any():
             return
+        n = edges.count
+        breaking = edges.rebel[:n] | (edges.links[:n] > 0)
+        x = np.concatenate([edges.x[:n][breaking], rebel.x[rebel.active]])
+        y = np.concatenate([edges.y[:n][breaking], rebel.y[rebel.active]])
+        edge_reach = np.full(np.count_nonzero(breaking), np.float32(MARGIN_PX))
+        reach = np.concatenate([edge_reach, rebel.radius[rebel.active] + np.float32(2 * MARGIN_PX)])
         dx, dy = np.abs(x[:, None] - psi.x), np.abs(y[:, None] - psi.y)
-        away_circle = np.hypot(dx, dy) - psi.width / 2
-        away_rectangle = np.hypot(np.maximum(dx - psi.width / 2, 0), np.maximum(dy - psi.height / 2, 0))
-        away = np.where(psi.shape == Shape.CIRCLE, away_circle, away_rectangle)
+        from_circle = np.hypot(dx, dy) - psi.width / 2
+        from_rectangle = np.hypot(np.maximum(dx - psi.width / 2, 0), np.maximum(dy - psi.height / 2, 0))
+        away = np.where(psi.shape == Shape.CIRCLE, from_circle, from_rectangle)
         psi.active &= ~(away <= reach[:, None]).any(axis=0)
-
-    def end_surprised(
-        self,
-        psi: PsiTable,
-        holder_of_corner: npt.NDArray[np.int32],
-        holder_of_edge: npt.NDArray[np.int32],
-        seen: Mask,
-    ) -> None:
-        """End the ψ regions whose corners are not where, or not as many as, the edges under them let expect.
-
-        ``holder_of_corner`` (c,), ``holder_of_edge`` (e,): rows of ψ. ``seen``: bool (e,), whether a corner lies at
-        an edge's prediction. This look costs a few places in an index, and lets nothing walk through ψ unseen.
-        """
-        corners = np.bincount(holder_of_corner, minlength=psi.capacity)
-        edges = np.bincount(holder_of_edge, minlength=psi.capacity)
-        explained = np.bincount(holder_of_edge[seen], minlength=psi.capacity)
-        gone = explained < SEEN_SHARE * edges - SPARE_CORNERS
-        new = corners > NEW_RATIO * edges + SPARE_CORNERS
-        psi.active &= ~(gone | new)

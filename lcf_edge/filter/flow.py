@@ -72,9 +72,7 @@ class KeyFrames:
         self.number = 0  # key frames so far
         self.since_s = 0.0  # time since the last one
 
-    def advance(
-        self, rotation: Matrix, forward: npt.NDArray[np.float64], speed_mps: float, dt_s: float
-    ) -> None:
+    def advance(self, rotation: Matrix, forward: npt.NDArray[np.float64], speed_mps: float, dt_s: float) -> None:
         """Account for the motion of one frame interval; ``forward``: (3,) unit direction of travel in camera axes."""
         step = 0.5 * speed_mps * dt_s * (forward + rotation @ forward)  # chord of the arc
         self.rotation[:] = rotation @ self.rotation

@@ -3,8 +3,16 @@
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, Floats, PsiTable
+from lcf_edge.config import Filter
+from lcf_edge.filter.edge_equations import Estimate
+from lcf_edge.filter.inputs import Corners
+from lcf_edge.filter.matching import Matcher
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.records import Shape
+
+SEEN_SHARE = 0.6  # of the edges under ψ must have a corner where they are predicted
+NEW_RATIO = 1.5  # and there may be so many corners for each
+SPARE_CORNERS = 2
 
 
 def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
@@ -27,6 +35,25 @@ def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
     held = inside.any(axis=1)
     holder[held] = rows[last[held]]
     return holder
+
+
+def end_surprised(
+    psi: PsiTable,
+    holder_of_corner: npt.NDArray[np.int32],
+    holder_of_edge: npt.NDArray[np.int32],
+    seen: Mask,
+) -> None:
+    """End the ψ regions whose corners are not where, or not as many as, the edges under them let expect.
+
+    ``holder_of_corner`` (c,), ``holder_of_edge`` (e,): rows of ψ. ``seen``: bool (e,), whether a corner lies at
+    an edge's prediction. This look costs a few places in an index, and lets nothing walk through ψ unseen.
+    """
+    corners = np.bincount(holder_of_corner, minlength=psi.capacity)
+    edges = np.bincount(holder_of_edge, minlength=psi.capacity)
+    explained = np.bincount(holder_of_edge[seen], minlength=psi.capacity)
+    gone = explained < SEEN_SHARE * edges - SPARE_CORNERS
+    new = corners > NEW_RATIO * edges + SPARE_CORNERS
+    psi.active &= ~(gone | new)
 
 
 class Groups:
@@ -92,3 +119,41 @@ class Groups:
         best[held] = last[held]
         return best
 
+    def circle_at(self, x: Floats, y: Floats) -> Rows:
+        """Row of the normal circle behind the group that holds each point, -1: none."""
+        group = self.assign(x, y)
+        if not self.count:
+            return group.astype(np.intp)
+        return np.where(group >= 0, self.row[np.maximum(group, 0)], NO_CIRCLE)
+
+
+class LineExpert:
+    """Omits the corners inside ψ, and looks there in passing whether all is as predicted."""
+
+    def __init__(self, settings: Filter, matcher: Matcher, edges: EdgeTable, psi: PsiTable) -> None:
+        self._settings = settings
+        self._matcher = matcher
+        self._edges = edges
+        self._psi = psi
+
+    def omit(self, corners: Corners, x: Floats, y: Floats, estimate: Estimate, key_number: int) -> Mask:
+        """Corners inside ψ, bool (corners,); edges under ψ are held: predicted without being matched.
+
+        ``x``, ``y``: corners, px. ``estimate``: E' of all edges. Regions where corners are not where, or not as many
+        as, the edges let expect, end first.
+        """
+        edges, n, psi = self._edges, self._edges.count, self._psi
+        edges.held[:n] = False
+        if not psi.active.any():
+            return np.zeros(len(corners), np.bool_)
+        both = inside_psi(psi, np.concatenate([x, estimate.x]), np.concatenate([y, estimate.y]))
+        of_corner, of_edge = both[: len(corners)], both[len(corners) :]
+        of_edge[edges.rebel[:n] | (edges.links[:n] > 0)] = NO_CIRCLE
+        held, inside = np.flatnonzero(of_edge != NO_CIRCLE), np.flatnonzero(of_corner != NO_CIRCLE)
+        seen = self._matcher.any_corner(
+            estimate.x[held], estimate.y[held], corners.pixel[inside], self._settings.bl_min_px
+        )
+        end_surprised(psi, of_corner[inside], of_edge[held], seen)
+        edges.held[:n] = (of_edge != NO_CIRCLE) & psi.active[of_edge]
+        edges.born_key[:n][edges.held[:n]] = key_number  # what is only predicted is no history
+        return np.asarray((of_corner != NO_CIRCLE) & psi.active[of_corner])

@@ -1,11 +1,14 @@
 """Corners and predicted edges find each other: by place through cells, by appearance, one to one."""
 
+from dataclasses import dataclass
+
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
-from lcf_edge.filter.tables import Floats, Rows
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, Corners
+from lcf_edge.filter.tables import Floats, Mask, Rows
+from lcf_edge.lens import Lens
 
 CELL_SHIFT = 3  # cells of 8x8 px hold a corner or two
 DISTANCE_COST = 0.4  # grey levels a px, so that of equal looks the nearest wins
@@ -62,9 +65,7 @@ def _runs(first: Indices, length: Indices) -> tuple[Indices, Indices]:
     return run, offset[run] + np.arange(len(run))
 
 
-def difference(
-    one: npt.NDArray[np.uint8], other: npt.NDArray[np.uint8]
-) -> Floats:
+def difference(one: npt.NDArray[np.uint8], other: npt.NDArray[np.uint8]) -> Floats:
     """Mean absolute grey difference of appearances; uint8 (n, 16) each, float32 (n,)."""
     if not len(one):
         return np.empty(0, np.float32)
@@ -107,3 +108,76 @@ def one_to_one(edge: Rows, corner: Rows, cost: Floats, edges: int, corners: int)
         free_corner[corner[chosen]] = False
         left = left[free_edge[e] & free_corner[c]]
     return np.concatenate(taken) if taken else np.empty(0, np.intp)
+
+
+@dataclass(frozen=True, slots=True)
+class Found:
+    """Pairs of an edge and its corner, one to one; int (pairs,) rows of each table."""
+
+    edge: Rows
+    corner: Rows
+
+
+class Matcher:
+    """Finds the corners of predicted edges. Places are px of the ideal pinhole, the look-up is in the input frame."""
+
+    def __init__(self, lens: Lens) -> None:
+        self._lens = lens
+        self._index = CornerIndex(lens.width, lens.height)
+
+    @property
+    def nbytes(self) -> int:
+        """Bytes that the index occupies, for good."""
+        return self._index.nbytes
+
+    def in_frame(self, x: Floats, y: Floats) -> Mask:
+        """Whether positions of the ideal pinhole lie in the picture; bool (n,)."""
+        return self._in_picture(self._lens.distort(np.stack([x, y], axis=1)))
+
+    def _in_picture(self, raw: Floats) -> Mask:
+        x, y = raw[:, 0], raw[:, 1]
+        return np.asarray((x >= 0) & (y >= 0) & (x <= self._lens.width - 1) & (y <= self._lens.height - 1))
+
+    def pair(
+        self,
+        x: Floats,
+        y: Floats,
+        looks: npt.NDArray[np.uint8],
+        gate: Floats,
+        likely: Floats,
+        wanted: Mask,
+        corners: Corners,
+        among: Rows,
+    ) -> Found:
+        """One-to-one pairs of the ``wanted`` edges, looked for at (x, y), and the corners ``among`` those of a frame.
+
+        ``x``, ``y``, ``gate``: float32 (n,) px. ``looks``: uint8 (n, 16). ``likely``: float32 (n,), see
+        ``likeness_needed``.
+        """
+        pixel = corners.pixel[among]
+        self._index.fill(pixel)
+        raw = self._lens.distort(np.stack([x, y], axis=1))
+        rows = np.flatnonzero(wanted & self._in_picture(raw))
+        who, what = self._index.candidates(raw[rows, 0], raw[rows, 1], gate[rows])
+        edge = rows[who]
+        off = raw[edge] - pixel[what]
+        away = np.hypot(off[:, 0], off[:, 1])
+        near = np.flatnonzero(away <= gate[edge])
+        edge, what, away = edge[near], what[near], away[near]
+        unlike = difference(looks[edge], corners.appearance[among[what]])
+        good = np.flatnonzero(unlike < likely[edge])
+        edge, what = edge[good], what[good]
+        cost = unlike[good] + np.float32(DISTANCE_COST) * away[good]
+        best = one_to_one(edge, what, cost, len(x), len(pixel))
+        return Found(edge[best], among[what[best]])
+
+    def any_corner(self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float) -> Mask:
+        """Whether one of the corners lies within ``reach_px`` of each place, whatever it looks like; bool (n,)."""
+        raw = self._lens.distort(np.stack([x, y], axis=1))
+        inside = np.flatnonzero(self._in_picture(raw))
+        self._index.fill(pixel)
+        who, what = self._index.candidates(raw[inside, 0], raw[inside, 1], np.float32(reach_px))
+        near = (np.abs(raw[inside[who]] - pixel[what]) <= reach_px).all(axis=1)
+        seen = np.zeros(len(x), np.bool_)
+        seen[inside[who[near]]] = True
+        return seen

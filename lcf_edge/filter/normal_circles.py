@@ -1,5 +1,7 @@
 """Circle expert, C_n: normal edges that go together by direction, speed and place become circles."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
@@ -13,11 +15,13 @@ from lcf_edge.filter.circles import (
     radius_of,
     release,
 )
-from lcf_edge.filter.edge_expert import update_position
+from lcf_edge.filter.edge_equations import update_position
 from lcf_edge.filter.flow import wrap
+from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
 SPEED_NOISE_PXPS = 12.0  # 1 sigma of an edge's V
+PASSING_WIDTHS = 1.5  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
 
 
@@ -29,9 +33,25 @@ class NormalCircles:
         self._tr_new = newborn_trust(settings)
         self._ids = Ids()
 
-    def update(
-        self, edges: EdgeTable, circles: CircleTable, focus: tuple[float, float], ignored: Mask
-    ) -> int:
+    def predict(self, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
+        """C'_n: what stands still goes out from the focus and grows, both at the rate of its expansion."""
+        growth = circles.expansion * np.float32(dt_s)
+        circles.x += (circles.x - np.float32(focus[0])) * growth
+        circles.y += (circles.y - np.float32(focus[1])) * growth
+        circles.radius *= 1 + growth
+
+    def passing_by(self, circles: CircleTable, around: Situation) -> Mask:
+        """Circles that the vehicle passes at a distance; bool (capacity,). Nothing on the path may be ignored."""
+        speed = around.speed_mps
+        if not math.isfinite(speed) or speed <= 0:
+            return np.zeros(circles.capacity, np.bool_)
+        range_m = np.float32(speed) / np.maximum(circles.expansion, np.float32(1e-3))
+        focal = np.float32(around.pinhole.fx)
+        right_m = (circles.x - np.float32(around.focus[0])) / focal * range_m
+        beside_m = np.abs(right_m) - circles.radius / focal * range_m
+        return np.asarray((circles.expansion > 0) & (beside_m > PASSING_WIDTHS * around.half_width_m))
+
+    def update(self, edges: EdgeTable, circles: CircleTable, focus: tuple[float, float], ignored: Mask) -> int:
         """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); answers evictions.
 
         ``focus``: O, px. ``ignored``: bool (capacity,), circles under an active ψ, which are only predicted.
@@ -94,11 +114,19 @@ class NormalCircles:
             circles.trust[updated], settings.tr_cr, circles.expansion[updated], mean_expansion[updated]
         )
         blend(
-            circles, updated, settings, mean_x[updated], mean_y[updated], radius_of(spread[updated], settings.bs_px)
+            circles,
+            updated,
+            settings,
+            mean_x[updated],
+            mean_y[updated],
+            radius_of(spread[updated], settings.bs_px),
         )
         circles.trust[live] = np.minimum(circles.trust + change, settings.tr_max)[live]
         circles.corr[updated] = np.hypot(mean_cos, mean_sin)[updated]
-        circles.width[updated], circles.height[updated] = EXTENT_SIGMAS * extent_x[updated], EXTENT_SIGMAS * extent_y[updated]
+        circles.width[updated], circles.height[updated] = (
+            EXTENT_SIGMAS * extent_x[updated],
+            EXTENT_SIGMAS * extent_y[updated],
+        )
         circles.support[updated] = support[updated]
         self._direct(circles, focus)
         circles.active &= circles.trust >= settings.tr_cr
@@ -184,7 +212,10 @@ class NormalCircles:
         circles.x[places], circles.y[places] = cx, cy
         var_x, var_y = mean(off_x * off_x), mean(off_y * off_y)
         circles.radius[places] = radius_of(var_x + var_y, settings.bs_px)
-        circles.width[places], circles.height[places] = EXTENT_SIGMAS * np.sqrt(var_x), EXTENT_SIGMAS * np.sqrt(var_y)
+        circles.width[places], circles.height[places] = (
+            EXTENT_SIGMAS * np.sqrt(var_x),
+            EXTENT_SIGMAS * np.sqrt(var_y),
+        )
         circles.expansion[places] = mean(expansion[left])
         circles.trust[places] = self._tr_new
         circles.support[places] = support

@@ -1,16 +1,15 @@
 """Circle expert, C_r: rebel edges that go together become circles with a cause and a time to contact."""
 
-from dataclasses import dataclass
-
 import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.circles import EXTENT_SIGMAS, Ids, blend, claim, newborn_trust, radius_of, release
-from lcf_edge.filter.edge_expert import update_position
+from lcf_edge.filter.edge_equations import update_position
 from lcf_edge.filter.flow import wrap
 from lcf_edge.filter.matching import one_to_one
-from lcf_edge.filter.rebel_detection import Links, Surroundings, Verdict, miss
+from lcf_edge.filter.rebel_detection import Rebels, miss
+from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 from lcf_edge.records import Cause
 
@@ -20,19 +19,6 @@ STILL_PXPS = 15.0  # slower circles have no direction
 MEMBER_MARGIN_PX = 8.0
 COAST_S = 1.0  # what is this near grows too fast to be followed corner by corner, and must not be forgotten
 LEAST_TTC_S = 0.05
-
-
-@dataclass(frozen=True, slots=True)
-class Rebels:
-    """Rebel edges as the circles see them; (k,) each. ``rows``: of the edge table; ``vx``, ``vy``: px/s."""
-
-    rows: Rows
-    x: Floats
-    y: Floats
-    vx: Floats
-    vy: Floats
-    links: Links
-    verdict: Verdict
 
 
 class RebelCircles:
@@ -80,15 +66,13 @@ class RebelCircles:
         vy = circles.speed[row] * np.sin(circles.beta[row]) + rate * dy[pick, nearest]
         return np.where(held, row, NO_CIRCLE), vx.astype(np.float32), vy.astype(np.float32)
 
-    def update(
-        self, edges: EdgeTable, circles: CircleTable, rebels: Rebels, around: Surroundings, speed_mps: float
-    ) -> int:
+    def update(self, edges: EdgeTable, circles: CircleTable, rebels: Rebels | None, around: Situation) -> int:
         """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); answers evictions."""
         settings = self._settings
         live = circles.active.copy()
         updated = np.zeros(circles.capacity, np.bool_)
         evicted = 0
-        if len(rebels.rows):
+        if rebels is not None and len(rebels.rows):
             label, size = self._groups(rebels, edges.circle[rebels.rows], circles)
             if len(size):
                 evicted = self._meet(edges, circles, rebels, label, size, around, updated)
@@ -117,7 +101,7 @@ class RebelCircles:
         rebels: Rebels,
         label: npt.NDArray[np.intp],
         size: npt.NDArray[np.intp],
-        around: Surroundings,
+        around: Situation,
         updated: Mask,
     ) -> int:
         """Groups update the circles that they belong to, and found new ones."""
@@ -200,7 +184,7 @@ class RebelCircles:
         grouped: Rows,
         label: npt.NDArray[np.intp],
         has: Rows,
-        around: Surroundings,
+        around: Situation,
         mean: object,
     ) -> None:
         """Cause, time to contact, range and lateral miss of each circle."""
@@ -237,7 +221,9 @@ class RebelCircles:
         slack = focal * np.float32(around.pitch_sigma_rad)
         with np.errstate(divide="ignore", invalid="ignore"):
             ground = np.where(
-                (bottom > slack) & (around.camera_height_m > 0), around.camera_height_m * focal / bottom, np.nan
+                (bottom > slack) & (around.camera_height_m > 0),
+                around.camera_height_m * focal / bottom,
+                np.nan,
             )
         right = (circles.x[rows] - np.float32(around.focus[0])) / focal
         range_m = np.where(stands, still_range, ground).astype(np.float32)

@@ -7,11 +7,13 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 """
 
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.flow import KeyFrames, Pinhole, line_distance, wrap
+from lcf_edge.filter.flow import KeyFrames, wrap
+from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
@@ -19,32 +21,20 @@ STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
 GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
 DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
-BASELINE_LEAST_S = 0.08
-BASELINE_SURE_S = 0.2  # a history this long tells what moves from what stands
+
+
+class Columns:
+    """Arrays of one length, taken together."""
+
+    __slots__ = ()
+
+    def take(self, rows: Rows) -> Self:
+        """Some of the rows."""
+        return type(self)(*(getattr(self, name)[rows] for name in self.__slots__))
 
 
 @dataclass(frozen=True, slots=True)
-class Surroundings:
-    """What the vehicle is and how it moves at this instant; ``focus``: O, px; ``horizon_y``: px."""
-
-    pinhole: Pinhole
-    focus: tuple[float, float]
-    horizon_y: float
-    camera_height_m: float  # 0: unknown
-    half_width_m: float
-    height_m: float
-    horizon_s: float
-    speed_mps: float  # NaN: unknown
-    yaw_rate_radps: float
-    noise_px: float  # 1 sigma of an edge's position
-    delta_px: float  # δ
-    focus_sigma_px: float
-    ground_margin: float  # share by which the ground may be misjudged
-    pitch_sigma_rad: float
-
-
-@dataclass(frozen=True, slots=True)
-class Links:
+class Links(Columns):
     """Edges seen from a key frame; float32 (n,): where they were (``x``, ``y``, derotated to now, px), the focus of
     the displacement since (``focus_x``, ``focus_y``, px), its forward part (``depth_m``), time and uncertainty."""
 
@@ -57,9 +47,7 @@ class Links:
     sigma_px: Floats
 
 
-def links_since(
-    edges: EdgeTable, rows: Rows, key: npt.NDArray[np.int64], keys: KeyFrames, around: Surroundings
-) -> Links:
+def links_since(edges: EdgeTable, rows: Rows, key: npt.NDArray[np.int64], keys: KeyFrames, around: Situation) -> Links:
     """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
     pinhole = around.pinhole
     slot_h = pinhole.homography(keys.rotation).reshape(KEYS, 9).astype(np.float32)
@@ -68,21 +56,27 @@ def links_since(
     depth = np.where(moves, displacement[:, 2], 1.0)
     focus_x = np.where(moves, pinhole.cx + pinhole.fx * displacement[:, 0] / depth, around.focus[0])
     focus_y = np.where(moves, pinhole.cy + pinhole.fy * displacement[:, 1] / depth, around.focus[1])
-    per_slot = np.stack(
-        [focus_x, focus_y, displacement[:, 2], keys.elapsed_s, keys.sigma_rad * pinhole.focal]
-    ).astype(np.float32)
+    per_slot = np.stack([focus_x, focus_y, displacement[:, 2], keys.elapsed_s, keys.sigma_rad * pinhole.focal]).astype(
+        np.float32
+    )
     slot = key % KEYS
     h = slot_h.T[:, slot]
     kx, ky = edges.key_x[slot, rows], edges.key_y[slot, rows]
     scale = 1 / (h[6] * kx + h[7] * ky + h[8])
     fx, fy, dz, elapsed, sigma = per_slot[:, slot]
     return Links(
-        (h[0] * kx + h[1] * ky + h[2]) * scale, (h[3] * kx + h[4] * ky + h[5]) * scale, fx, fy, dz, elapsed, sigma
+        (h[0] * kx + h[1] * ky + h[2]) * scale,
+        (h[3] * kx + h[4] * ky + h[5]) * scale,
+        fx,
+        fy,
+        dz,
+        elapsed,
+        sigma,
     )
 
 
 @dataclass(frozen=True, slots=True)
-class Verdict:
+class Verdict(Columns):
     """What the links say; (n,) each.
 
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where it should be. ``over``: px
@@ -102,7 +96,20 @@ class Verdict:
     incoming: Mask
 
 
-def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
+@dataclass(frozen=True, slots=True)
+class Rebels:
+    """Rebel edges as the circles see them; (k,) each. ``rows``: of the edge table; ``vx``, ``vy``: px/s."""
+
+    rows: Rows
+    x: Floats
+    y: Floats
+    vx: Floats
+    vy: Floats
+    links: Links
+    verdict: Verdict
+
+
+def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
     """Hold edges at ``x``, ``y`` (float32 (n,), px) against the flow of what stands still.
 
     From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r. The lateral miss is measured from the arc that speed and
@@ -157,12 +164,10 @@ def judge(links: Links, x: Floats, y: Floats, around: Surroundings) -> Verdict:
         & (outward - r * ground_mu * np.float32(1 + around.ground_margin) > noise)
         & (height_m < around.height_m)
     )
-    return Verdict(
-        r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming
-    )
+    return Verdict(r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming)
 
 
-def miss(right_m: Floats, ahead_m: Floats, around: Surroundings) -> Floats:
+def miss(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
     """Distance of points from the vehicle's path, m, right positive: from the arc of speed and yaw rate."""
     speed = around.speed_mps
     if not np.isfinite(speed) or abs(around.yaw_rate_radps) < 1e-3 * max(abs(speed), 0.05):
@@ -172,9 +177,7 @@ def miss(right_m: Floats, ahead_m: Floats, around: Surroundings) -> Floats:
     return (distance - np.abs(radius)) * np.sign(radius)
 
 
-def agree(
-    whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float
-) -> Mask:
+def agree(whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float) -> Mask:
     """Whether the younger link of each chain says the same as the whole chain (bounded, consistent deviation).
 
     The rate of the deviation over the recent link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
@@ -213,16 +216,3 @@ def give_birth(edges: EdgeTable, rows: Rows, first: Links, second: Links) -> Non
     edges.origin_x[rows], edges.origin_y[rows] = first.x, first.y
     edges.rebel[rows] = True
     edges.links[rows] = 0
-
-
-__all__ = [
-    "Links",
-    "Surroundings",
-    "Verdict",
-    "agree",
-    "give_birth",
-    "judge",
-    "line_distance",
-    "links_since",
-    "miss",
-]

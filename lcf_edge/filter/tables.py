@@ -96,6 +96,23 @@ class EdgeTable:
         self._flags[:, target] = self._flags[:, source]
         self.appearance[target] = self.appearance[source]
 
+    def normal_room(self) -> int:
+        """Rows that E_n may still take."""
+        return self.normal_capacity - (self.count - int(np.count_nonzero(self.rebel[: self.count])))
+
+    def trim(self) -> int:
+        """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; how many."""
+        n = self.count
+        chains = (self.links[:n] > 0) & ~self.rebel[:n]
+        excess_chains = max(0, int(np.count_nonzero(chains)) - self.chain_capacity)
+        self.links[self.least_trusted(chains, excess_chains)] = 0
+        excess = max(0, -self.normal_room())
+        if excess:
+            dead = np.zeros(n, np.bool_)
+            dead[self.least_trusted(~self.rebel[:n], excess)] = True
+            self.remove(dead)
+        return excess + excess_chains
+
     def least_trusted(self, candidates: Mask, number: int) -> Rows:
         """The ``number`` rows of ``candidates`` (bool (count,)) with the least trust, the youngest of equals first."""
         rows = np.flatnonzero(candidates)

@@ -77,9 +77,7 @@ class VideoFile(Recording):
         try:
             check_size(*size)
         except PictureError as error:
-            raise RecordingError(
-                f"{path}: pictures are {error} ({size[0]}x{size[1]} px); scale the video"
-            ) from error
+            raise RecordingError(f"{path}: pictures are {error} ({size[0]}x{size[1]} px); scale the video") from error
         wanted_fps = config.camera.fps
         tells_fps = math.isfinite(own_fps) and 0 < own_fps < FASTEST_FPS
         self._fps = own_fps if tells_fps and wanted_fps == Camera().fps else wanted_fps
@@ -93,9 +91,7 @@ class VideoFile(Recording):
         index = 0
         try:
             while capture.grab():
-                yield Picture(
-                    _stamp_ns(index, self._fps), f"{self.path}: picture {index}", partial(_retrieve, capture)
-                )
+                yield Picture(_stamp_ns(index, self._fps), f"{self.path}: picture {index}", partial(_retrieve, capture))
                 index += 1
         except cv2.error as error:
             self._warn(f"{self.path}: damaged after picture {index} ({error.err})")
@@ -108,17 +104,13 @@ class VideoFile(Recording):
         capture = cv2.VideoCapture(str(self.path))
         if not capture.isOpened():
             capture.release()
-            raise RecordingError(
-                f"{self.path}: not a video that can be decoded; convert it, or check it with a player"
-            )
+            raise RecordingError(f"{self.path}: not a video that can be decoded; convert it, or check it with a player")
         return capture
 
 
 def natural_order(name: str) -> list[tuple[int, str]]:
     """Sorting key in which numbers inside a name count as numbers."""
-    return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"(\d{1,18})", name)] + [
-        (0, name)
-    ]
+    return [(int(part), "") if part.isdecimal() else (0, part) for part in re.split(r"(\d{1,18})", name)] + [(0, name)]
 
 
 def _retrieve(capture: cv2.VideoCapture) -> Grey:

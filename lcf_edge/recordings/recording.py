@@ -107,9 +107,7 @@ def interleave(
     yield from heapq.merge(*(stream.up_to(math.inf) for stream in streams), key=_stamp_ns)
 
 
-def reorder(
-    items: Iterable[Picture | Sample], late: Callable[[Picture | Sample], None]
-) -> Iterator[Picture | Sample]:
+def reorder(items: Iterable[Picture | Sample], late: Callable[[Picture | Sample], None]) -> Iterator[Picture | Sample]:
     """One stream, only roughly in the order of its stamps, in the order of delivery (see ``Recording``).
 
     At most ``HELD_PICTURES`` and ``HELD_SAMPLES`` wait for earlier ones; what comes later still, or repeats

@@ -81,9 +81,7 @@ class RosBag(Recording):
 
     def _late(self, item: Picture | Sample) -> None:
         kind = {Picture: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
-        self._skip(
-            f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s"
-        )
+        self._skip(f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s")
 
     def _open_files(self) -> list[McapFile]:
         """The files that can be opened: of a bag that a power cut ended, the last may be empty."""
@@ -190,9 +188,7 @@ def _parse(message: Message, where: str) -> Picture | Sample:
             return Picture(_stamp_ns(image.header, message), where, partial(raw_picture, image))
         case schema if schema == COMPRESSED_IMAGE:
             compressed = cdr.decode_compressed_image(message.data)
-            return Picture(
-                _stamp_ns(compressed.header, message), where, partial(decode_picture, compressed.data)
-            )
+            return Picture(_stamp_ns(compressed.header, message), where, partial(decode_picture, compressed.data))
         case schema if schema == IMU:
             imu = cdr.decode_imu(message.data)
             if imu.gyro is None or imu.accel is None:

@@ -46,9 +46,7 @@ _TEXT_SCALE = 0.42
 
 def draw(image: npt.NDArray[np.uint8], outcome: "Outcome") -> Picture:
     """The two panels of one frame: (h, w) luminance in, (h, 2w, 3) blue, green, red out."""
-    base = cv2.cvtColor(
-        cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR
-    )  # dimmed: the marks stand out
+    base = cv2.cvtColor(cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR)  # dimmed: the marks stand out
     width = image.shape[1]
     panels = np.concatenate((base, base), axis=1).astype(np.uint8, copy=False)
     left, right = panels[:, :width], panels[:, width:]
@@ -216,9 +214,7 @@ class VideoSink:
         check_output(path, SUFFIXES)
         self.path = path
         # Two decimals: the container's time base cannot hold more.
-        self._writer = cv2.VideoWriter(
-            str(path), cv2.VideoWriter.fourcc(*"mp4v"), round(frames_per_s, 2), size
-        )
+        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), round(frames_per_s, 2), size)
         self._frames = 0
         if not self._writer.isOpened():
             raise self._failure()

@@ -35,9 +35,7 @@ def _columns(table: np.ndarray[Any, np.dtype[np.void]]) -> dict[str, list[Any]]:
     """Each field of a table as a list of Python numbers, floats with 3 decimals."""
     names = table.dtype.names or ()
     return {
-        name: (
-            np.round(table[name].astype(np.float64), 3) if table[name].dtype.kind == "f" else table[name]
-        ).tolist()
+        name: (np.round(table[name].astype(np.float64), 3) if table[name].dtype.kind == "f" else table[name]).tolist()
         for name in names
     }
 

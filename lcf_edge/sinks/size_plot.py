@@ -55,9 +55,7 @@ class SizePlot:
         figure = Figure(figsize=(10, 5.71), dpi=140, layout="constrained")
         FigureCanvasAgg(figure)
         axes = figure.add_subplot()
-        axes.set_yscale(
-            "symlog", linthresh=1.0, linscale=0.3
-        )  # logarithmic, but with a place for an empty table
+        axes.set_yscale("symlog", linthresh=1.0, linscale=0.3)  # logarithmic, but with a place for an empty table
         axes.set(ylim=(-0.15, 2.0 * max(piled_up[-1], 10)), xlim=(1, max(len(frames), 2)))
         ends: list[tuple[float, str, str]] = []
         axes.plot(frames, piled_up, color="black", linewidth=2.2)

@@ -1,0 +1,63 @@
+"""Step 0: the camera's rotation is taken out of all that is stored; what the gyro missed, the flow tells."""
+
+import math
+
+import numpy as np
+
+from lcf_edge.filter.flow import Matrix, Pinhole, carry
+from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, PsiTable
+
+CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
+LEAST_EDGES = 25  # that a correction of the rotation needs
+MOST_EDGES = 200  # and that are enough
+_ROUNDS = 3
+
+
+def derotate(
+    pinhole: Pinhole,
+    rotation: Matrix,
+    edges: EdgeTable,
+    circles: tuple[CircleTable, CircleTable],
+    psi: PsiTable,
+) -> None:
+    """H = K·R·K⁻¹ on every stored image position; own directions turn with the picture."""
+    h = pinhole.homography(rotation)
+    n = edges.count
+    roll = np.float32(math.atan2(h[1, 0], h[0, 0]))
+    edges.x[:n], edges.y[:n] = carry(h, edges.x[:n], edges.y[:n])
+    edges.origin_x[:n], edges.origin_y[:n] = carry(h, edges.origin_x[:n], edges.origin_y[:n])
+    edges.beta[:n] += roll
+    for table in (*circles, psi):
+        table.x[:], table.y[:] = carry(h, table.x, table.y)
+    for table in circles:
+        table.beta += roll
+
+
+def missing_rotation(
+    pinhole: Pinhole, x: Floats, y: Floats, off_px: Floats, beta: Floats, prior_sigma_rad: float
+) -> tuple[Matrix, float]:
+    """The small rotation that puts edges back on their flow lines; and what stays uncertain of it, rad.
+
+    ``x``, ``y``: corners, float32 (n,) px. ``off_px``: their distances from the flow lines (``line_distance``), which
+    do not depend on depth. ``beta``: directions of the lines. Least squares, robust against what moves, with the
+    gyro's uncertainty as prior. Answers a first-order rotation (3, 3), as in ``Motion.rotation``.
+    """
+    focal = np.float32(pinhole.focal)
+    u, v = (
+        (x - np.float32(pinhole.cx)) / np.float32(pinhole.fx),
+        (y - np.float32(pinhole.cy)) / np.float32(pinhole.fy),
+    )
+    cos, sin = np.cos(beta), np.sin(beta)
+    # px across the line for a rotation of 1 rad about x, y and z
+    across = focal * np.stack([sin * u * v - cos * (1 + v * v), -sin * (1 + u * u) + cos * u * v, sin * v + cos * u])
+    prior = np.eye(3) * (CORNER_SIGMA_PX / prior_sigma_rad) ** 2
+    turn = np.zeros(3)
+    information = prior
+    for _ in range(_ROUNDS):
+        rest = off_px - turn.astype(np.float32) @ across
+        weighted = across / np.square(1 + np.square(rest / np.float32(2 * CORNER_SIGMA_PX)))
+        information = (weighted @ across.T).astype(np.float64) + prior
+        turn = np.linalg.solve(information, (weighted @ off_px).astype(np.float64))
+    a, b, c = turn
+    sigma = CORNER_SIGMA_PX * math.sqrt(np.diag(np.linalg.inv(information))[:2].max())  # of pitch and yaw
+    return np.array([[1, -c, b], [c, 1, -a], [-b, a, 1]]), sigma

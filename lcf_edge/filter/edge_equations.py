@@ -1,0 +1,136 @@
+"""The equations of the Circle expert for edges: predict, classify (λ*1 to λ*5), update; whole arrays, no state."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.filter.flow import line_distance, wrap
+from lcf_edge.filter.tables import Floats, Mask, Rows
+
+CORNER_NOISE_PX = 0.7  # below this a displacement has no direction
+
+
+class Relation(IntEnum):
+    """λ*: how a corner relates to an estimated edge (section Edge Classifications)."""
+
+    BEYOND = 1  # outside the gate, but within the error span
+    FOLLOWS = 2  # in the gate, on the line, as predicted
+    DISAGREES = 3  # in the gate, on the line, but not in speed or direction
+    BREAKS = 4  # off the line
+    STAYS = 5  # near where the edge was, on the line
+
+
+TRUST_CHANGE = np.array([0, -1, +1, -1, 0, -1], np.float32)
+"""Change of Tr for λ*1 to λ*5; index 0 is unused (no match is -1 as well, see ``UNMATCHED``)."""
+
+UNMATCHED = np.float32(-1)
+
+
+@dataclass(frozen=True, slots=True)
+class Estimate:
+    """Predicted edges E'; float32 (n,): L' (``x``, ``y``, px), V' (``speed``, px/s), and the direction taken (rad)."""
+
+    x: Floats
+    y: Floats
+    speed: Floats
+    beta: Floats
+
+    def take(self, rows: Rows | Mask) -> "Estimate":
+        """Some of them."""
+        return Estimate(self.x[rows], self.y[rows], self.speed[rows], self.beta[rows])
+
+
+def predict(x: Floats, y: Floats, beta: Floats, speed: Floats, expected_speed: Floats, dt_s: float) -> Estimate:
+    """L' = L + V'·t_f along β; V' = ½(V + expected V) (section Edge Classifications, below eq. of E_n)."""
+    halfway = np.float32(0.5) * (speed + expected_speed)
+    step = halfway * np.float32(dt_s)
+    return Estimate(x + step * np.cos(beta), y + step * np.sin(beta), halfway, beta)
+
+
+def classify(
+    x: Floats,
+    y: Floats,
+    estimate: Estimate,
+    corner_x: Floats,
+    corner_y: Floats,
+    bl: Floats,
+    delta_px: Floats | float,
+    eps_beta_rad: float,
+) -> npt.NDArray[np.int8]:
+    """λ* class of each pair of an edge and a corner, int8 (n,), in the order 2, 3, 1, 5, 4.
+
+    ``x``, ``y``: L, where the edge was (derotated), px. ``bl``: BL, px. ``delta_px``: δ. All float32 (n,).
+    Speed agrees when the corner lies within half of BL of L' along the line, direction when the corner moved along
+    the flow within ``eps_beta_rad`` (displacements below corner noise have none).
+    """
+    ahead_x, ahead_y = corner_x - estimate.x, corner_y - estimate.y
+    moved_x, moved_y = corner_x - x, corner_y - y
+    cos, sin = np.cos(estimate.beta), np.sin(estimate.beta)
+    in_gate = np.hypot(ahead_x, ahead_y) <= bl
+    near_previous = np.hypot(moved_x, moved_y) <= bl
+    on_line = np.abs(line_distance(moved_x, moved_y, estimate.beta)) <= delta_px
+    along = np.abs(ahead_x * cos + ahead_y * sin)
+    moved = np.hypot(moved_x, moved_y)
+    ahead = np.where(estimate.speed < 0, estimate.beta + np.float32(np.pi), estimate.beta)
+    turn = np.abs(wrap(np.arctan2(moved_y, moved_x) - ahead))
+    noise = np.maximum(np.float32(CORNER_NOISE_PX), np.asarray(delta_px, np.float32))
+    agrees = (along <= np.maximum(np.float32(0.5) * bl, noise)) & ((moved <= 2 * noise) | (turn <= eps_beta_rad))
+    return np.select(
+        [in_gate & on_line & agrees, in_gate & on_line, on_line & near_previous, on_line],
+        [
+            np.int8(Relation.FOLLOWS),
+            np.int8(Relation.DISAGREES),
+            np.int8(Relation.STAYS),
+            np.int8(Relation.BEYOND),
+        ],
+        np.int8(Relation.BREAKS),
+    )
+
+
+def update_position(trust: Floats, tr_cr: float, predicted: Floats, measured: Floats) -> Floats:
+    """L = ((Tr - Tr_cr)·L' + L_edge) / ((Tr - Tr_cr) + 1) (eq. EnEstimation, first line); any coordinate, px."""
+    weight = np.maximum(trust - np.float32(tr_cr), 0)
+    return (weight * predicted + measured) / (weight + 1)
+
+
+def update_speed(
+    trust: Floats, tr_cr: float, estimate: Estimate, corner_x: Floats, corner_y: Floats, dt_s: float
+) -> Floats:
+    """V = V' ± distance/t_f, plus when the corner lies beyond L' along the line (eq. EnEstimation, second line).
+
+    The printed equation squares pixels and starts from V_ν; the residual along the line has the unit of a speed. It
+    enters with the weight that the corner has in L, 1/((Tr - Tr_cr) + 1): with its full weight the corner noise of
+    one frame, divided by t_f, would be the noise of V.
+    """
+    along = (corner_x - estimate.x) * np.cos(estimate.beta) + (corner_y - estimate.y) * np.sin(estimate.beta)
+    return estimate.speed + along / (np.float32(dt_s) * (np.maximum(trust - np.float32(tr_cr), 0) + 1))
+
+
+def update_gate(
+    bl: Floats,
+    speed: Floats,
+    estimate_speed: Floats,
+    corr: Floats,
+    dt_s: float,
+    least_px: float,
+    most_px: float,
+) -> Floats:
+    """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
+    wanted = np.abs(estimate_speed - speed) * np.float32(dt_s) / corr
+    return np.clip(np.float32(0.5) * (wanted + bl), np.float32(least_px), np.float32(most_px))
+
+
+def update_deviation(deviation: Floats, beta: Floats, beta_before: Floats) -> Floats:
+    """DL follows the turn of β (eq. of DL), rad.
+
+    As printed, DL(k) = DL(k-1) - [Δβ - DL(k-1)], an error in DL doubles at every step; with the sign of the bracket
+    turned and half its weight it halves.
+    """
+    return wrap(deviation + np.float32(0.5) * wrap(wrap(beta - beta_before) - deviation))
+
+
+def change_trust(trust: Floats, change: Floats | np.float32, tr_max: float) -> Floats:
+    """Tr + change, at most Tr_max."""
+    return np.minimum(trust + change, np.float32(tr_max))
