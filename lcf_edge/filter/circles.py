@@ -1,11 +1,13 @@
 """What normal and rebel circles share: newborn trust, identities, places in the table, the blend of two circles."""
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.edge_equations import update_position
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Rows
 
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members
 RADIUS_LEAST_PX = 6.0
@@ -38,13 +40,13 @@ def release(edges: EdgeTable, circles: CircleTable, rebel: bool) -> None:
     circle[gone] = NO_CIRCLE
 
 
-def claim(edges: EdgeTable, circles: CircleTable, number: int, tr_new: float, rebel: bool) -> tuple[Rows, int]:
+def claim(edges: EdgeTable, circles: CircleTable, number: int, settings: Filter, rebel: bool) -> tuple[Rows, int]:
     """Rows for newborn circles: free ones first, then those of circles trusted less than a newborn.
 
     Answers the rows (perhaps fewer than asked) and how many circles, old or new, found no place.
     """
     free = np.flatnonzero(~circles.active)[:number]
-    weak = np.flatnonzero(circles.active & (circles.trust < tr_new))
+    weak = np.flatnonzero(circles.active & (circles.trust < newborn_trust(settings)))
     weak = weak[np.argsort(circles.trust[weak], kind="stable")][: number - len(free)]
     circles.active[weak] = False
     release(edges, circles, rebel)
@@ -53,20 +55,63 @@ def claim(edges: EdgeTable, circles: CircleTable, number: int, tr_new: float, re
     return rows, number - len(free)
 
 
-def radius_of(spread: Floats, most_px: float) -> Floats:
-    """R in px from the mean squared distance of the members from their centre."""
-    return np.clip(RADIUS_SIGMAS * np.sqrt(spread), RADIUS_LEAST_PX, most_px).astype(np.float32)
+class Members:
+    """Edges gathered into groups, and what a circle takes from them.
+
+    ``label``: int (k,), group of each edge, 0 to ``groups`` - 1; a group may be empty. ``x``, ``y``: their positions, px.
+    Per group, float32 (groups,): ``size``, ``centre_x``, ``centre_y``, ``spread`` (mean squared distance, px²),
+    ``width``, ``height`` (extent, px).
+    """
+
+    def __init__(self, label: Rows, groups: int, x: Floats, y: Floats) -> None:
+        self.label = label
+        self._groups = groups
+        self.size = np.bincount(label, minlength=groups)
+        self._safe = np.maximum(self.size, 1).astype(np.float32)
+        self.centre_x, self.centre_y = self.mean(x), self.mean(y)
+        off_x, off_y = x - self.centre_x[label], y - self.centre_y[label]
+        variance_x, variance_y = self.mean(off_x * off_x), self.mean(off_y * off_y)
+        self.spread = variance_x + variance_y
+        self.width = np.float32(EXTENT_SIGMAS) * np.sqrt(variance_x)
+        self.height = np.float32(EXTENT_SIGMAS) * np.sqrt(variance_y)
+
+    def mean(self, values: npt.NDArray[Any]) -> Floats:
+        """Mean of a value of the edges, (k,), over each group; 0 for an empty one."""
+        return (np.bincount(self.label, values, minlength=self._groups) / self._safe).astype(np.float32)
+
+    def radius(self, most_px: float) -> Floats:
+        """R that holds most of each group, px."""
+        return np.clip(RADIUS_SIGMAS * np.sqrt(self.spread), RADIUS_LEAST_PX, most_px).astype(np.float32)
 
 
-def blend(
-    circles: CircleTable,
-    rows: Mask | Rows,
-    settings: Filter,
-    x: Floats,
-    y: Floats,
-    radius: Floats,
-) -> None:
-    """The circle predicted and the circle that its edges show, weighed by trust (as eq. EnEstimation)."""
+def blend(circles: CircleTable, rows: Rows, members: Members, groups: Rows, settings: Filter) -> None:
+    """The circle predicted and the circle that its edges show, weighed by trust (as eq. EnEstimation).
+
+    ``rows``: of the table; ``groups``: the group of members of each.
+    """
     trust = circles.trust[rows]
-    for column, seen in ((circles.x, x), (circles.y, y), (circles.radius, radius)):
-        column[rows] = update_position(trust, settings.tr_cr, column[rows], seen)
+    for column, seen in (
+        (circles.x, members.centre_x),
+        (circles.y, members.centre_y),
+        (circles.radius, members.radius(settings.bs_px)),
+    ):
+        column[rows] = update_position(trust, settings.tr_cr, column[rows], seen[groups])
+    describe(circles, rows, members, groups)
+
+
+def describe(circles: CircleTable, rows: Rows, members: Members, groups: Rows) -> None:
+    """Support and extent of circles, from their members."""
+    circles.support[rows] = members.size[groups]
+    circles.width[rows], circles.height[rows] = members.width[groups], members.height[groups]
+
+
+def give_birth(circles: CircleTable, rows: Rows, members: Members, groups: Rows, settings: Filter, ids: Ids) -> None:
+    """Newborn circles from their members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
+    circles.x[rows], circles.y[rows] = members.centre_x[groups], members.centre_y[groups]
+    circles.radius[rows] = members.radius(settings.bs_px)[groups]
+    describe(circles, rows, members, groups)
+    circles.trust[rows] = newborn_trust(settings)
+    circles.id[rows] = ids.take(len(rows))
+    circles.corr[rows] = 1
+    circles.cause[rows] = 0
+    circles.ttc[rows], circles.range[rows], circles.lateral[rows] = np.inf, np.nan, np.nan

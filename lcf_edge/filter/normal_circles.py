@@ -1,21 +1,13 @@
 """Circle expert, C_n: normal edges that go together by direction, speed and place become circles."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from lcf_edge.config import Filter
-from lcf_edge.filter.circles import (
-    EXTENT_SIGMAS,
-    Ids,
-    blend,
-    claim,
-    newborn_trust,
-    radius_of,
-    release,
-)
-from lcf_edge.filter.edge_equations import update_position
+from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
+from lcf_edge.filter.edge_equations import change_trust, update_position
 from lcf_edge.filter.flow import wrap
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
@@ -23,6 +15,24 @@ from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Ma
 SPEED_NOISE_PXPS = 12.0  # 1 sigma of an edge's V
 PASSING_WIDTHS = 1.5  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
+SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
+
+
+@dataclass(frozen=True, slots=True)
+class Flowing:
+    """Trusted normal edges, (k,) each: rows of the table, L in px, r (px from O), direction of flow, V/r in 1/s."""
+
+    rows: Rows
+    x: Floats
+    y: Floats
+    r: Floats
+    cos: Floats
+    sin: Floats
+    expansion: Floats
+
+    def take(self, rows: Rows) -> "Flowing":
+        """Some of them."""
+        return Flowing(*(getattr(self, name)[rows] for name in self.__slots__))
 
 
 class NormalCircles:
@@ -30,7 +40,6 @@ class NormalCircles:
 
     def __init__(self, settings: Filter) -> None:
         self._settings = settings
-        self._tr_new = newborn_trust(settings)
         self._ids = Ids()
 
     def predict(self, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
@@ -56,111 +65,76 @@ class NormalCircles:
 
         ``focus``: O, px. ``ignored``: bool (capacity,), circles under an active ψ, which are only predicted.
         """
-        settings = self._settings
+        flowing = self._flowing(edges, focus)
+        owner, involved = self._involve(flowing, edges.circle[flowing.rows], circles, ignored)
+        edges.circle[flowing.rows] = owner
+        self._compare(flowing, owner, involved, circles, ignored)
+        self._direct(circles, focus)
+        circles.active &= circles.trust >= self._settings.tr_cr
+        release(edges, circles, rebel=False)
+        left = np.flatnonzero(edges.circle[flowing.rows] == NO_CIRCLE)
+        evicted = self._found(edges, circles, flowing.take(left), focus)
+        self._direct(circles, focus)
+        return evicted
+
+    def _flowing(self, edges: EdgeTable, focus: tuple[float, float]) -> Flowing:
         n = edges.count
-        capacity = circles.capacity
-        trusted = ~edges.rebel[:n] & ~edges.held[:n] & (edges.links[:n] == 0) & (edges.trust[:n] >= settings.tr_s)
-        rows = np.flatnonzero(trusted)
+        free = ~edges.rebel[:n] & ~edges.held[:n] & (edges.links[:n] == 0)
+        rows = np.flatnonzero(free & (edges.trust[:n] >= self._settings.tr_s))
         x, y = edges.x[rows], edges.y[rows]
         dx, dy = x - np.float32(focus[0]), y - np.float32(focus[1])
         r = np.maximum(np.hypot(dx, dy), np.float32(1))
-        cos, sin = dx / r, dy / r
-        expansion = edges.speed[rows] / r
-        owner = edges.circle[rows]
+        return Flowing(rows, x, y, r, dx / r, dy / r, edges.speed[rows] / r)
 
+    def _involve(self, flowing: Flowing, owner: Rows, circles: CircleTable, ignored: Mask) -> tuple[Rows, Mask]:
+        """Circle of each edge, -1: none; and the circles that most of their edges still lie in (percentinvolve)."""
+        capacity = circles.capacity
         had = owner >= 0
         before = np.bincount(owner[had], minlength=capacity)
-        fits, inside = self._fits(circles, np.maximum(owner, 0), x, y, cos, sin, r, expansion)
+        fits, inside = self._fits(flowing, np.maximum(owner, 0), circles)
         included = np.bincount(owner[had & inside], minlength=capacity)
         owner = np.where(had & fits, owner, NO_CIRCLE)
-
-        loose = np.flatnonzero(owner == NO_CIRCLE)
-        candidates = np.flatnonzero(circles.active & ~ignored)
-        if len(loose) and len(candidates):
-            distance = np.square(x[loose, None] - circles.x[candidates]) + np.square(
-                y[loose, None] - circles.y[candidates]
-            )
-            nearest = candidates[np.argmin(distance, axis=1)]
-            fits, inside = self._fits(
-                circles, nearest, x[loose], y[loose], cos[loose], sin[loose], r[loose], expansion[loose]
-            )
+        loose, open_circles = np.flatnonzero(owner == NO_CIRCLE), np.flatnonzero(circles.active & ~ignored)
+        if len(loose) and len(open_circles):
+            alone = flowing.take(loose)
+            away = np.square(alone.x[:, None] - circles.x[open_circles])
+            away += np.square(alone.y[:, None] - circles.y[open_circles])
+            nearest = open_circles[np.argmin(away, axis=1)]
+            fits, inside = self._fits(alone, nearest, circles)
             joins = fits & inside
             owner[loose[joins]] = nearest[joins]
-        edges.circle[rows] = owner
+        return owner, included >= self._settings.involvement * np.maximum(before, 1)
 
-        member = owner >= 0
-        who = owner[member]
-        support = np.bincount(who, minlength=capacity)
-        safe = np.maximum(support, 1).astype(np.float32)
-
-        def mean(values: Floats) -> Floats:
-            return (np.bincount(who, values[member], minlength=capacity) / safe).astype(np.float32)
-
-        mean_x, mean_y, mean_cos, mean_sin = mean(x), mean(y), mean(cos), mean(sin)
-        mean_expansion = mean(expansion)
-        spread = mean(np.square(x - mean_x[owner]) + np.square(y - mean_y[owner]))
-        extent_x = np.sqrt(mean(np.square(x - mean_x[owner])))
-        extent_y = np.sqrt(mean(np.square(y - mean_y[owner])))
-        beta = np.arctan2(mean_sin, mean_cos)
-
-        seen = circles.active & ~ignored & (support >= settings.circle_support)
-        involved = included >= settings.involvement * np.maximum(before, 1)
-        turn = np.abs(wrap(beta - circles.beta))
-        aligned = seen & involved & (turn < settings.eps_beta_rad / 5)
-        updated = seen & involved
-        change = np.where(aligned, 1, -1)
-        live = circles.active & ~ignored
-        circles.expansion[updated] = update_position(
-            circles.trust[updated], settings.tr_cr, circles.expansion[updated], mean_expansion[updated]
-        )
-        blend(
-            circles,
-            updated,
-            settings,
-            mean_x[updated],
-            mean_y[updated],
-            radius_of(spread[updated], settings.bs_px),
-        )
-        circles.trust[live] = np.minimum(circles.trust + change, settings.tr_max)[live]
-        circles.corr[updated] = np.hypot(mean_cos, mean_sin)[updated]
-        circles.width[updated], circles.height[updated] = (
-            EXTENT_SIGMAS * extent_x[updated],
-            EXTENT_SIGMAS * extent_y[updated],
-        )
-        circles.support[updated] = support[updated]
-        self._direct(circles, focus)
-        circles.active &= circles.trust >= settings.tr_cr
-        release(edges, circles, rebel=False)
-
-        evicted = self._found(edges, circles, rows, owner, x, y, expansion, focus)
-        release(edges, circles, rebel=False)
-        return evicted
-
-    def _fits(
-        self,
-        circles: CircleTable,
-        owner: Rows,
-        x: Floats,
-        y: Floats,
-        cos: Floats,
-        sin: Floats,
-        r: Floats,
-        expansion: Floats,
-    ) -> tuple[Mask, Mask]:
-        """Whether each edge agrees with its circle in direction, speed and place; and lies inside it."""
+    def _fits(self, flowing: Flowing, owner: Rows, circles: CircleTable) -> tuple[Mask, Mask]:
+        """Whether each edge agrees with its circle in direction, speed and place (EdgeEncompare); and lies inside."""
         settings = self._settings
-        distance = np.hypot(x - circles.x[owner], y - circles.y[owner])
-        inside = distance < circles.radius[owner] * np.float32(1.5) + 4
-        along = cos * np.cos(circles.beta[owner]) + sin * np.sin(circles.beta[owner])
+        away = np.hypot(flowing.x - circles.x[owner], flowing.y - circles.y[owner])
+        inside = away < circles.radius[owner] * np.float32(1.5) + 4
+        along = flowing.cos * np.cos(circles.beta[owner]) + flowing.sin * np.sin(circles.beta[owner])
         centre = circles.expansion[owner]
-        slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PXPS) / r
-        fits = (
-            circles.active[owner]
-            & (distance < settings.bs_px)
-            & (along > np.cos(settings.eps_beta_rad))
-            & (np.abs(expansion - centre) < slack)
+        slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PXPS) / flowing.r
+        fits = circles.active[owner] & (away < settings.bs_px) & (along > math.cos(settings.eps_beta_rad))
+        return fits & (np.abs(flowing.expansion - centre) < slack), inside
+
+    def _compare(self, flowing: Flowing, owner: Rows, involved: Mask, circles: CircleTable, ignored: Mask) -> None:
+        """Groups against circles: aligned Tr +1; deviated but well included, updated and Tr -1; unmatched Tr -1."""
+        settings = self._settings
+        member = np.flatnonzero(owner >= 0)
+        edges = flowing.take(member)
+        members = Members(owner[member], circles.capacity, edges.x, edges.y)
+        mean_cos, mean_sin = members.mean(edges.cos), members.mean(edges.sin)
+        live = circles.active & ~ignored
+        updated = live & involved & (members.size >= settings.circle_support)
+        turn = np.abs(wrap(np.arctan2(mean_sin, mean_cos) - circles.beta))
+        aligned = updated & (turn < settings.eps_beta_rad / 5)
+        rows = np.flatnonzero(updated)
+        circles.expansion[rows] = update_position(
+            circles.trust[rows], settings.tr_cr, circles.expansion[rows], members.mean(edges.expansion)[rows]
         )
-        return fits, inside
+        blend(circles, rows, members, rows, settings)
+        circles.corr[rows] = np.hypot(mean_cos, mean_sin)[rows]
+        change = np.where(aligned, np.float32(1), np.float32(-1))
+        circles.trust[live] = change_trust(circles.trust, change, settings.tr_max)[live]
 
     def _direct(self, circles: CircleTable, focus: tuple[float, float]) -> None:
         """β and V of normal circles follow from their place and expansion."""
@@ -168,61 +142,27 @@ class NormalCircles:
         circles.beta[:] = np.arctan2(dy, dx)
         circles.speed[:] = circles.expansion * np.hypot(dx, dy)
 
-    def _found(
-        self,
-        edges: EdgeTable,
-        circles: CircleTable,
-        rows: Rows,
-        owner: npt.NDArray[np.int32],
-        x: Floats,
-        y: Floats,
-        expansion: Floats,
-        focus: tuple[float, float],
-    ) -> int:
+    def _found(self, edges: EdgeTable, circles: CircleTable, left: Flowing, focus: tuple[float, float]) -> int:
         """New circles from the edges that are left: those of one cell of the picture and one octave of expansion."""
         settings = self._settings
-        left = np.flatnonzero(owner == NO_CIRCLE)
-        if len(left) < settings.circle_support:
-            return 0
         size = np.float32(settings.bs_px)
-        u = np.floor((x[left] - np.float32(focus[0])) / size).astype(np.int64)
-        v = np.floor((y[left] - np.float32(focus[1])) / size).astype(np.int64)
-        octave = np.rint(np.log2(np.maximum(np.abs(expansion[left]), np.float32(2**-6)))).astype(np.int64)
-        key = ((v + 512) * 1024 + (u + 512)) * 32 + octave + 8
-        _, label = np.unique(key, return_inverse=True)
-        size_of = np.bincount(label)
-        big = size_of >= settings.circle_support
-        if not big.any():
+        u = np.floor((left.x - np.float32(focus[0])) / size).astype(np.int64)
+        v = np.floor((left.y - np.float32(focus[1])) / size).astype(np.int64)
+        octave = np.rint(np.log2(np.maximum(np.abs(left.expansion), np.float32(2.0**SLOWEST_OCTAVE))))
+        key = ((v << 16) + u) * 64 + octave.astype(np.int64) - SLOWEST_OCTAVE
+        _, label, count = np.unique(key, return_inverse=True, return_counts=True)
+        big = np.flatnonzero(count >= settings.circle_support)
+        if not len(big):
             return 0
-        number = np.full(len(big), NO_CIRCLE)
-        number[np.argsort(-size_of, kind="stable")[: int(big.sum())]] = np.arange(int(big.sum()))
+        big = big[np.argsort(-count[big], kind="stable")]
+        places, evicted = claim(edges, circles, len(big), settings, rebel=False)
+        number = np.full(len(count), NO_CIRCLE)
+        number[big[: len(places)]] = np.arange(len(places))
         group = number[label]
-        member = group >= 0
-        left, group = left[member], group[member]
-        places, evicted = claim(edges, circles, int(big.sum()), self._tr_new, rebel=False)
-        kept = group < len(places)
-        left, group = left[kept], group[kept]
-        support = np.bincount(group, minlength=len(places)).astype(np.float32)
-
-        def mean(values: Floats) -> Floats:
-            return (np.bincount(group, values, minlength=len(places)) / support).astype(np.float32)
-
-        cx, cy = mean(x[left]), mean(y[left])
-        off_x, off_y = x[left] - cx[group], y[left] - cy[group]
-        circles.x[places], circles.y[places] = cx, cy
-        var_x, var_y = mean(off_x * off_x), mean(off_y * off_y)
-        circles.radius[places] = radius_of(var_x + var_y, settings.bs_px)
-        circles.width[places], circles.height[places] = (
-            EXTENT_SIGMAS * np.sqrt(var_x),
-            EXTENT_SIGMAS * np.sqrt(var_y),
-        )
-        circles.expansion[places] = mean(expansion[left])
-        circles.trust[places] = self._tr_new
-        circles.support[places] = support
-        circles.corr[places] = 1
-        circles.cause[places] = 0
-        circles.ttc[places], circles.range[places], circles.lateral[places] = np.inf, np.nan, np.nan
-        circles.id[places] = self._ids.take(len(places))
-        self._direct(circles, focus)
-        edges.circle[rows[left]] = places[group]
+        chosen = np.flatnonzero(group >= 0)
+        born, group = left.take(chosen), group[chosen]
+        members = Members(group, len(places), born.x, born.y)
+        give_birth(circles, places, members, np.arange(len(places)), settings, self._ids)
+        circles.expansion[places] = members.mean(born.expansion)
+        edges.circle[born.rows] = places[group]
         return evicted

@@ -1,16 +1,18 @@
 """Circle expert, C_r: rebel edges that go together become circles with a cause and a time to contact."""
 
+import math
+
 import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.config import Filter
-from lcf_edge.filter.circles import EXTENT_SIGMAS, Ids, blend, claim, newborn_trust, radius_of, release
-from lcf_edge.filter.edge_equations import update_position
+from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
+from lcf_edge.filter.edge_equations import change_trust, update_position
 from lcf_edge.filter.flow import wrap
 from lcf_edge.filter.matching import one_to_one
 from lcf_edge.filter.rebel_detection import Rebels, miss
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Rows
 from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PXPS = 10.0  # 1 sigma of a rebel's velocity over its links
@@ -19,6 +21,7 @@ STILL_PXPS = 15.0  # slower circles have no direction
 MEMBER_MARGIN_PX = 8.0
 COAST_S = 1.0  # what is this near grows too fast to be followed corner by corner, and must not be forgotten
 LEAST_TTC_S = 0.05
+LEAST_RATE = 1e-3  # 1/s, slower expansions are none
 
 
 class RebelCircles:
@@ -26,7 +29,6 @@ class RebelCircles:
 
     def __init__(self, settings: Filter) -> None:
         self._settings = settings
-        self._tr_new = newborn_trust(settings)
         self._ids = Ids()
 
     def predict(self, circles: CircleTable, dt_s: float) -> None:
@@ -68,176 +70,122 @@ class RebelCircles:
 
     def update(self, edges: EdgeTable, circles: CircleTable, rebels: Rebels | None, around: Situation) -> int:
         """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); answers evictions."""
-        settings = self._settings
-        live = circles.active.copy()
-        updated = np.zeros(circles.capacity, np.bool_)
+        live = np.flatnonzero(circles.active)
+        updated: Rows = np.empty(0, np.intp)
         evicted = 0
         if rebels is not None and len(rebels.rows):
-            label, size = self._groups(rebels, edges.circle[rebels.rows], circles)
+            rebels, label, size = self._group(rebels)
             if len(size):
-                evicted = self._meet(edges, circles, rebels, label, size, around, updated)
-        missed = live & circles.active & ~updated
-        coasts = (circles.ttc < COAST_S) & (circles.ttc > -COAST_S) & (circles.trust >= settings.tr_s)
-        circles.trust[missed & ~coasts] -= 1
-        circles.active &= circles.ttc > 0
-        circles.active &= circles.trust >= settings.tr_cr
+                updated, evicted = self._meet(edges, circles, rebels, label, size, around)
+        missed = np.setdiff1d(live[circles.active[live]], updated)
+        near = np.abs(circles.ttc[missed]) < COAST_S
+        coasts = near & (circles.trust[missed] >= self._settings.tr_s)
+        circles.trust[missed[~coasts]] -= 1
+        circles.active &= (circles.ttc > 0) & (circles.trust >= self._settings.tr_cr)
         release(edges, circles, rebel=True)
         return evicted
 
-    def _groups(
-        self, rebels: Rebels, owner: npt.NDArray[np.int32], circles: CircleTable
-    ) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
-        """Group of each rebel, -1 for those in groups without support; and the size of each group."""
+    def _group(self, rebels: Rebels) -> tuple[Rebels, Rows, Rows]:
+        """The rebels in groups with support, the group of each, and the groups' sizes."""
         label = link(rebels.x, rebels.y, rebels.vx, rebels.vy, self._settings)
         _, label, size = np.unique(label, return_inverse=True, return_counts=True)
         big = size >= self._settings.rebel_support
-        number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE)
-        return number[label], size[big]
+        number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE)[label]
+        chosen = np.flatnonzero(number >= 0)
+        return rebels.take(chosen), number[chosen], size[big]
 
     def _meet(
-        self,
-        edges: EdgeTable,
-        circles: CircleTable,
-        rebels: Rebels,
-        label: npt.NDArray[np.intp],
-        size: npt.NDArray[np.intp],
-        around: Situation,
-        updated: Mask,
-    ) -> int:
-        """Groups update the circles that they belong to, and found new ones."""
+        self, edges: EdgeTable, circles: CircleTable, rebels: Rebels, label: Rows, size: Rows, around: Situation
+    ) -> tuple[Rows, int]:
+        """Groups update the circles that they are involved in, and found new ones; answers the rows and evictions."""
         settings = self._settings
-        grouped = np.flatnonzero(label >= 0)
-        label = label[grouped]
-        x, y = rebels.x[grouped], rebels.y[grouped]
-        vx, vy = rebels.vx[grouped], rebels.vy[grouped]
-        count = size.astype(np.float32)
+        members = Members(label, len(size), rebels.x, rebels.y)
+        vx, vy = members.mean(rebels.vx), members.mean(rebels.vy)
+        beta, speed = np.arctan2(vy, vx), np.hypot(vx, vy)
+        radius = members.radius(settings.bs_px)
+        odd = size < settings.rebel_share * (size + self._normal_inside(edges, members, radius))
 
-        def mean(values: Floats) -> Floats:
-            return (np.bincount(label, values, minlength=len(size)) / count).astype(np.float32)
-
-        cx, cy, cvx, cvy = mean(x), mean(y), mean(vx), mean(vy)
-        dx, dy = x - cx[label], y - cy[label]
-        spread = mean(dx * dx + dy * dy)
-        radius = radius_of(spread, settings.bs_px)
-        extent_x = np.sqrt(mean(dx * dx))
-        extent_y = np.sqrt(mean(dy * dy))
-        beta, speed = np.arctan2(cvy, cvx), np.hypot(cvx, cvy)
-        crowded = size < settings.rebel_share * (size + self._normal_inside(edges, cx, cy, radius))
-
-        active = np.flatnonzero(circles.active)
-        distance = np.hypot(x[:, None] - circles.x, y[:, None] - circles.y)
-        inside = circles.active & (distance < circles.radius + np.float32(MEMBER_MARGIN_PX))
-        owner = edges.circle[rebels.rows[grouped]]
-        circle_of = (
-            involve(label, owner, inside, size, settings.involvement) if len(active) else np.full(len(size), NO_CIRCLE)
-        )
-        circle_of[crowded] = NO_CIRCLE  # a few odd ones in a crowd that flows are mistakes, not an object
-        known = circle_of >= 0
-        rows = circle_of[known]
-        turn = np.abs(wrap(beta[known] - circles.beta[rows]))
-        noise_angle = np.arctan2(np.float32(STILL_PXPS), speed[known])
-        aligned = turn < settings.eps_beta_circle_rebel_rad + noise_angle
-        blend(circles, rows, settings, cx[known], cy[known], radius[known])
-        circles.trust[rows] = np.minimum(
-            circles.trust[rows] + np.where(aligned, 1, -1).astype(np.float32), np.float32(settings.tr_max)
-        )
-        updated[rows] = True
-
-        new = np.flatnonzero(~known & ~crowded)
+        away = np.hypot(rebels.x[:, None] - circles.x, rebels.y[:, None] - circles.y)
+        inside = circles.active & (away < circles.radius + np.float32(MEMBER_MARGIN_PX))
+        row = involve(label, edges.circle[rebels.rows], inside, size, settings.involvement)
+        row[odd] = NO_CIRCLE  # a few odd ones in a crowd that flows are mistakes, not an object
+        known = np.flatnonzero(row >= 0)
+        new = np.flatnonzero((row < 0) & ~odd)
         new = new[np.argsort(-size[new], kind="stable")]
-        places, evicted = claim(edges, circles, len(new), self._tr_new, rebel=True)
+
+        rows = row[known]
+        turn = np.abs(wrap(beta[known] - circles.beta[rows]))
+        aligned = turn < settings.eps_beta_circle_rebel_rad + np.arctan2(np.float32(STILL_PXPS), speed[known])
+        blend(circles, rows, members, known, settings)
+        change = np.where(aligned, np.float32(1), np.float32(-1))
+        circles.trust[rows] = change_trust(circles.trust[rows], change, settings.tr_max)
+
+        places, evicted = claim(edges, circles, len(new), settings, rebel=True)
         new = new[: len(places)]
-        circles.x[places], circles.y[places], circles.radius[places] = cx[new], cy[new], radius[new]
-        circles.trust[places] = self._tr_new
-        circles.id[places] = self._ids.take(len(places))
-        circles.ttc[places] = np.inf
-        circles.corr[places] = 1
-        updated[places] = True
+        give_birth(circles, places, members, new, settings, self._ids)
+        row[new] = places
 
-        row_of = circle_of.copy()
-        row_of[new] = places
-        has = np.flatnonzero(row_of >= 0)
-        rows = row_of[has]
-        fresh = np.isin(rows, places)
-        circles.support[rows] = size[has]
-        circles.beta[rows], circles.speed[rows] = beta[has], speed[has]
-        circles.width[rows] = EXTENT_SIGMAS * extent_x[has]
-        circles.height[rows] = EXTENT_SIGMAS * extent_y[has]
-        self._contact(circles, rows, fresh, rebels, grouped, label, has, around, mean)
-        edges.circle[rebels.rows] = NO_CIRCLE
-        edges.circle[rebels.rows[grouped]] = row_of[label]
-        return evicted
+        groups = np.concatenate([known, new])
+        rows = row[groups]
+        circles.beta[rows], circles.speed[rows] = beta[groups], speed[groups]
+        self._contact(circles, rows, groups, rebels, members, around)
+        edges.circle[rebels.rows] = row[label]
+        return rows, evicted
 
-    def _normal_inside(self, edges: EdgeTable, x: Floats, y: Floats, radius: Floats) -> npt.NDArray[np.intp]:
-        """Edges that were seen to follow the flow inside each circle; int (groups,)."""
+    def _normal_inside(self, edges: EdgeTable, members: Members, radius: Floats) -> Rows:
+        """Edges that were seen to follow the flow inside the circle of each group; int (groups,)."""
         n = edges.count
-        rows = np.flatnonzero(edges.matched[:n] & ~edges.rebel[:n] & (edges.links[:n] == 0) & (edges.trust[:n] >= 4))
-        away2 = np.square(edges.x[rows, None] - x) + np.square(edges.y[rows, None] - y)
-        return np.count_nonzero(away2 < radius * radius, axis=0)
+        flows = edges.matched[:n] & ~edges.rebel[:n] & (edges.links[:n] == 0) & (edges.trust[:n] > self._settings.tr_s)
+        rows = np.flatnonzero(flows)
+        away2 = np.square(edges.x[rows, None] - members.centre_x) + np.square(edges.y[rows, None] - members.centre_y)
+        return np.asarray(np.count_nonzero(away2 < radius * radius, axis=0))
 
     def _contact(
-        self,
-        circles: CircleTable,
-        rows: Rows,
-        fresh: Mask,
-        rebels: Rebels,
-        grouped: Rows,
-        label: npt.NDArray[np.intp],
-        has: Rows,
-        around: Situation,
-        mean: object,
+        self, circles: CircleTable, rows: Rows, groups: Rows, rebels: Rebels, members: Members, around: Situation
     ) -> None:
-        """Cause, time to contact, range and lateral miss of each circle."""
-        assert callable(mean)
+        """Cause, time to contact, range and lateral miss of circles; ``groups``: the group of members of each.
+
+        What stands still expands about the focus, what moves about itself: 1/TTC = V_e/r, fitted over the members.
+        """
         links, verdict = rebels.links, rebels.verdict
-        elapsed = links.elapsed_s[grouped]
-        x0, y0 = links.x[grouped], links.y[grouped]
-        vx, vy = rebels.vx[grouped], rebels.vy[grouped]
-        incoming = verdict.incoming[grouped]
-        share = mean(incoming.astype(np.float32))[has]
+        stands = members.mean(verdict.incoming)[groups] >= 0.5
+        expanding = standing_expansion(rebels, members)[groups]
+        range_m = members.mean(links.depth_m / links.elapsed_s)[groups] / np.maximum(expanding, LEAST_RATE)
+        speed = around.speed_mps
+        rate = np.where(stands, max(speed, 0.0) / range_m, own_expansion(rebels, members)[groups])
+        before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], LEAST_TTC_S), rate)
+        rate = update_position(circles.trust[rows], self._settings.tr_cr, before, rate)
+        ttc = np.where(rate > LEAST_RATE, 1 / np.maximum(rate, LEAST_RATE), np.inf)
 
-        # What stands still expands about the focus; what moves, about itself: V_e/r, fitted over the members.
-        weight = np.square(x0 - links.focus_x[grouped]) + np.square(y0 - links.focus_y[grouped])
-        still_rate = (mean(verdict.expansion[grouped] * weight) / np.maximum(mean(weight), 1))[has]
-        depth_rate = links.depth_m[grouped] / elapsed  # mean V_ν over the links
-        still_range = mean(depth_rate)[has] / np.maximum(still_rate, np.float32(1e-3))
-        px, py = x0 - mean(x0)[label], y0 - mean(y0)[label]
-        own_var = mean(px * px + py * py)
-        own_rate = (mean(px * vx + py * vy) / np.maximum(own_var, 1))[has]
-        sigma = np.float32(VELOCITY_NOISE_PXPS) / np.sqrt(np.maximum(own_var[has] * circles.support[rows], 1))
-        moves_rate = np.where(own_rate > 2 * sigma, own_rate, 0)
-
-        speed = np.float32(around.speed_mps)
-        focal = np.float32(around.pinhole.focal)
-        stands = share >= 0.5
-        still_ttc = still_range / np.maximum(speed, np.float32(1e-3)) if speed > 0 else np.full_like(still_rate, np.inf)
-        rate = np.where(stands, 1 / np.maximum(still_ttc, np.float32(1e-3)), moves_rate)
-        before = np.where(fresh | ~np.isfinite(circles.ttc[rows]), rate, 1 / np.maximum(circles.ttc[rows], 1e-3))
-        rate = update_position(circles.trust[rows], self._settings.tr_cr, before.astype(np.float32), rate)
-        with np.errstate(divide="ignore"):
-            ttc = np.where(rate > 1e-3, 1 / rate, np.inf).astype(np.float32)
-
-        bottom = circles.y[rows] + np.float32(0.5) * circles.height[rows] - np.float32(around.horizon_y)
-        slack = focal * np.float32(around.pitch_sigma_rad)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            ground = np.where(
-                (bottom > slack) & (around.camera_height_m > 0),
-                around.camera_height_m * focal / bottom,
-                np.nan,
-            )
-        right = (circles.x[rows] - np.float32(around.focus[0])) / focal
-        range_m = np.where(stands, still_range, ground).astype(np.float32)
-        drift_rate = mean(vx)[has] / focal
-        moving_miss = range_m * np.where(np.isfinite(ttc), drift_rate * ttc, np.nan)
-        lateral = np.where(stands, miss(right * range_m, range_m, around), moving_miss).astype(np.float32)
-        if not np.isfinite(around.speed_mps):
-            range_m = np.where(stands, np.nan, range_m).astype(np.float32)
-            lateral = np.full_like(range_m, np.nan)
-        inwards = mean(((verdict.short > np.abs(verdict.drift)) & verdict.mover)[grouped].astype(np.float32))[has]
+        right = (circles.x[rows] - around.focus[0]) / around.pinhole.fx
+        on_ground_m = around.ground_range_m(circles.y[rows] + 0.5 * circles.height[rows])
+        drift = members.mean(rebels.vx)[groups] / around.pinhole.fx  # of its bearing, 1/s
+        moving_miss = on_ground_m * drift * np.where(np.isfinite(ttc), ttc, np.nan)
+        lateral = np.where(stands, miss(right * range_m, range_m, around), moving_miss)
+        if not math.isfinite(speed):
+            range_m, lateral = np.full_like(range_m, np.nan), np.full_like(lateral, np.nan)
+        inwards = members.mean(verdict.mover & (verdict.short > np.abs(verdict.drift)))[groups] > 0.5
         meets = stands | ((ttc < around.horizon_s) & ~(np.abs(lateral) > around.half_width_m))
-        cause = np.where(meets, Cause.INCOMING, np.where(inwards > 0.5, Cause.LEADING, Cause.CROSSING))
-        circles.ttc[rows], circles.range[rows], circles.lateral[rows] = ttc, range_m, lateral
-        circles.cause[rows] = cause
+        circles.cause[rows] = np.where(meets, Cause.INCOMING, np.where(inwards, Cause.LEADING, Cause.CROSSING))
+        circles.ttc[rows], circles.lateral[rows] = ttc, lateral
+        circles.range[rows] = np.where(stands, range_m, on_ground_m)
+
+
+def standing_expansion(rebels: Rebels, members: Members) -> Floats:
+    """V_e/r about the focus, 1/s, float32 (groups,): least squares over the members, so that far ones count more."""
+    links = rebels.links
+    weight = np.square(links.x - links.focus_x) + np.square(links.y - links.focus_y)
+    return members.mean(rebels.verdict.expansion * weight) / np.maximum(members.mean(weight), 1)
+
+
+def own_expansion(rebels: Rebels, members: Members) -> Floats:
+    """V_e/r about the group's own centre, 1/s, float32 (groups,); 0 where it is not above its noise."""
+    x, y, label = rebels.links.x, rebels.links.y, members.label
+    px, py = x - members.mean(x)[label], y - members.mean(y)[label]
+    extent2 = np.maximum(members.mean(px * px + py * py), 1)
+    rate = members.mean(px * rebels.vx + py * rebels.vy) / extent2
+    sigma = np.float32(VELOCITY_NOISE_PXPS) / np.sqrt(extent2 * members.size)
+    return np.where(rate > 2 * sigma, rate, 0).astype(np.float32)
 
 
 def link(x: Floats, y: Floats, vx: Floats, vy: Floats, settings: Filter) -> npt.NDArray[np.intp]:

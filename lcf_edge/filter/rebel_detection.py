@@ -6,7 +6,7 @@ ground. Whatever leaves that segment of a line moves by itself (a *mover*); what
 the horizon inside the vehicle's width, and stands above the ground, is *incoming*.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
@@ -23,14 +23,14 @@ GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this 
 DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
 
 
+@dataclass(frozen=True, slots=True)
 class Columns:
-    """Arrays of one length, taken together."""
-
-    __slots__ = ()
+    """Columns of one length, taken together."""
 
     def take(self, rows: Rows) -> Self:
         """Some of the rows."""
-        return type(self)(*(getattr(self, name)[rows] for name in self.__slots__))
+        parts = (getattr(self, field.name) for field in fields(self))
+        return type(self)(*(part.take(rows) for part in parts))  # a column is an array or columns
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,7 +97,7 @@ class Verdict(Columns):
 
 
 @dataclass(frozen=True, slots=True)
-class Rebels:
+class Rebels(Columns):
     """Rebel edges as the circles see them; (k,) each. ``rows``: of the edge table; ``vx``, ``vy``: px/s."""
 
     rows: Rows

@@ -8,6 +8,7 @@ import numpy as np
 from lcf_edge.config import Camera, Config
 from lcf_edge.filter.flow import Matrix, Pinhole
 from lcf_edge.filter.inputs import Motion
+from lcf_edge.filter.tables import Floats
 
 PITCH_MEMORY_S = 1.0  # shaking faster than this turns the camera, not the way of the vehicle
 YAW_MEMORY_S = 0.3
@@ -34,6 +35,13 @@ class Situation:
     focus_sigma_px: float
     ground_margin: float
     pitch_sigma_rad: float
+
+    def ground_range_m(self, y: Floats) -> Floats:
+        """Range at which the ground is seen at image rows ``y``, px; NaN at the horizon, above it, or unknown."""
+        focal = self.pinhole.focal
+        below = y - self.horizon_y
+        seen = (below > focal * self.pitch_sigma_rad) & (self.camera_height_m > 0)
+        return np.where(seen, self.camera_height_m * focal / np.maximum(below, 1), np.nan)
 
 
 class Heading:
