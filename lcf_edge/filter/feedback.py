@@ -4,6 +4,7 @@ import numpy as np
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.matching import Matcher
 from lcf_edge.filter.tables import CircleTable, EdgeTable, Mask, PsiTable
 from lcf_edge.records import Shape
 
@@ -15,8 +16,9 @@ MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 class Feedback:
     """Writes, moves and ends ψ regions."""
 
-    def __init__(self, settings: Filter) -> None:
+    def __init__(self, settings: Filter, matcher: Matcher) -> None:
         self._settings = settings
+        self._matcher = matcher
         self._ids = Ids()
 
     def ignored(self, psi: PsiTable, circles: CircleTable) -> Mask:
@@ -64,9 +66,14 @@ class Feedback:
         psi.height *= 1 + growth
 
     def give_way(self, psi: PsiTable, edges: EdgeTable, rebel: CircleTable) -> None:
-        """End the ψ regions that come near a rebel edge, a chain of α or a rebel circle."""
+        """End the ψ regions that come near a rebel edge, a chain of α or a rebel circle, or the sides of the frame.
+
+        At the sides appears what nobody has seen yet.
+        """
         if not psi.active.any():
             return
+        reach = psi.width / 2 + np.float32(MARGIN_PX)
+        psi.active &= self._matcher.in_frame(psi.x - reach, psi.y) & self._matcher.in_frame(psi.x + reach, psi.y)
         n = edges.count
         breaking = edges.rebel[:n] | (edges.links[:n] > 0)
         x = np.concatenate([edges.x[:n][breaking], rebel.x[rebel.active]])

@@ -56,7 +56,7 @@ class LineCircleFilter:
         self._alpha = Alpha(settings, self.edges, self._keys)
         self._normal_circles = NormalCircles(settings)
         self._rebel_circles = RebelCircles(settings)
-        self._feedback = Feedback(settings)
+        self._feedback = Feedback(settings, self._matcher)
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each preallocated table."""

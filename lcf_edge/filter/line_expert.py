@@ -10,8 +10,8 @@ from lcf_edge.filter.matching import Matcher
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.records import Shape
 
-SEEN_SHARE = 0.6  # of the edges under ψ must have a corner where they are predicted
-NEW_RATIO = 1.5  # and there may be so many corners for each
+MISSING_SHARE = 0.4  # of the edges under ψ may have no corner where they are predicted
+NEW_SHARE = 0.4  # and so many corners, for each edge, may lie where none is
 SPARE_CORNERS = 2
 
 
@@ -39,21 +39,21 @@ def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
 
 def end_surprised(
     psi: PsiTable,
-    holder_of_corner: npt.NDArray[np.int32],
     holder_of_edge: npt.NDArray[np.int32],
     seen: Mask,
+    holder_of_corner: npt.NDArray[np.int32],
+    expected: Mask,
 ) -> None:
-    """End the ψ regions whose corners are not where, or not as many as, the edges under them let expect.
+    """End the ψ regions whose corners are not where the edges under them let expect.
 
-    ``holder_of_corner`` (c,), ``holder_of_edge`` (e,): rows of ψ. ``seen``: bool (e,), whether a corner lies at
-    an edge's prediction. This look costs a few places in an index, and lets nothing walk through ψ unseen.
+    ``holder_of_edge``, ``holder_of_corner``: rows of ψ. ``seen``: bool, edges that have a corner where they are
+    predicted. ``expected``: bool, corners where an edge is predicted. This look in passing costs a few places in an
+    index, and lets nothing walk through ψ unseen.
     """
-    corners = np.bincount(holder_of_corner, minlength=psi.capacity)
     edges = np.bincount(holder_of_edge, minlength=psi.capacity)
-    explained = np.bincount(holder_of_edge[seen], minlength=psi.capacity)
-    gone = explained < SEEN_SHARE * edges - SPARE_CORNERS
-    new = corners > NEW_RATIO * edges + SPARE_CORNERS
-    psi.active &= ~(gone | new)
+    missing = np.bincount(holder_of_edge[~seen], minlength=psi.capacity)
+    new = np.bincount(holder_of_corner[~expected], minlength=psi.capacity)
+    psi.active &= (missing <= MISSING_SHARE * edges + SPARE_CORNERS) & (new <= NEW_SHARE * edges + SPARE_CORNERS)
 
 
 class Groups:
@@ -150,10 +150,10 @@ class LineExpert:
         of_corner, of_edge = both[: len(corners)], both[len(corners) :]
         of_edge[edges.rebel[:n] | (edges.links[:n] > 0)] = NO_CIRCLE
         held, inside = np.flatnonzero(of_edge != NO_CIRCLE), np.flatnonzero(of_corner != NO_CIRCLE)
-        seen = self._matcher.any_corner(
+        seen, expected = self._matcher.coincide(
             estimate.x[held], estimate.y[held], corners.pixel[inside], self._settings.bl_min_px
         )
-        end_surprised(psi, of_corner[inside], of_edge[held], seen)
+        end_surprised(psi, of_edge[held], seen, of_corner[inside], expected)
         edges.held[:n] = (of_edge != NO_CIRCLE) & psi.active[of_edge]
         edges.born_key[:n][edges.held[:n]] = key_number  # what is only predicted is no history
         return np.asarray((of_corner != NO_CIRCLE) & psi.active[of_corner])

@@ -171,13 +171,19 @@ class Matcher:
         best = one_to_one(edge, what, cost, len(x), len(pixel))
         return Found(edge[best], among[what[best]])
 
-    def any_corner(self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float) -> Mask:
-        """Whether one of the corners lies within ``reach_px`` of each place, whatever it looks like; bool (n,)."""
+    def coincide(
+        self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float
+    ) -> tuple[Mask, Mask]:
+        """Which places have a corner within ``reach_px``, and which corners a place, whatever they look like.
+
+        ``x``, ``y``: (n,) px; ``pixel``: (m, 2). Answers bool (n,) and bool (m,).
+        """
         raw = self._lens.distort(np.stack([x, y], axis=1))
         inside = np.flatnonzero(self._in_picture(raw))
         self._index.fill(pixel)
         who, what = self._index.candidates(raw[inside, 0], raw[inside, 1], np.float32(reach_px))
         near = (np.abs(raw[inside[who]] - pixel[what]) <= reach_px).all(axis=1)
-        seen = np.zeros(len(x), np.bool_)
-        seen[inside[who[near]]] = True
-        return seen
+        place, corner = np.zeros(len(x), np.bool_), np.zeros(len(pixel), np.bool_)
+        place[inside[who[near]]] = True
+        corner[what[near]] = True
+        return place, corner

@@ -9,6 +9,7 @@ from lcf_edge.config import Filter
 from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
 from lcf_edge.filter.edge_equations import change_trust, update_position
 from lcf_edge.filter.flow import wrap
+from lcf_edge.filter.rebel_detection import miss
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
@@ -57,7 +58,8 @@ class NormalCircles:
         range_m = np.float32(speed) / np.maximum(circles.expansion, np.float32(1e-3))
         focal = np.float32(around.pinhole.fx)
         right_m = (circles.x - np.float32(around.focus[0])) / focal * range_m
-        beside_m = np.abs(right_m) - circles.radius / focal * range_m
+        off_path_m = np.abs(miss(right_m, range_m, around))
+        beside_m = np.minimum(np.abs(right_m), off_path_m) - circles.radius / focal * range_m  # a turn may end
         return np.asarray((circles.expansion > 0) & (beside_m > PASSING_WIDTHS * around.half_width_m))
 
     def update(self, edges: EdgeTable, circles: CircleTable, focus: tuple[float, float], ignored: Mask) -> int:
