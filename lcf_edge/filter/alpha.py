@@ -31,23 +31,20 @@ class Alpha:
         self._edges = edges
         self._keys = keys
         self._tr_new = newborn_trust(settings)
-        self._motion_px = 0.0  # median motion of edges since the last key frame
 
     def mark_key(self, dt_s: float) -> bool:
         """Make this frame a key frame when there is motion enough to be told from corner noise, or time is up."""
         settings, edges, keys = self._settings, self._edges, self._keys
-        n = edges.count
-        self._motion_px += float(np.median(np.abs(edges.speed[:n]))) * dt_s if n else 0.0
-        waited_s = keys.since_s + 0.5 * dt_s
-        moved = self._motion_px >= settings.key_motion_px
-        if keys.number and (
-            waited_s < settings.key_interval_s or not (moved or waited_s >= 2 * settings.key_interval_s)
-        ):
+        n, waited_s = edges.count, keys.since_s + 0.5 * dt_s
+        if keys.number and waited_s < settings.key_interval_s:
             return False
+        if keys.number and waited_s < 2 * settings.key_interval_s and n:
+            moved_px = float(np.median(np.abs(edges.speed[:n]))) * keys.since_s
+            if moved_px < settings.key_motion_px:
+                return False
         slot = keys.mark()
         edges.key_x[slot, :n] = edges.x[:n]
         edges.key_y[slot, :n] = edges.y[:n]
-        self._motion_px = 0.0
         return True
 
     def detect(self, around: Situation, key: bool) -> tuple[Rebels | None, int]:
@@ -127,7 +124,7 @@ class Alpha:
         """V along the flow line of edges that went their own way until now, px/s."""
         edges = self._edges
         dx, dy = edges.x[rows] - np.float32(around.focus[0]), edges.y[rows] - np.float32(around.focus[1])
-        return edges.speed[rows] * np.cos(wrap(edges.beta[rows] - np.arctan2(dy, dx)))
+        return np.asarray(edges.speed[rows] * np.cos(wrap(edges.beta[rows] - np.arctan2(dy, dx))))
 
     def looked_at(self, circles: int) -> Mask:
         """Normal circles most of whose edges have a history that tells what moves; bool (circles,)."""

@@ -58,7 +58,7 @@ def claim(edges: EdgeTable, circles: CircleTable, number: int, settings: Filter,
 class Members:
     """Edges gathered into groups, and what a circle takes from them.
 
-    ``label``: int (k,), group of each edge, 0 to ``groups`` - 1; a group may be empty. ``x``, ``y``: their positions, px.
+    ``label``: int (k,), group of each edge, 0 to ``groups`` - 1; a group may be empty. ``x``, ``y``: px.
     Per group, float32 (groups,): ``size``, ``centre_x``, ``centre_y``, ``spread`` (mean squared distance, px²),
     ``width``, ``height`` (extent, px).
     """

@@ -24,11 +24,14 @@ def derotate(
     h = pinhole.homography(rotation)
     n = edges.count
     roll = np.float32(math.atan2(h[1, 0], h[0, 0]))
-    edges.x[:n], edges.y[:n] = carry(h, edges.x[:n], edges.y[:n])
-    edges.origin_x[:n], edges.origin_y[:n] = carry(h, edges.origin_x[:n], edges.origin_y[:n])
-    edges.beta[:n] += roll
-    for table in (*circles, psi):
-        table.x[:], table.y[:] = carry(h, table.x, table.y)
+    places = [(edges.x[:n], edges.y[:n]), (edges.origin_x[:n], edges.origin_y[:n])]
+    places += [(table.x, table.y) for table in (*circles, psi)]
+    x, y = carry(h, np.concatenate([x for x, _ in places]), np.concatenate([y for _, y in places]))
+    start = 0
+    for to_x, to_y in places:
+        stop = start + len(to_x)
+        to_x[:], to_y[:] = x[start:stop], y[start:stop]
+        start = stop
     for table in circles:
         table.beta += roll
 

@@ -92,7 +92,7 @@ def classify(
 def update_position(trust: Floats, tr_cr: float, predicted: Floats, measured: Floats) -> Floats:
     """L = ((Tr - Tr_cr)·L' + L_edge) / ((Tr - Tr_cr) + 1) (eq. EnEstimation, first line); any coordinate, px."""
     weight = np.maximum(trust - np.float32(tr_cr), 0)
-    return (weight * predicted + measured) / (weight + 1)
+    return np.asarray((weight * predicted + measured) / (weight + 1))
 
 
 def update_speed(
@@ -105,7 +105,8 @@ def update_speed(
     one frame, divided by t_f, would be the noise of V.
     """
     along = (corner_x - estimate.x) * np.cos(estimate.beta) + (corner_y - estimate.y) * np.sin(estimate.beta)
-    return estimate.speed + along / (np.float32(dt_s) * (np.maximum(trust - np.float32(tr_cr), 0) + 1))
+    weight = np.maximum(trust - np.float32(tr_cr), 0) + 1
+    return np.asarray(estimate.speed + along / (np.float32(dt_s) * weight))
 
 
 def update_gate(
@@ -133,4 +134,4 @@ def update_deviation(deviation: Floats, beta: Floats, beta_before: Floats) -> Fl
 
 def change_trust(trust: Floats, change: Floats | np.float32, tr_max: float) -> Floats:
     """Tr + change, at most Tr_max."""
-    return np.minimum(trust + change, np.float32(tr_max))
+    return np.asarray(np.minimum(trust + change, np.float32(tr_max)))

@@ -118,7 +118,7 @@ class EdgeExpert:
         edges, n, settings = self._edges, self._edges.count, self._settings
         edge, corner = found.edge, found.corner
         at = estimate.take(edge)
-        delta = np.float32(settings.delta_px + 2 * rotation_px)
+        delta = settings.delta_px + 2 * rotation_px
         before_x, before_y = edges.x[edge], edges.y[edge]
         relation = classify(before_x, before_y, at, x[corner], y[corner], edges.bl[edge], delta, settings.eps_beta_rad)
         relation[edges.rebel[edge] | (edges.links[edge] > 0)] = Relation.FOLLOWS  # λ*r: no flow line to leave

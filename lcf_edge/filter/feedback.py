@@ -27,13 +27,16 @@ class Feedback:
         under[psi.circle[psi.active & (psi.circle >= 0)]] = True
         return under
 
-    def write(self, psi: PsiTable, circles: CircleTable, harmless: Mask, dt_s: float) -> int:
-        """Normal circles at Tr_max write ψ, their trust falls back to Tr_s; answers evictions.
+    def ready(self, psi: PsiTable, circles: CircleTable) -> Mask:
+        """Normal circles at Tr_max that have no ψ; bool (capacity,)."""
+        return circles.active & (circles.trust >= self._settings.tr_max) & ~self.ignored(psi, circles)
 
-        ``harmless``: bool (capacity,), circles that may be ignored.
+    def write(self, psi: PsiTable, circles: CircleTable, ready: Mask, dt_s: float) -> int:
+        """Normal circles write ψ, their trust falls back to Tr_s; answers evictions.
+
+        ``ready``: bool (capacity,), those at Tr_max that may be ignored.
         """
         settings = self._settings
-        ready = circles.active & harmless & (circles.trust >= settings.tr_max) & ~self.ignored(psi, circles)
         rows = np.flatnonzero(ready)
         places = np.flatnonzero(~psi.active)[: len(rows)]
         evicted = len(rows) - len(places)

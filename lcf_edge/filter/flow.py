@@ -13,7 +13,7 @@ NEAR = 1e-6
 
 def wrap(angle: Floats) -> Floats:
     """Angle in (-π, π], any shape."""
-    return (np.pi - np.remainder(np.pi - angle, 2 * np.pi)).astype(np.float32, copy=False)
+    return np.asarray(np.pi - np.remainder(np.pi - angle, 2 * np.pi), np.float32)
 
 
 def line_distance(dx: Floats, dy: Floats, beta: Floats) -> Floats:

@@ -134,9 +134,11 @@ class LineCircleFilter:
         ignored = self._feedback.ignored(self.psi, self.normal)
         evicted = self._normal_circles.update(edges, self.normal, around.focus, ignored)
         evicted += self._rebel_circles.update(edges, self.rebel, rebels, around)
-        passing = self._normal_circles.passing_by(self.normal, around)
-        looked_at = self._alpha.looked_at(self.normal.capacity)
-        evicted += self._feedback.write(self.psi, self.normal, passing & looked_at, dt_s)
+        ready = self._feedback.ready(self.psi, self.normal)
+        if ready.any():
+            ready &= self._normal_circles.passing_by(self.normal, around)
+            ready &= self._alpha.looked_at(self.normal.capacity)
+            evicted += self._feedback.write(self.psi, self.normal, ready, dt_s)
         self._feedback.give_way(self.psi, edges, self.rebel)
         return evicted
 

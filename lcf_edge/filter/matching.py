@@ -13,7 +13,7 @@ from lcf_edge.lens import Lens
 CELL_SHIFT = 3  # cells of 8x8 px hold a corner or two
 DISTANCE_COST = 0.4  # grey levels a px, so that of equal looks the nearest wins
 LIKENESS_FLOOR = 3.0  # grey levels of camera noise
-_ROUNDS = 3
+_ROUNDS = 2
 
 Pairs = tuple[Rows, Rows]
 Indices = npt.NDArray[np.intp]
@@ -80,7 +80,8 @@ def likeness_needed(appearance: npt.NDArray[np.uint8], most: float, share: float
     for its neighbours. Answers float32 (n,), at most ``most`` grey levels.
     """
     flat = np.full_like(appearance, 128)
-    return np.minimum(np.float32(LIKENESS_FLOOR) + np.float32(share) * difference(appearance, flat), np.float32(most))
+    wanted = np.float32(LIKENESS_FLOOR) + np.float32(share) * difference(appearance, flat)
+    return np.asarray(np.minimum(wanted, np.float32(most)))
 
 
 def one_to_one(edge: Rows, corner: Rows, cost: Floats, edges: int, corners: int) -> Rows:
@@ -171,9 +172,7 @@ class Matcher:
         best = one_to_one(edge, what, cost, len(x), len(pixel))
         return Found(edge[best], among[what[best]])
 
-    def coincide(
-        self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float
-    ) -> tuple[Mask, Mask]:
+    def coincide(self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float) -> tuple[Mask, Mask]:
         """Which places have a corner within ``reach_px``, and which corners a place, whatever they look like.
 
         ``x``, ``y``: (n,) px; ``pixel``: (m, 2). Answers bool (n,) and bool (m,).

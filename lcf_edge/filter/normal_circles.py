@@ -17,6 +17,8 @@ SPEED_NOISE_PXPS = 12.0  # 1 sigma of an edge's V
 PASSING_WIDTHS = 1.5  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
 SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
+OCTAVES = 16
+CELLS = 32  # a side, of BS_λ each
 
 
 @dataclass(frozen=True, slots=True)
@@ -151,8 +153,9 @@ class NormalCircles:
         u = np.floor((left.x - np.float32(focus[0])) / size).astype(np.int64)
         v = np.floor((left.y - np.float32(focus[1])) / size).astype(np.int64)
         octave = np.rint(np.log2(np.maximum(np.abs(left.expansion), np.float32(2.0**SLOWEST_OCTAVE))))
-        key = ((v << 16) + u) * 64 + octave.astype(np.int64) - SLOWEST_OCTAVE
-        _, label, count = np.unique(key, return_inverse=True, return_counts=True)
+        key = ((v + CELLS // 2) % CELLS * CELLS + (u + CELLS // 2) % CELLS) * OCTAVES
+        key += np.minimum(octave.astype(np.int64) - SLOWEST_OCTAVE, OCTAVES - 1)
+        count = np.bincount(key, minlength=CELLS * CELLS * OCTAVES)
         big = np.flatnonzero(count >= settings.circle_support)
         if not len(big):
             return 0
@@ -160,7 +163,7 @@ class NormalCircles:
         places, evicted = claim(edges, circles, len(big), settings, rebel=False)
         number = np.full(len(count), NO_CIRCLE)
         number[big[: len(places)]] = np.arange(len(places))
-        group = number[label]
+        group = number[key]
         chosen = np.flatnonzero(group >= 0)
         born, group = left.take(chosen), group[chosen]
         members = Members(group, len(places), born.x, born.y)

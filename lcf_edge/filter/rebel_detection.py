@@ -79,8 +79,8 @@ def links_since(edges: EdgeTable, rows: Rows, key: npt.NDArray[np.int64], keys: 
 class Verdict(Columns):
     """What the links say; (n,) each.
 
-    ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where it should be. ``over``: px
-    beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it stands still. ``mover``,
+    ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
+    it should be. ``over``: px beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it stands still. ``mover``,
     ``incoming``: bool.
     """
 
@@ -174,7 +174,7 @@ def miss(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
         return right_m
     radius = np.float32(speed / around.yaw_rate_radps)  # of the arc, its centre to the left when positive
     distance = np.hypot(right_m + radius, ahead_m)
-    return (distance - np.abs(radius)) * np.sign(radius)
+    return np.asarray((distance - np.abs(radius)) * np.sign(radius))
 
 
 def agree(whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float) -> Mask:

@@ -4,14 +4,16 @@ Edges stand packed in the first ``count`` rows. Circles and ψ keep their row fo
 use), because edges refer to a circle by its row.
 """
 
+from typing import Any
+
 import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
 
-Rows = npt.NDArray[np.intp]
+Rows = npt.NDArray[np.signedinteger[Any]]
 Mask = npt.NDArray[np.bool_]
-Floats = npt.NDArray[np.float32]
+Floats = npt.NDArray[np.floating[Any]]
 
 KEYS = 11  # key frames that an edge remembers
 NO_CIRCLE = -1
