@@ -68,13 +68,15 @@ class Feedback:
         psi.width *= 1 + growth
         psi.height *= 1 + growth
 
-    def give_way(self, psi: PsiTable, edges: EdgeTable, rebel: CircleTable) -> None:
-        """End the ψ regions that come near a rebel edge, a chain of α or a rebel circle, or the sides of the frame.
+    def give_way(self, psi: PsiTable, passing: Mask, edges: EdgeTable, rebel: CircleTable) -> None:
+        """End the ψ regions that come near a rebel edge, a chain of α, a rebel circle or the sides of the frame.
 
-        At the sides appears what nobody has seen yet.
+        At the sides appears what nobody has seen yet. ``passing``: bool (circles,), normal circles that the vehicle
+        still passes at a distance: in a turn, what was beside the path may come to lie on it.
         """
         if not psi.active.any():
             return
+        psi.active &= passing.take(psi.circle, mode="clip")
         reach = psi.width / 2 + np.float32(MARGIN_PX)
         psi.active &= self._matcher.in_frame(psi.x - reach, psi.y) & self._matcher.in_frame(psi.x + reach, psi.y)
         n = edges.count

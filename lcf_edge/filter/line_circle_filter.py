@@ -101,6 +101,8 @@ class LineCircleFilter:
 
     def _derotate(self, motion: Motion) -> Situation:
         """Step 0, and the predictions of circles and ψ."""
+        for table in (self.normal, self.rebel, self.psi):
+            table.park()
         self._heading.turn(motion)
         speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0  # of an unknown speed, the direction
         self._keys.advance(motion.rotation, self._heading.forward, speed, motion.dt_s)
@@ -135,11 +137,12 @@ class LineCircleFilter:
         evicted = self._normal_circles.update(edges, self.normal, around.focus, ignored)
         evicted += self._rebel_circles.update(edges, self.rebel, rebels, around)
         ready = self._feedback.ready(self.psi, self.normal)
+        passing = self._normal_circles.passing_by(self.normal, around)
+        ready &= passing
         if ready.any():
-            ready &= self._normal_circles.passing_by(self.normal, around)
             ready &= self._alpha.looked_at(self.normal.capacity)
             evicted += self._feedback.write(self.psi, self.normal, ready, dt_s)
-        self._feedback.give_way(self.psi, edges, self.rebel)
+        self._feedback.give_way(self.psi, passing, edges, self.rebel)
         return evicted
 
     def _sizes(self, corners: int, omitted: Mask, evicted: int) -> Sizes:

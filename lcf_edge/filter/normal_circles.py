@@ -14,7 +14,7 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
 SPEED_NOISE_PXPS = 12.0  # 1 sigma of an edge's V
-PASSING_WIDTHS = 1.5  # half widths of the vehicle, beside its path
+PASSING_WIDTHS = 2.0  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
 SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
 OCTAVES = 16

@@ -80,8 +80,8 @@ class Verdict(Columns):
     """What the links say; (n,) each.
 
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
-    it should be. ``over``: px beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it stands still. ``mover``,
-    ``incoming``: bool.
+    it should be. ``over``: px beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it
+    stands still. ``mover``, ``incoming``: bool.
     """
 
     r: Floats

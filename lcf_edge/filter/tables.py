@@ -158,6 +158,10 @@ class CircleTable:
         """Bytes that the table occupies, for good."""
         return sum(a.nbytes for a in (self._floats, self.active, self.id, self.support, self.cause))
 
+    def park(self) -> None:
+        """Zero the rows that are not in use, so that predictions of nothing stay nothing."""
+        self._floats[:, ~self.active] = 0
+
     @property
     def count(self) -> int:
         """Rows in use."""
@@ -180,6 +184,10 @@ class PsiTable:
     def nbytes(self) -> int:
         """Bytes that the table occupies, for good."""
         return sum(a.nbytes for a in (self._floats, self.active, self.id, self.shape, self.circle))
+
+    def park(self) -> None:
+        """Zero the rows that are not in use, so that predictions of nothing stay nothing."""
+        self._floats[:, ~self.active] = 0
 
     @property
     def count(self) -> int:
