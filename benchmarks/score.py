@@ -115,9 +115,7 @@ def score(
         scene = scenes.get(truth.stamp_ns)
         circles = _rebels(scene, min_trust)
         in_sight_since = {
-            thing.id: in_sight_since.get(thing.id, truth.stamp_ns)
-            for thing in truth.objects
-            if thing.in_sight
+            thing.id: in_sight_since.get(thing.id, truth.stamp_ns) for thing in truth.objects if thing.in_sight
         }
         on = {thing.id: _on(circles, thing) for thing in truth.objects}
         for thing in truth.objects:

@@ -1,4 +1,7 @@
-"""What a source delivers: pictures, inertial samples, speeds; SI units, camera axes (x right, y down, z forward)."""
+"""What a source delivers: pictures, inertial samples, speeds.
+
+SI units and the camera's axes: x right, y down, z forward.
+"""
 
 from dataclasses import dataclass
 

@@ -124,17 +124,13 @@ def cutting_cart(plan: Plan) -> Box | None:
     return _follow(plan, "cutting", gap, closing, offset)
 
 
-def _follow(
-    plan: Plan, name: str, gap_m: float, closing_mps: float, offset_m: Callable[[float], float]
-) -> Box | None:
+def _follow(plan: Plan, name: str, gap_m: float, closing_mps: float, offset_m: Callable[[float], float]) -> Box | None:
     """A cart that travels along the road, knots every 0.1 s."""
     road = Road(plan.drive)
     size = plan.between(0.8, 1.4), plan.between(0.8, 1.5), plan.between(0.9, 1.8)
     knots = []
     for time in np.arange(-0.1, plan.end_s + 0.3, 0.1).tolist():
-        reach = (
-            float(plan.drive.speed.integral(np.array([time]))[0]) + gap_m - closing_mps * time + size[2] / 2
-        )
+        reach = float(plan.drive.speed.integral(np.array([time]))[0]) + gap_m - closing_mps * time + size[2] / 2
         knots.append((time, *road.place(reach, offset_m(time))[0].tolist()))
     heading = road.place(gap_m)[1]
     cart = Box(name, *size, path=tuple(knots), heading_rad=heading, paint=plan.paint(0.18))
@@ -209,9 +205,7 @@ def _crowd(plan: Plan) -> None:
                 contact_s=plan.between(0.4, 1.3) * plan.end_s,
             )
         else:
-            crossing_walker(
-                plan, f"walker_{number}", miss_m=(-3.0, 3.0), pass_s=plan.between(0.5, 1.5) * plan.end_s
-            )
+            crossing_walker(plan, f"walker_{number}", miss_m=(-3.0, 3.0), pass_s=plan.between(0.5, 1.5) * plan.end_s)
 
 
 def _slow_rover(plan: Plan) -> None:
@@ -329,14 +323,10 @@ def make(
     seconds = seconds or (30.0 if slow else 8.0)
     fps = fps or (3.0 if slow else 20.0)
     if seed < 0 or seconds * fps < 1 or min(width, height) < 16 or focal_px <= 0:
-        raise ValueError(
-            "a drive needs a seed >= 0, at least one picture of 16x16 px, and a positive focal length"
-        )
+        raise ValueError("a drive needs a seed >= 0, at least one picture of 16x16 px, and a positive focal length")
     random = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     bias = random.normal(0, 0.005, 3).tolist(), random.normal(0, 0.1, 3).tolist()
-    noise = SensorNoise(
-        tuple(bias[0]), accel_bias_mps2=tuple(bias[1]), speed_scale=float(random.normal(1, 0.01))
-    )
+    noise = SensorNoise(tuple(bias[0]), accel_bias_mps2=tuple(bias[1]), speed_scale=float(random.normal(1, 0.01)))
     still = Profile(((0.0, 0.0),))
     drive = Drive(kind, seed, seconds, fps, still, still, (), Lens(width, height, focal_px), noise)
     plan = Plan(random, drive)

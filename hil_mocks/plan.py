@@ -63,9 +63,7 @@ class Plan:
         """Add the first of the drawn boxes that touches neither camera nor another box during the drive."""
         for _ in range(attempts):
             box = draw()
-            if _clear_of_camera(self.drive, box) and all(
-                _apart(self.drive, box, other) for other in self.boxes
-            ):
+            if _clear_of_camera(self.drive, box) and all(_apart(self.drive, box, other) for other in self.boxes):
                 self.boxes.append(box)
                 return box
         return None
@@ -103,9 +101,7 @@ class Road:
         points, ahead, travelled = points[onward], ahead[onward], travelled[onward]
         reach = 100.0
         self._distance = np.concatenate([[-reach], travelled, [travelled[-1] + reach]])
-        self._points = np.concatenate(
-            [points[:1] - reach * ahead[:1], points, points[-1:] + reach * ahead[-1:]]
-        )
+        self._points = np.concatenate([points[:1] - reach * ahead[:1], points, points[-1:] + reach * ahead[-1:]])
         self._ahead = np.concatenate([ahead[:1], ahead, ahead[-1:]])
         self.length_m = float(travelled[-1])
 

@@ -60,9 +60,7 @@ class Optics:
         self.size = (lens.width, lens.height)
         self._map: npt.NDArray[np.float32] | None = None  # columns and rows to look at
         if lens.model != "none":
-            columns, rows = np.meshgrid(
-                np.arange(lens.width, dtype=float), np.arange(lens.height, dtype=float)
-            )
+            columns, rows = np.meshgrid(np.arange(lens.width, dtype=float), np.arange(lens.height, dtype=float))
             seen = self._undistorted(np.stack([columns, rows], axis=-1).reshape(-1, 2))
             low = np.floor(seen.min(axis=0)) - 1
             self.size = tuple((np.ceil(seen.max(axis=0)) + 1 - low).astype(int).tolist())

@@ -117,9 +117,7 @@ class Renderer:
         """A square of walls that travels with the camera, from its zenith down to the horizon."""
         half = _SKYLINE_M
         top = half * _SKYLINE_ROWS / (_SKYLINE_TEXELS / 2)
-        corners = np.array(
-            [[-half, -top, half], [half, -top, half], [half, -top, -half], [-half, -top, -half]]
-        )
+        corners = np.array([[-half, -top, half], [half, -top, half], [half, -top, -half], [-half, -top, -half]])
         corners = corners @ attitude
         across = np.roll(corners, -1, axis=0) - corners
         down = np.tile(attitude[1] * top, (4, 1))
@@ -147,9 +145,7 @@ class Renderer:
         texels_a_line = scale * depth**2 / (optics.lens.focal_px * height_m) / 3
         level_of_row = np.clip(np.rint(np.log2(texels_a_line)), 0, 7)
         level_of_row[below < 3] = 8  # haze
-        stretch = np.array(
-            [[1.0, 0.0, 0.0], [0.0, 3.0, 1.0], [0.0, 0.0, 1.0]]
-        )  # three lines a row, middle on it
+        stretch = np.array([[1.0, 0.0, 0.0], [0.0, 3.0, 1.0], [0.0, 0.0, 1.0]])  # three lines a row, middle on it
         for level in np.unique(level_of_row[level_of_row < 8]).astype(int).tolist():
             rows = np.flatnonzero(level_of_row == level)
             shrink = np.diag([2.0**level, 2.0**level, 1.0])

@@ -19,9 +19,7 @@ def _clouds(random: Random, shape: tuple[int, int], cell_px: float) -> npt.NDArr
     return np.asarray(cv2.resize(small, (width, height), interpolation=cv2.INTER_LINEAR), dtype=np.float32)
 
 
-def _marks(
-    random: Random, canvas: npt.NDArray[np.float32], size_px: float, share: float, depth: float
-) -> None:
+def _marks(random: Random, canvas: npt.NDArray[np.float32], size_px: float, share: float, depth: float) -> None:
     """Paint rectangles, triangles and discs of about `size_px` that cover about `share` of the canvas."""
     height, width = canvas.shape
     count = int(share * width * height / size_px**2) + 1
@@ -82,9 +80,7 @@ def skyline(paint: Paint, side_px: int, height_px: int) -> tuple[Picture, ...]:
     """The four sides of the horizon, each (height_px, side_px): clouds above, houses far away."""
     random = np.random.default_rng([paint.seed, 20])
     width = 4 * side_px
-    canvas = np.linspace(60, 25, height_px, dtype=np.float32)[:, None] + 6 * _clouds(
-        random, (height_px, width), 120
-    )
+    canvas = np.linspace(60, 25, height_px, dtype=np.float32)[:, None] + 6 * _clouds(random, (height_px, width), 120)
     left = 0
     while left < width:
         wide, tall = int(random.integers(20, 90)), int(random.integers(15, 95))

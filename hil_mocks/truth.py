@@ -148,9 +148,7 @@ def _visible_shares(view: View, optics: Optics) -> list[tuple[float, Bounds | No
     shares = []
     for index, placed in enumerate(view.placed, start=1):
         left, top, right, bottom = (value / 2 for value in _outer(placed))
-        window = np.s_[
-            max(int(top) - 2, 0) : max(int(bottom) + 3, 0), max(int(left) - 2, 0) : max(int(right) + 3, 0)
-        ]
+        window = np.s_[max(int(top) - 2, 0) : max(int(bottom) + 3, 0), max(int(left) - 2, 0) : max(int(right) + 3, 0)]
         _fill(alone, placed, 1)
         own = alone[window] > 0
         area = int(np.count_nonzero(own))

@@ -16,6 +16,7 @@ from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Ro
 from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PXPS = 10.0  # 1 sigma of a rebel's velocity over its links
+LINK_S = 0.12
 LOOMS_PER_S = 1.0  # fastest expansion of one object, 1/s
 STILL_PXPS = 15.0  # slower circles have no direction
 MEMBER_MARGIN_PX = 8.0
@@ -204,7 +205,8 @@ def link(x: Floats, y: Floats, vx: Floats, vy: Floats, settings: Filter) -> npt.
         difference < np.float32(0.5) * faster
     )
     looms = difference < np.float32(2 * VELOCITY_NOISE_PXPS) + np.float32(LOOMS_PER_S) * distance
-    linked = (distance < settings.rebel_link_px) & (together | looms)
+    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_S) * faster)  # what is near is large
+    linked = (distance < reach) & (together | looms)
     label = np.arange(len(x))
     while True:
         lowest = np.where(linked, label, len(x)).min(axis=1)

@@ -299,8 +299,7 @@ def test_odometry_integrates_to_the_path():
 
 def test_exposure_scales_the_picture():
     full, dim = (
-        next(iter(scenes.frames(drive(standing(0.0, 4.0), gain=hold(g)))))[0].image.astype(float)
-        for g in (1.0, 0.5)
+        next(iter(scenes.frames(drive(standing(0.0, 4.0), gain=hold(g)))))[0].image.astype(float) for g in (1.0, 0.5)
     )
     np.testing.assert_allclose(dim, full / 2, atol=0.51)
 
@@ -394,9 +393,7 @@ def test_recording_has_the_layout_of_asl(recording):
         "odom0": "#timestamp [ns],v_x [m s^-1],w_z [rad s^-1]",
     }
     camera = dict(
-        line.split(": ", 1)
-        for line in (folder / "mav0/cam0/sensor.yaml").read_text().splitlines()
-        if ": " in line
+        line.split(": ", 1) for line in (folder / "mav0/cam0/sensor.yaml").read_text().splitlines() if ": " in line
     )
     assert json.loads(camera["resolution"]) == [320, 240]
     assert json.loads(camera["intrinsics"].split(" #")[0]) == [250.0, 250.0, 159.5, 119.5]

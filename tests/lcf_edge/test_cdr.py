@@ -62,9 +62,7 @@ def samples(message: Callable[..., Any]) -> Callable[[str], dict[str, Any]]:
         return message("geometry_msgs/msg/Vector3", x=x, y=y, z=z)
 
     def make(frame_id: str) -> dict[str, Any]:
-        twist = message(
-            "geometry_msgs/msg/Twist", linear=vector(1.5, 0.1, 0.2), angular=vector(0.3, 0.4, -0.5)
-        )
+        twist = message("geometry_msgs/msg/Twist", linear=vector(1.5, 0.1, 0.2), angular=vector(0.3, 0.4, -0.5))
         turn = message("geometry_msgs/msg/Quaternion", x=0.0, y=0.0, z=0.0, w=1.0)
         pose = message(
             "geometry_msgs/msg/Pose",
@@ -105,9 +103,7 @@ def samples(message: Callable[..., Any]) -> Callable[[str], dict[str, Any]]:
                 pose=message("geometry_msgs/msg/PoseWithCovariance", pose=pose, covariance=np.zeros(36)),
                 twist=message("geometry_msgs/msg/TwistWithCovariance", twist=twist, covariance=np.ones(36)),
             ),
-            "geometry_msgs/msg/TwistStamped": message(
-                "geometry_msgs/msg/TwistStamped", header=frame_id, twist=twist
-            ),
+            "geometry_msgs/msg/TwistStamped": message("geometry_msgs/msg/TwistStamped", header=frame_id, twist=twist),
             "sensor_msgs/msg/CameraInfo": message(
                 "sensor_msgs/msg/CameraInfo",
                 header=frame_id,
@@ -140,8 +136,7 @@ def test_reads_what_another_implementation_wrote(
     ros: Typestore, samples: Callable[[str], dict[str, Any]], frame_id: str, little_endian: bool
 ) -> None:
     payloads = {
-        kind: bytes(ros.serialize_cdr(m, kind, little_endian=little_endian))
-        for kind, m in samples(frame_id).items()
+        kind: bytes(ros.serialize_cdr(m, kind, little_endian=little_endian)) for kind, m in samples(frame_id).items()
     }
     header = cdr.Header(STAMP_NS, frame_id)
 
@@ -188,9 +183,7 @@ def _filled(dtype: np.dtype[np.void], rows: int, rng: np.random.Generator) -> np
 
 @pytest.mark.parametrize("frame_id", FRAME_IDS)
 @pytest.mark.parametrize(("circles", "psi"), [(0, 0), (1, 0), (0, 1), (3, 2)])
-def test_scene_is_read_by_another_implementation(
-    ros: Typestore, frame_id: str, circles: int, psi: int
-) -> None:
+def test_scene_is_read_by_another_implementation(ros: Typestore, frame_id: str, circles: int, psi: int) -> None:
     sent = scene(circles, psi)
     payload = cdr.encode_scene(sent, frame_id)
     got: Any = ros.deserialize_cdr(payload, "lcf_msgs/msg/Scene")
@@ -229,9 +222,7 @@ def test_scene_is_read_without_a_copy() -> None:
 
 def test_constants_of_the_message_definitions_are_those_of_the_records() -> None:
     text = (files("lcf_edge") / "msg" / "Circle.msg").read_text(encoding="utf-8")
-    names = [
-        line.split()[1] for line in text.splitlines() if line.strip() and line[0] != "#" and "=" not in line
-    ]
+    names = [line.split()[1] for line in text.splitlines() if line.strip() and line[0] != "#" and "=" not in line]
     assert tuple(names) == CIRCLE.names
 
 
@@ -247,9 +238,7 @@ def test_scene_whose_numbers_do_not_fit_is_refused(wrong: dict[str, float]) -> N
         "vehicle_speed": 0.0,
     }
     with pytest.raises(cdr.CdrError, match="does not fit"):
-        cdr.encode_scene(
-            Scene(**(fields | wrong), circles=np.empty(0, CIRCLE), psi=np.empty(0, PSI_REGION)), "c"
-        )
+        cdr.encode_scene(Scene(**(fields | wrong), circles=np.empty(0, CIRCLE), psi=np.empty(0, PSI_REGION)), "c")
 
 
 @pytest.mark.parametrize("kind", DECODERS)
@@ -271,17 +260,13 @@ def test_a_damaged_message_is_a_message_or_a_cdr_error(
 
 
 @pytest.mark.parametrize("kind", DECODERS)
-def test_a_message_cut_short_is_an_error(
-    ros: Typestore, samples: Callable[[str], dict[str, Any]], kind: str
-) -> None:
+def test_a_message_cut_short_is_an_error(ros: Typestore, samples: Callable[[str], dict[str, Any]], kind: str) -> None:
     if kind.startswith(("lcf_msgs", "std_msgs")):
         payload, needed = cdr.encode_scene(scene(2, 2), "camera"), {"lcf_msgs/msg/Scene": 0}.get(kind)
     else:
         payload, needed = bytes(ros.serialize_cdr(samples("camera")[kind], kind)), None
     ends = [n for n in range(len(payload)) if not with_error(DECODERS[kind], payload[:n])]
-    assert ends == list(range(len(ends))), (
-        "every shorter payload is refused, up to the last field that is read"
-    )
+    assert ends == list(range(len(ends))), "every shorter payload is refused, up to the last field that is read"
     assert len(ends) >= 20
     if needed == 0:
         assert len(ends) == len(payload)

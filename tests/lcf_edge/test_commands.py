@@ -148,8 +148,7 @@ def test_config_tells_the_bytes_of_each_table_and_in_all() -> None:
     text = lcf_edge("config").stdout
     assert tomllib.loads(text)["vehicle"]["horizon_s"] == 4.0
     rows = {
-        name: int(size.replace(",", ""))
-        for name, size in re.findall(r"^#   (.+?)  +([\d,]+)$", text, re.MULTILINE)
+        name: int(size.replace(",", "")) for name, size in re.findall(r"^#   (.+?)  +([\d,]+)$", text, re.MULTILINE)
     }
     in_all = rows.pop("in all")
     assert in_all == sum(rows.values()) > 0
@@ -309,9 +308,7 @@ def test_published_scenes_arrive(recording: Path) -> None:
         assert arrived.wait(PATIENCE_S)
 
 
-def test_a_recording_is_not_overwritten_by_its_own_results(
-    refused: Refused, replayed: tuple[Done, Path]
-) -> None:
+def test_a_recording_is_not_overwritten_by_its_own_results(refused: Refused, replayed: tuple[Done, Path]) -> None:
     video = replayed[1] / "overlay.mp4"
     kept = video.read_bytes()
     for option in ("-o", "--video"):
@@ -430,9 +427,7 @@ HITS += [(120, 73, True), (120, 71, False), (120, 207, True), (120, 209, False)]
 
 
 @pytest.mark.parametrize(("x", "y", "hit"), HITS)
-def test_a_threat_is_found_by_a_circle_in_its_box_grown_by_a_quarter_and_8_px(
-    x: int, y: int, hit: bool
-) -> None:
+def test_a_threat_is_found_by_a_circle_in_its_box_grown_by_a_quarter_and_8_px(x: int, y: int, hit: bool) -> None:
     drive = [truth(seq, thing(1)) for seq in range(10)]
     (finding,) = findings(drive, {seq: [(x, y, Cause.CROSSING)] for seq in (4, 5)})
     assert finding.latency_s == (0.4 if hit else None)

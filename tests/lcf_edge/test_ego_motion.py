@@ -74,9 +74,7 @@ class TestRotation:
                 feed(ego, [sample * 0.005], gyro=lambda _: RATE)
                 sample += 1
             whole = ego.advance(ns(t)).rotation @ whole
-        np.testing.assert_allclose(
-            whole, turned_by(np.array(RATE) * 200 * 0.0317), atol=1e-7
-        )  # stamps: whole ns
+        np.testing.assert_allclose(whole, turned_by(np.array(RATE) * 200 * 0.0317), atol=1e-7)  # stamps: whole ns
 
     def test_varying_rate_about_one_axis_is_its_integral(self) -> None:
         ego = estimator()
@@ -249,9 +247,7 @@ class TestBias:
 
     def test_is_not_learnt_from_a_shaken_vehicle(self) -> None:
         ego, random = estimator(), np.random.default_rng(0)
-        feed(
-            ego, np.arange(0, 1, 0.01), accel=lambda _: tuple(random.normal(LEVEL, 0.5)), gyro=lambda _: BIAS
-        )
+        feed(ego, np.arange(0, 1, 0.01), accel=lambda _: tuple(random.normal(LEVEL, 0.5)), gyro=lambda _: BIAS)
         ego.advance(ns(0.9))
         np.testing.assert_array_equal(ego.gyro_bias_radps, np.zeros(3))
 
@@ -459,9 +455,7 @@ anything = st.floats(allow_nan=True, allow_infinity=True)
 stamps = st.integers(-(10**9), 10**10) | st.integers(-(2**64), 2**64)
 events = st.one_of(
     st.builds(ImuSample, stamps, st.tuples(*[anything] * 3), st.tuples(*[anything] * 3)),
-    st.builds(
-        ImuSample, stamps, st.tuples(*[st.floats(-20, 20)] * 3), st.tuples(*[st.floats(-100, 100)] * 3)
-    ),
+    st.builds(ImuSample, stamps, st.tuples(*[st.floats(-20, 20)] * 3), st.tuples(*[st.floats(-100, 100)] * 3)),
     st.builds(SpeedSample, stamps, anything, anything),
     st.builds(SpeedSample, stamps, st.floats(-60, 60), st.floats(-3, 3)),
     st.integers(-(10**9), 10**11),

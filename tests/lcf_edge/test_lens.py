@@ -46,9 +46,7 @@ def opencv_distort(lens: Lens, ideal: Any) -> Any:
 class TestBentLens:
     def test_distort_is_the_model_of_opencv(self, lens: Lens) -> None:
         spread = (grid(lens) - [lens.cx, lens.cy]) * 0.95 + [lens.cx, lens.cy]
-        np.testing.assert_allclose(
-            lens.distort(spread.astype(np.float32)), opencv_distort(lens, spread), atol=1e-3
-        )
+        np.testing.assert_allclose(lens.distort(spread.astype(np.float32)), opencv_distort(lens, spread), atol=1e-3)
 
     def test_undistort_is_its_inverse_over_the_whole_frame(self, lens: Lens) -> None:
         points = (grid(lens) + 0.3).astype(np.float32)
@@ -81,9 +79,7 @@ class TestBentLens:
         assert np.isnan(lens.undistort(lost)).all()
 
 
-@pytest.mark.parametrize(
-    "lens", [PINHOLE, replace(PINHOLE, model="radial-tangential", coefficients=(0.0,) * 4)]
-)
+@pytest.mark.parametrize("lens", [PINHOLE, replace(PINHOLE, model="radial-tangential", coefficients=(0.0,) * 4)])
 def test_lens_that_does_not_bend_changes_nothing(lens: Lens) -> None:
     points = np.array([[1.5, 2.5]], np.float32)
     assert lens.distort(points) is points
@@ -159,9 +155,7 @@ class TestFromConfig:
         np.testing.assert_allclose(bearing, [-0.6, 0.6], atol=1e-5)
 
     def test_field_of_view_beyond_the_model_is_refused(self) -> None:
-        camera = Camera(
-            horizontal_fov_rad=2.5, distortion_model="radial-tangential", distortion=[-0.5, 0.0, 0.0, 0.0]
-        )
+        camera = Camera(horizontal_fov_rad=2.5, distortion_model="radial-tangential", distortion=[-0.5, 0.0, 0.0, 0.0])
         with pytest.raises(ConfigError, match="horizontal_fov_rad"):
             Lens.from_config(camera, 640, 480)
 

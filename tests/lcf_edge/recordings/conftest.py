@@ -64,12 +64,8 @@ class AslFolder:
             cv2.imwrite(str(self.picture(stamp)), texture(index))
         self.write("cam0", "#timestamp [ns],filename", (f"{t},{t}.png" for t in frames))
         samples = range(0, 260_000_000, 10_000_000)
-        self.write(
-            "imu0", "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z", (f"{t},0.1,0.2,0.3,1,2,3" for t in samples)
-        )
-        self.write(
-            "odom0", "#timestamp [ns],v_x [m s^-1],w_z [rad s^-1]", (f"{t},1.5,0.25" for t in samples[::2])
-        )
+        self.write("imu0", "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z", (f"{t},0.1,0.2,0.3,1,2,3" for t in samples))
+        self.write("odom0", "#timestamp [ns],v_x [m s^-1],w_z [rad s^-1]", (f"{t},1.5,0.25" for t in samples[::2]))
         self.yaml("cam0", CAMERA_YAML)
         self.yaml("imu0", IMU_YAML)
 

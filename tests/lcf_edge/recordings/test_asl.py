@@ -35,14 +35,10 @@ def test_everything_is_delivered(asl: Any, read: Read, inside: str) -> None:
     assert frames(items) == FRAMES
     assert [frame.seq for frame in of(Frame, items)] == [0, 1, 2, 3, 4]
     assert [int(frame.image.mean()) for frame in of(Frame, items)] == [5, 15, 25, 35, 45]
-    assert {(frame.image.shape, frame.image.dtype) for frame in of(Frame, items)} == {
-        ((48, 64), np.dtype("u1"))
-    }
+    assert {(frame.image.shape, frame.image.dtype) for frame in of(Frame, items)} == {((48, 64), np.dtype("u1"))}
     assert len(of(ImuSample, items)) == 26
     assert [(s.speed_mps, s.yaw_rate_radps) for s in of(SpeedSample, items)] == [(1.5, 0.25)] * 13
-    assert recording.lens == Lens(
-        64, 48, 50.0, 51.0, 31.5, 23.5, "radial-tangential", (-0.28, 0.07, 0.0002, 1.8e-05)
-    )
+    assert recording.lens == Lens(64, 48, 50.0, 51.0, 31.5, 23.5, "radial-tangential", (-0.28, 0.07, 0.0002, 1.8e-05))
     assert (recording.frame_count, recording.has_imu, recording.has_speed) == (5, True, True)
     assert (recording.warnings, dict(recording.skipped)) == ([], {})
 

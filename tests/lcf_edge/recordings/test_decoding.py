@@ -96,9 +96,7 @@ LEVELS = np.arange(0, 200, 25, np.uint8).reshape(2, 4)
 
 
 @pytest.mark.parametrize("padding", [0, 5])
-@pytest.mark.parametrize(
-    "encoding", ["mono8", "8UC1", "rgb8", "bgr8", "yuyv", "yuv422_yuy2", "uyvy", "yuv422"]
-)
+@pytest.mark.parametrize("encoding", ["mono8", "8UC1", "rgb8", "bgr8", "yuyv", "yuv422_yuy2", "uyvy", "yuv422"])
 def test_raw_pictures_with_and_without_padded_rows(encoding: str, padding: int) -> None:
     chroma = np.full_like(LEVELS, 128)
     layout = {

@@ -27,9 +27,7 @@ def speed(stamp_ns: int) -> SpeedSample:
     return SpeedSample(stamp_ns, 0.0, 0.0)
 
 
-def check_delivery(
-    items: Sequence[Picture | Sample], kinds: Sequence[type] = (ImuSample, SpeedSample)
-) -> None:
+def check_delivery(items: Sequence[Picture | Sample], kinds: Sequence[type] = (ImuSample, SpeedSample)) -> None:
     """Each kind in its order; before each picture exactly the samples up to the first at or after it."""
     for kind in (Picture, ImuSample, SpeedSample):
         own = [item.stamp_ns for item in items if isinstance(item, kind)]
@@ -68,9 +66,7 @@ def test_a_shuffled_stream_is_put_in_order(
 
 def test_a_long_stream_is_put_in_order_and_little_of_it_is_held() -> None:
     """Pictures arrive 40 ms late, at 20/s, next to an IMU at 200/s: as a camera driver delivers them."""
-    arrivals = [(t + 40, picture(t)) for t in range(0, 20_000, 50)] + [
-        (t, imu(t)) for t in range(3, 20_000, 5)
-    ]
+    arrivals = [(t + 40, picture(t)) for t in range(0, 20_000, 50)] + [(t, imu(t)) for t in range(3, 20_000, 5)]
     arrivals.sort(key=lambda arrival: arrival[0])
     taken = delivered = most_held = 0
 

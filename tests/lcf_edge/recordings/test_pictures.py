@@ -98,9 +98,7 @@ def test_a_video_can_be_read_again(video: Path) -> None:
     assert [frame.stamp_ns for frame in recording] == [frame.stamp_ns for frame in recording]
 
 
-def test_a_damaged_video_is_read_up_to_the_damage(
-    video: Path, read: Read, capfd: pytest.CaptureFixture[str]
-) -> None:
+def test_a_damaged_video_is_read_up_to_the_damage(video: Path, read: Read, capfd: pytest.CaptureFixture[str]) -> None:
     data = video.read_bytes()
     video.write_bytes(data[: len(data) // 2])
     recording, items = read(video)
@@ -130,9 +128,7 @@ def test_what_is_no_video_is_refused(
     ],
     ids=["missing", "empty folder", "no pictures", "text"],
 )
-def test_what_is_no_recording_is_refused_in_one_line(
-    tmp_path: Path, make: Callable[[Path], Any], message: str
-) -> None:
+def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, make: Callable[[Path], Any], message: str) -> None:
     path = tmp_path / "drive"
     make(path)
     with pytest.raises(RecordingError) as caught:

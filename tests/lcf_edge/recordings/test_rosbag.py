@@ -49,9 +49,7 @@ class Messages:
         header = self.ros.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
         return kind, bytes(self.ros.serialize_cdr(self.ros.types[kind](header=header, **fields), kind))
 
-    def image(
-        self, stamp_ns: int, picture: Any, encoding: str = "mono8", **changed: Any
-    ) -> tuple[str, bytes]:
+    def image(self, stamp_ns: int, picture: Any, encoding: str = "mono8", **changed: Any) -> tuple[str, bytes]:
         height, width = picture.shape[:2]
         fields = {"height": height, "width": width, "encoding": encoding, "is_bigendian": 0}
         fields |= {"step": picture.strides[0], "data": picture.reshape(-1)}
@@ -59,9 +57,7 @@ class Messages:
 
     def compressed(self, stamp_ns: int, data: bytes, image_format: str = "jpeg") -> tuple[str, bytes]:
         array = np.frombuffer(data, np.uint8)
-        return self._make(
-            "sensor_msgs/msg/CompressedImage", stamp_ns, "camera", format=image_format, data=array
-        )
+        return self._make("sensor_msgs/msg/CompressedImage", stamp_ns, "camera", format=image_format, data=array)
 
     def imu(
         self,
@@ -95,9 +91,7 @@ class Messages:
             "odom",
             child_frame_id="base_link",
             pose=types["geometry_msgs/msg/PoseWithCovariance"](pose=pose, covariance=np.zeros(36)),
-            twist=types["geometry_msgs/msg/TwistWithCovariance"](
-                twist=self._twist(speed), covariance=np.zeros(36)
-            ),
+            twist=types["geometry_msgs/msg/TwistWithCovariance"](twist=self._twist(speed), covariance=np.zeros(36)),
         )
 
     def twist(self, stamp_ns: int, speed: float = 1.5) -> tuple[str, bytes]:
@@ -173,9 +167,7 @@ def drive(bag: Bag, make: Messages) -> Bag:
     for index in range(20):
         stamp = START_NS + index * STEP_NS
         arrivals.append((stamp + 30_000_000, "/camera/image_raw", make.image(stamp, picture(index))))
-        arrivals.append(
-            (stamp + 30_000_001, "/camera/camera_info", make.camera_info(d=(0.1, 0.2, 0.3, 0.4, 0.0)))
-        )
+        arrivals.append((stamp + 30_000_001, "/camera/camera_info", make.camera_info(d=(0.1, 0.2, 0.3, 0.4, 0.0))))
     end = START_NS + 20 * STEP_NS
     arrivals += [(stamp + 1, "/imu/data", make.imu(stamp)) for stamp in range(START_NS, end, 10_000_000)]
     for stamp in range(START_NS, end, 20_000_000):
@@ -209,9 +201,7 @@ def test_everything_is_delivered(drive: Bag, read: Read, form: dict[str, Any]) -
     assert [s.gyro for s in of(ImuSample, items)] == [(0.1, 0.2, 0.3)] * 100
     assert [s.accel for s in of(ImuSample, items)] == [(0, -9.81, 0)] * 100
     assert [(s.speed_mps, s.yaw_rate_radps) for s in of(SpeedSample, items)] == [(1.5, 0.25)] * 50
-    assert recording.lens == Lens(
-        64, 48, 50.0, 51.0, 31.5, 23.5, "radial-tangential", (0.1, 0.2, 0.3, 0.4, 0.0)
-    )
+    assert recording.lens == Lens(64, 48, 50.0, 51.0, 31.5, 23.5, "radial-tangential", (0.1, 0.2, 0.3, 0.4, 0.0))
     assert recording.frame_count == (None if "repeat_channels" in form or "use_statistics" in form else 20)
     assert (recording.has_imu, recording.has_speed) == (True, True)
     assert (recording.warnings, dict(recording.skipped)) == ([], {})
@@ -349,9 +339,7 @@ def test_axes_of_an_imu_that_may_not_be_the_cameras_are_told(
         ("plumb_bob", (0.1, float("nan"), 0.0, 0.0), None),
     ],
 )
-def test_lens(
-    bag: Bag, make: Messages, model: str, d: tuple[float, ...], expected: tuple[str, Any] | None
-) -> None:
+def test_lens(bag: Bag, make: Messages, model: str, d: tuple[float, ...], expected: tuple[str, Any] | None) -> None:
     bag.add("/camera/camera_info", make.camera_info(model, d))
     bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
     recording = open_recording(bag.write(), Config())
@@ -446,9 +434,7 @@ def test_the_chunk_that_was_cut_is_read_as_far_as_it_goes(
     """All messages in one chunk, whose content does not compress."""
     rng = np.random.default_rng(1)
     for index in range(200):
-        bag.add(
-            "/image", make.image(START_NS + index, rng.integers(0, 256, (48, 64), np.uint8)), START_NS + index
-        )
+        bag.add("/image", make.image(START_NS + index, rng.integers(0, 256, (48, 64), np.uint8)), START_NS + index)
     data = bag.write(compression=compression, chunk_size=2**24).read_bytes()
     bag.path.write_bytes(data[: len(data) * 3 // 4])
     recording, items = read(bag.path)
@@ -489,9 +475,7 @@ def _chunks(data: bytes | bytearray) -> list[tuple[int, int]]:
 
 @pytest.mark.parametrize("claim", [2**30, 2**40, 2**64 - 1])
 @pytest.mark.parametrize(("place", "said"), [(16, "bytes unpacked"), (36, "")], ids=["unpacked", "packed"])
-def test_a_size_that_is_a_lie_takes_no_memory(
-    drive: Bag, read: Read, place: int, said: str, claim: int
-) -> None:
+def test_a_size_that_is_a_lie_takes_no_memory(drive: Bag, read: Read, place: int, said: str, claim: int) -> None:
     """Sizes of a chunk, unpacked and packed (behind the four letters of its compression)."""
     data = bytearray(drive.write().read_bytes())
     start, _ = _chunks(data)[1]
@@ -509,9 +493,7 @@ def test_any_damage_leaves_a_recording_or_a_recording_error(drive: Bag, data: st
     content = bytearray(drive.write(**form).read_bytes())
     for _ in range(data.draw(st.integers(1, 4))):
         at = data.draw(st.integers(8, len(content) - 8))
-        wrong = data.draw(
-            st.one_of(st.binary(min_size=1, max_size=1), st.just(b"\xff" * 8), st.just(bytes(8)))
-        )
+        wrong = data.draw(st.one_of(st.binary(min_size=1, max_size=1), st.just(b"\xff" * 8), st.just(bytes(8))))
         content[at : at + len(wrong)] = wrong
     damaged = drive.path.with_name("damaged.mcap")
     damaged.write_bytes(content[: data.draw(st.integers(8, len(content)))])

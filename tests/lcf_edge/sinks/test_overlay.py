@@ -179,9 +179,7 @@ def test_labels_of_neighbours_do_not_cover_each_other() -> None:
     both = picture(circles=np.concatenate([circle(**rebel, x=x, ttc=1) for x in (100, 110)]))
     empty = picture()
     above = np.s_[60:82, WIDTH:]
-    assert (text_pixels(both[above], empty[above]).size) < 1.2 * text_pixels(
-        alone[0][above], empty[above]
-    ).size
+    assert (text_pixels(both[above], empty[above]).size) < 1.2 * text_pixels(alone[0][above], empty[above]).size
 
 
 def test_notes_stand_in_the_caption() -> None:
@@ -198,9 +196,7 @@ def test_notes_stand_in_the_caption() -> None:
     ttc=st.floats(width=32),
     size=st.sampled_from([(1, 1), (33, 7), (64, 48), (320, 240)]),
 )
-def test_no_value_breaks_the_drawing(
-    x: float, y: float, radius: float, ttc: float, size: tuple[int, int]
-) -> None:
+def test_no_value_breaks_the_drawing(x: float, y: float, radius: float, ttc: float, size: tuple[int, int]) -> None:
     circles = np.concatenate([circle(kind=kind, x=x, y=y, radius=radius, ttc=ttc) for kind in Kind])
     panels = picture(
         circles=circles,

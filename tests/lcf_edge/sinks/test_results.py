@@ -96,8 +96,7 @@ def test_an_unknown_number_is_null(unknown: float, field: str, key: str) -> None
 def test_an_unknown_speed_is_null_and_notes_tell_why() -> None:
     known = scene()
     parts = {
-        name: getattr(known, name)
-        for name in ("stamp_ns", "seq", "image_width", "image_height", "circles", "psi")
+        name: getattr(known, name) for name in ("stamp_ns", "seq", "image_width", "image_height", "circles", "psi")
     }
     line = json.loads(encode_line(Scene(**parts, vehicle_speed=np.nan, notes=("no imu", "no speed"))))
     assert line["speed"] is None
