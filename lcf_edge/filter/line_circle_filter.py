@@ -23,6 +23,9 @@ from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, Mask, PsiTabl
 from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
 
+SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
+FORGET = 0.3
+
 
 @dataclass(frozen=True, slots=True)
 class Step:
@@ -55,8 +58,9 @@ class LineCircleFilter:
         self._edge_expert = EdgeExpert(settings, self._matcher, self.edges, self.normal)
         self._alpha = Alpha(settings, self.edges, self._keys)
         self._normal_circles = NormalCircles(settings)
-        self._rebel_circles = RebelCircles(settings)
+        self._rebel_circles = RebelCircles(settings, config.vehicle.horizon_s)
         self._feedback = Feedback(settings, self._matcher)
+        self._missing_px = settings.leap_px  # by which the gyro lately missed the rotation
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each preallocated table."""
@@ -84,8 +88,7 @@ class LineCircleFilter:
         evicted = self.groups.collect(self.normal, self.rebel, self._config.filter.tr_cr)
 
         kept = np.flatnonzero(~omitted)
-        slack_px = 3 * motion.rotation_sigma_rad * self._pinhole.focal
-        found = self._edge_expert.find(estimate, corners, kept, slack_px)
+        found = self._edge_expert.find(estimate, corners, kept, self._slack_px(motion))
         estimate, sigma_rad = self._refine(estimate, found, x, y, motion)
         taken = self._edge_expert.update(estimate, found, corners, x, y, motion, sigma_rad * self._pinhole.focal)
         self._edge_expert.delete()
@@ -117,16 +120,25 @@ class LineCircleFilter:
     def _carry(self, rotation: Matrix) -> None:
         derotate(self._pinhole, rotation, self.edges, (self.normal, self.rebel), self.psi)
 
+    def _slack_px(self, motion: Motion) -> float:
+        """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""
+        gyro_px = 3 * motion.rotation_sigma_rad * self._pinhole.focal
+        return min(gyro_px, SURPRISE_PX + 3 * self._missing_px, self._config.filter.leap_px)
+
     def _refine(self, estimate: Estimate, found: Found, x: Floats, y: Floats, motion: Motion) -> tuple[Estimate, float]:
         """Take out the rotation that the gyro missed; answers the predictions and what stays uncertain, rad."""
         sigma_rad = motion.rotation_sigma_rad
         told = self._edge_expert.off_line(estimate, found, x, y) if sigma_rad > 0 else None
         if told is not None:
             rotation, sigma_rad = missing_rotation(self._pinhole, *told, sigma_rad)
+            missed_px = math.hypot(rotation[0, 2], rotation[1, 2]) * self._pinhole.focal
+            self._missing_px += FORGET * (missed_px - self._missing_px)
             self._keys.correct(rotation)
             self._carry(rotation)
             ex, ey = carry(self._pinhole.homography(rotation), estimate.x, estimate.y)
             estimate = Estimate(ex, ey, estimate.speed, estimate.beta)
+        else:
+            self._missing_px = self._config.filter.leap_px  # lost: look everywhere
         self._keys.blur(sigma_rad)
         return estimate, sigma_rad
 

@@ -13,7 +13,7 @@ from lcf_edge.filter.rebel_detection import miss
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
-SPEED_NOISE_PXPS = 12.0  # 1 sigma of an edge's V
+SPEED_NOISE_PX = 0.6  # 1 sigma of an edge's V, times t_f
 PASSING_WIDTHS = 2.0  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
 SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
@@ -44,9 +44,11 @@ class NormalCircles:
     def __init__(self, settings: Filter) -> None:
         self._settings = settings
         self._ids = Ids()
+        self._dt_s = 1.0
 
     def predict(self, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
         """C'_n: what stands still goes out from the focus and grows, both at the rate of its expansion."""
+        self._dt_s = dt_s
         growth = circles.expansion * np.float32(dt_s)
         circles.x += (circles.x - np.float32(focus[0])) * growth
         circles.y += (circles.y - np.float32(focus[1])) * growth
@@ -116,7 +118,7 @@ class NormalCircles:
         inside = away < circles.radius[owner] * np.float32(1.5) + 4
         along = flowing.cos * np.cos(circles.beta[owner]) + flowing.sin * np.sin(circles.beta[owner])
         centre = circles.expansion[owner]
-        slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PXPS) / flowing.r
+        slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PX / self._dt_s) / flowing.r
         fits = circles.active[owner] & (away < settings.bs_px) & (along > math.cos(settings.eps_beta_rad))
         return fits & (np.abs(flowing.expansion - centre) < slack), inside
 

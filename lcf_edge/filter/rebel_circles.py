@@ -15,21 +15,24 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Rows
 from lcf_edge.records import Cause
 
-VELOCITY_NOISE_PXPS = 10.0  # 1 sigma of a rebel's velocity over its links
-LINK_S = 0.12
-LOOMS_PER_S = 1.0  # fastest expansion of one object, 1/s
-STILL_PXPS = 15.0  # slower circles have no direction
+VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
+STILL_PX = 6.0  # circles that moved less over that time have no direction
 MEMBER_MARGIN_PX = 8.0
-COAST_S = 1.0  # what is this near grows too fast to be followed corner by corner, and must not be forgotten
-LEAST_TTC_S = 0.05
-LEAST_RATE = 1e-3  # 1/s, slower expansions are none
+LEAST_RATE = 1e-6  # 1/s, slower expansions are none
+# Times in shares of the horizon, so that what holds for a rover holds for a snail.
+LOOMS = 4.0  # fastest expansion of one object, over one horizon
+LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
+COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
+LEAST_TTC_SHARE = 0.0125
 
 
 class RebelCircles:
     """Groups rebel edges into circles (C_r) and keeps the circles from frame to frame."""
 
-    def __init__(self, settings: Filter) -> None:
+    def __init__(self, settings: Filter, horizon_s: float) -> None:
         self._settings = settings
+        self._horizon_s = horizon_s
+        self._least_ttc_s = np.float32(LEAST_TTC_SHARE * horizon_s)
         self._ids = Ids()
 
     def predict(self, circles: CircleTable, dt_s: float) -> None:
@@ -39,9 +42,9 @@ class RebelCircles:
         """
         dt = np.float32(dt_s)
         ttc = circles.ttc
-        looming = np.isfinite(ttc) & (ttc > LEAST_TTC_S) & circles.active
+        looming = np.isfinite(ttc) & (ttc > self._least_ttc_s) & circles.active
         tau = np.where(looming, ttc, np.float32(1e6))
-        grow = np.minimum(tau / np.maximum(tau - dt, np.float32(LEAST_TTC_S)), np.float32(1.5))
+        grow = np.minimum(tau / np.maximum(tau - dt, self._least_ttc_s), np.float32(1.5))
         step = circles.speed * dt * grow
         circles.x += step * np.cos(circles.beta)
         circles.y += step * np.sin(circles.beta)
@@ -64,7 +67,7 @@ class RebelCircles:
         pick = np.arange(len(x))
         held = away[pick, nearest] < 0
         row = rows[nearest]
-        rate = np.where(circles.ttc[row] > LEAST_TTC_S, 1 / np.maximum(circles.ttc[row], np.float32(LEAST_TTC_S)), 0)
+        rate = np.where(circles.ttc[row] > self._least_ttc_s, 1 / np.maximum(circles.ttc[row], self._least_ttc_s), 0)
         vx = circles.speed[row] * np.cos(circles.beta[row]) + rate * dx[pick, nearest]
         vy = circles.speed[row] * np.sin(circles.beta[row]) + rate * dy[pick, nearest]
         return np.where(held, row, NO_CIRCLE), vx.astype(np.float32), vy.astype(np.float32)
@@ -79,7 +82,7 @@ class RebelCircles:
             if len(size):
                 updated, evicted = self._meet(edges, circles, rebels, label, size, around)
         missed = np.setdiff1d(live[circles.active[live]], updated)
-        near = np.abs(circles.ttc[missed]) < COAST_S
+        near = np.abs(circles.ttc[missed]) < COAST_SHARE * self._horizon_s
         coasts = near & (circles.trust[missed] >= self._settings.tr_s)
         circles.trust[missed[~coasts]] -= 1
         circles.active &= (circles.ttc > 0) & (circles.trust >= self._settings.tr_cr)
@@ -88,7 +91,7 @@ class RebelCircles:
 
     def _group(self, rebels: Rebels) -> tuple[Rebels, Rows, Rows]:
         """The rebels in groups with support, the group of each, and the groups' sizes."""
-        label = link(rebels.x, rebels.y, rebels.vx, rebels.vy, self._settings)
+        label = link(rebels, self._settings, self._horizon_s)
         _, label, size = np.unique(label, return_inverse=True, return_counts=True)
         big = size >= self._settings.rebel_support
         number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE)[label]
@@ -103,6 +106,7 @@ class RebelCircles:
         members = Members(label, len(size), rebels.x, rebels.y)
         vx, vy = members.mean(rebels.vx), members.mean(rebels.vy)
         beta, speed = np.arctan2(vy, vx), np.hypot(vx, vy)
+        still = np.float32(STILL_PX) / members.mean(rebels.links.elapsed_s)
         radius = members.radius(settings.bs_px)
         odd = size < settings.rebel_share * (size + self._normal_inside(edges, members, radius))
 
@@ -116,7 +120,7 @@ class RebelCircles:
 
         rows = row[known]
         turn = np.abs(wrap(beta[known] - circles.beta[rows]))
-        aligned = turn < settings.eps_beta_circle_rebel_rad + np.arctan2(np.float32(STILL_PXPS), speed[known])
+        aligned = turn < settings.eps_beta_circle_rebel_rad + np.arctan2(still[known], speed[known])
         blend(circles, rows, members, known, settings)
         change = np.where(aligned, np.float32(1), np.float32(-1))
         circles.trust[rows] = change_trust(circles.trust[rows], change, settings.tr_max)
@@ -154,7 +158,7 @@ class RebelCircles:
         range_m = members.mean(links.depth_m / links.elapsed_s)[groups] / np.maximum(expanding, LEAST_RATE)
         speed = around.speed_mps
         rate = np.where(stands, max(speed, 0.0) / range_m, own_expansion(rebels, members)[groups])
-        before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], LEAST_TTC_S), rate)
+        before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], self._least_ttc_s), rate)
         rate = update_position(circles.trust[rows], self._settings.tr_cr, before, rate)
         ttc = np.where(rate > LEAST_RATE, 1 / np.maximum(rate, LEAST_RATE), np.inf)
 
@@ -185,27 +189,28 @@ def own_expansion(rebels: Rebels, members: Members) -> Floats:
     px, py = x - members.mean(x)[label], y - members.mean(y)[label]
     extent2 = np.maximum(members.mean(px * px + py * py), 1)
     rate = members.mean(px * rebels.vx + py * rebels.vy) / extent2
-    sigma = np.float32(VELOCITY_NOISE_PXPS) / np.sqrt(extent2 * members.size)
+    sigma = np.float32(VELOCITY_NOISE_PX) / members.mean(rebels.links.elapsed_s) / np.sqrt(extent2 * members.size)
     return np.where(rate > 2 * sigma, rate, 0).astype(np.float32)
 
 
-def link(x: Floats, y: Floats, vx: Floats, vy: Floats, settings: Filter) -> npt.NDArray[np.intp]:
+def link(rebels: Rebels, settings: Filter, horizon_s: float) -> Rows:
     """Label of each rebel edge's group (eq. EdgeErcompareER, and by place); int (k,), k at most E_r's capacity.
 
     Two rebels are linked when they are near and move in the same direction with a like speed, or differ in velocity
     by no more than the parts of an object that grows in the picture do.
     """
-    dx, dy = x[:, None] - x, y[:, None] - y
-    distance = np.hypot(dx, dy)
+    x, y, vx, vy = rebels.x, rebels.y, rebels.vx, rebels.vy
+    distance = np.hypot(x[:, None] - x, y[:, None] - y)
     difference = np.hypot(vx[:, None] - vx, vy[:, None] - vy)
+    noise = np.float32(VELOCITY_NOISE_PX) / rebels.links.elapsed_s
     speed = np.hypot(vx, vy)
     faster = np.maximum(speed[:, None], speed)
     along = vx[:, None] * vx + vy[:, None] * vy
     together = (along > np.cos(settings.eps_beta_rebel_rad) * speed[:, None] * speed) & (
         difference < np.float32(0.5) * faster
     )
-    looms = difference < np.float32(2 * VELOCITY_NOISE_PXPS) + np.float32(LOOMS_PER_S) * distance
-    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_S) * faster)  # what is near is large
+    looms = difference < noise[:, None] + noise + np.float32(LOOMS / horizon_s) * distance
+    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_SHARE * horizon_s) * faster)
     linked = (distance < reach) & (together | looms)
     label = np.arange(len(x))
     while True:
