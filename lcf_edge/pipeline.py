@@ -20,7 +20,7 @@ from lcf_edge.lens import Lens, Points
 from lcf_edge.recordings import Recording
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
-LEAST_DT_S = 1e-3
+LEAST_DT_S = 5e-3  # of a first frame, or of two with one stamp
 
 Records = np.ndarray[Any, np.dtype[np.void]]
 

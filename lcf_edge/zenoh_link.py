@@ -87,7 +87,8 @@ def scene_key(prefix: str) -> str:
 class ScenePublisher:
     """Puts each scene on ``<prefix>/scene``: CDR, dropped on congestion, express, real-time priority.
 
-    It lives as long as its session. Raises ``PublishError`` when ``publish.prefix`` is no valid key.
+    A liveliness token ``<prefix>/@alive/<robot>`` tells that it is there. It lives as long as its session. Raises
+    ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """
 
     def __init__(self, session: zenoh.Session, publish: config.Publish) -> None:
@@ -96,8 +97,10 @@ class ScenePublisher:
         self._frame_id = publish.frame_id
         # A gid names one publisher: the same for its whole life, different for every other.
         self._gid = hashlib.blake2b(f"{session.zid()}/{self.key}".encode(), digest_size=16).digest()
-        if "*" in self.key or "$" in self.key:
-            raise PublishError(f"publish.prefix: {publish.prefix}: a key to publish on has no wildcards")
+        for name in ("prefix", "robot"):
+            value = getattr(publish, name)
+            if set("*$#?") & set(value) or not value:
+                raise PublishError(f"publish.{name}: {value!r}: a key to publish on has no wildcards")
         try:
             self._publisher = session.declare_publisher(
                 self.key,
@@ -106,6 +109,7 @@ class ScenePublisher:
                 priority=zenoh.Priority.REAL_TIME,
                 express=True,
             )
+            self._alive = session.liveliness().declare_token(f"{publish.prefix}/@alive/{publish.robot}")
         except zenoh.ZError as error:
             raise PublishError(f"publish.prefix: {publish.prefix}: {_reason(str(error))}") from error
 

@@ -1,16 +1,22 @@
 """The Line-Circle filter (Tafrishi & Kandjani 2017): pure, bounded, whole-array.
 
-One step, in reading order (``line_circle_filter``):
+One step, in reading order (``line_circle_filter`` calls them in this order):
 
-``inputs``          what a step takes: the frame's corners and the vehicle's motion since the last frame
-``tables``          what is kept between steps: edges (E_n, E_r), circles (C_n, C_r), ψ; preallocated
-``flow``            where what stands still goes: focus of expansion, flow lines, derotation, key frames
-``line_expert``     corners inside ψ are omitted, the rest is grouped by λ
-``matching``        corners and predicted edges find each other, one to one
-``edge_expert``     the five classes λ*, trust, and the updates of L, V, BL, β, DL
-``rebel_detection`` α: which edges break the flow over three key frames
-``circle_expert``   edges become circles
-``feedback``        trusted normal circles become ψ; circles become λ
+``inputs``           what a step takes: the frame's corners and the vehicle's motion since the last frame
+``tables``           what is kept between steps: edges (E_n, E_r, α), circles (C_n, C_r), ψ; preallocated
+``flow``             directions, flow lines, homographies, key frames
+``situation``        the vehicle at this instant: where it heads in the picture, what it is, how it moves
+``derotation``       step 0: the camera's rotation is taken out of all that is stored
+``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
+``matching``         corners and predicted edges find each other, one to one
+``edge_equations``   the Circle expert's equations for edges: prediction, the five classes λ*, updates, trust
+``edge_expert``      applies them to the table
+``rebel_detection``  what breaks the flow over a chain of key positions, as equations
+``alpha``            applies them: chains become rebel edges, rebels that obey go home
+``circles``          what normal and rebel circles share
+``normal_circles``   C_n from E_n
+``rebel_circles``    C_r from E_r, with cause and time to contact
+``feedback``         trusted normal circles become ψ, and ψ gives way
 """
 
 from lcf_edge.filter.inputs import Corners, Motion

@@ -32,6 +32,7 @@ def derotate(
         stop = start + len(to_x)
         to_x[:], to_y[:] = x[start:stop], y[start:stop]
         start = stop
+    edges.beta[:n] += roll
     for table in circles:
         table.beta += roll
 

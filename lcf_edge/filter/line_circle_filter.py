@@ -146,7 +146,7 @@ class LineCircleFilter:
         """Steps 4 and 5: circles, ψ; answers evictions."""
         edges = self.edges
         ignored = self._feedback.ignored(self.psi, self.normal)
-        evicted = self._normal_circles.update(edges, self.normal, around.focus, ignored)
+        evicted = self._normal_circles.update(edges, self.normal, around, ignored)
         evicted += self._rebel_circles.update(edges, self.rebel, rebels, around)
         ready = self._feedback.ready(self.psi, self.normal)
         passing = self._normal_circles.passing_by(self.normal, around)

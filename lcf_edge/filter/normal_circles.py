@@ -66,12 +66,13 @@ class NormalCircles:
         beside_m = np.minimum(np.abs(right_m), off_path_m) - circles.radius / focal * range_m  # a turn may end
         return np.asarray((circles.expansion > 0) & (beside_m > PASSING_WIDTHS * around.half_width_m))
 
-    def update(self, edges: EdgeTable, circles: CircleTable, focus: tuple[float, float], ignored: Mask) -> int:
+    def update(self, edges: EdgeTable, circles: CircleTable, around: Situation, ignored: Mask) -> int:
         """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); answers evictions.
 
-        ``focus``: O, px. ``ignored``: bool (capacity,), circles under an active ψ, which are only predicted.
+        ``ignored``: bool (capacity,), circles under an active ψ, which are only predicted.
         """
-        flowing = self._flowing(edges, focus)
+        focus = around.focus
+        flowing = self._flowing(edges, around)
         owner, involved = self._involve(flowing, edges.circle[flowing.rows], circles, ignored)
         edges.circle[flowing.rows] = owner
         self._compare(flowing, owner, involved, circles, ignored)
@@ -83,14 +84,18 @@ class NormalCircles:
         self._direct(circles, focus)
         return evicted
 
-    def _flowing(self, edges: EdgeTable, focus: tuple[float, float]) -> Flowing:
-        n = edges.count
+    def _flowing(self, edges: EdgeTable, around: Situation) -> Flowing:
+        """The edges that may be grouped; eq. EdgeEncompare's |V_e| ≤ ε_V·V_ν is held to the depth of the scene."""
+        settings, n, focus = self._settings, edges.count, around.focus
         free = ~edges.rebel[:n] & ~edges.held[:n] & (edges.links[:n] == 0)
-        rows = np.flatnonzero(free & (edges.trust[:n] >= self._settings.tr_s))
+        rows = np.flatnonzero(free & (edges.trust[:n] >= settings.tr_s))
         x, y = edges.x[rows], edges.y[rows]
         dx, dy = x - np.float32(focus[0]), y - np.float32(focus[1])
         r = np.maximum(np.hypot(dx, dy), np.float32(1))
-        return Flowing(rows, x, y, r, dx / r, dy / r, edges.speed[rows] / r)
+        flowing = Flowing(rows, x, y, r, dx / r, dy / r, edges.speed[rows] / r)
+        fastest = settings.eps_v * around.scene_flow_pxps / around.pinhole.focal
+        noise = np.float32(SPEED_NOISE_PX / self._dt_s) / r
+        return flowing.take(np.flatnonzero(np.abs(flowing.expansion) <= fastest + noise))
 
     def _involve(self, flowing: Flowing, owner: Rows, circles: CircleTable, ignored: Mask) -> tuple[Rows, Mask]:
         """Circle of each edge, -1: none; and the circles that most of their edges still lie in (percentinvolve)."""
@@ -132,10 +137,12 @@ class NormalCircles:
         live = circles.active & ~ignored
         updated = live & involved & (members.size >= settings.circle_support)
         turn = np.abs(wrap(np.arctan2(mean_sin, mean_cos) - circles.beta))
-        aligned = updated & (turn < settings.eps_beta_rad / 5)
+        mean_expansion = members.mean(edges.expansion)
+        like = np.abs(mean_expansion) <= 10 * settings.eps_v * np.abs(circles.expansion)
+        aligned = updated & like & (turn < settings.eps_beta_rad / 5)
         rows = np.flatnonzero(updated)
         circles.expansion[rows] = update_position(
-            circles.trust[rows], settings.tr_cr, circles.expansion[rows], members.mean(edges.expansion)[rows]
+            circles.trust[rows], settings.tr_cr, circles.expansion[rows], mean_expansion[rows]
         )
         blend(circles, rows, members, rows, settings)
         circles.corr[rows] = np.hypot(mean_cos, mean_sin)[rows]

@@ -17,6 +17,7 @@ from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
+LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
 MEMBER_MARGIN_PX = 8.0
 LEAST_RATE = 1e-6  # 1/s, slower expansions are none
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
@@ -78,7 +79,7 @@ class RebelCircles:
         updated: Rows = np.empty(0, np.intp)
         evicted = 0
         if rebels is not None and len(rebels.rows):
-            rebels, label, size = self._group(rebels)
+            rebels, label, size = self._group(rebels, around)
             if len(size):
                 updated, evicted = self._meet(edges, circles, rebels, label, size, around)
         missed = np.setdiff1d(live[circles.active[live]], updated)
@@ -89,9 +90,9 @@ class RebelCircles:
         release(edges, circles, rebel=True)
         return evicted
 
-    def _group(self, rebels: Rebels) -> tuple[Rebels, Rows, Rows]:
+    def _group(self, rebels: Rebels, around: Situation) -> tuple[Rebels, Rows, Rows]:
         """The rebels in groups with support, the group of each, and the groups' sizes."""
-        label = link(rebels, self._settings, self._horizon_s)
+        label = link(rebels, self._settings, around)
         _, label, size = np.unique(label, return_inverse=True, return_counts=True)
         big = size >= self._settings.rebel_support
         number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE)[label]
@@ -120,7 +121,8 @@ class RebelCircles:
 
         rows = row[known]
         turn = np.abs(wrap(beta[known] - circles.beta[rows]))
-        aligned = turn < settings.eps_beta_circle_rebel_rad + np.arctan2(still[known], speed[known])
+        like = speed[known] <= circles.speed[rows] + settings.eps_v_circle_rebel * around.scene_flow_pxps
+        aligned = like & (turn < settings.eps_beta_circle_rebel_rad + np.arctan2(still[known], speed[known]))
         blend(circles, rows, members, known, settings)
         change = np.where(aligned, np.float32(1), np.float32(-1))
         circles.trust[rows] = change_trust(circles.trust[rows], change, settings.tr_max)
@@ -193,7 +195,7 @@ def own_expansion(rebels: Rebels, members: Members) -> Floats:
     return np.where(rate > 2 * sigma, rate, 0).astype(np.float32)
 
 
-def link(rebels: Rebels, settings: Filter, horizon_s: float) -> Rows:
+def link(rebels: Rebels, settings: Filter, around: Situation) -> Rows:
     """Label of each rebel edge's group (eq. EdgeErcompareER, and by place); int (k,), k at most E_r's capacity.
 
     Two rebels are linked when they are near and move in the same direction with a like speed, or differ in velocity
@@ -206,11 +208,11 @@ def link(rebels: Rebels, settings: Filter, horizon_s: float) -> Rows:
     speed = np.hypot(vx, vy)
     faster = np.maximum(speed[:, None], speed)
     along = vx[:, None] * vx + vy[:, None] * vy
-    together = (along > np.cos(settings.eps_beta_rebel_rad) * speed[:, None] * speed) & (
-        difference < np.float32(0.5) * faster
-    )
-    looms = difference < noise[:, None] + noise + np.float32(LOOMS / horizon_s) * distance
-    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_SHARE * horizon_s) * faster)
+    together = along > np.cos(settings.eps_beta_rebel_rad) * speed[:, None] * speed
+    together &= difference < np.float32(LIKE_SPEED) * faster
+    together &= faster <= np.minimum(speed[:, None], speed) + settings.eps_v_rebel * around.scene_flow_pxps
+    looms = difference < noise[:, None] + noise + np.float32(LOOMS / around.horizon_s) * distance
+    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_SHARE * around.horizon_s) * faster)
     linked = (distance < reach) & (together | looms)
     label = np.arange(len(x))
     while True:

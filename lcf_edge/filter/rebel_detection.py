@@ -139,6 +139,8 @@ def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
         ground_mu = np.zeros_like(mu)
     short = r * least_mu - outward
     over = outward - r * travelled / np.float32(NEAREST_M)
+    if not np.isfinite(around.speed_mps):  # then ΔZ has a direction and no size: only what leaves its line moves
+        short, over = np.zeros_like(short), np.zeros_like(over)
     tolerance = around.delta_px + np.float32(around.focus_sigma_px) * np.abs(mu) + links.sigma_px
     mover = (np.abs(drift) > tolerance) | (short > tolerance) | (over > tolerance)
 

@@ -18,7 +18,9 @@ YAW_MEMORY_S = 0.3
 class Situation:
     """``focus``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps`` NaN: unknown.
 
-    ``noise_px``: 1 sigma of an edge's position. ``delta_px``: δ over a chain of key frames.
+    ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal length from
+    O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``noise_px``: 1 sigma of
+    an edge's position. ``delta_px``: δ over a chain of key frames.
     """
 
     pinhole: Pinhole
@@ -30,6 +32,7 @@ class Situation:
     horizon_s: float
     speed_mps: float
     yaw_rate_radps: float
+    scene_flow_pxps: float
     noise_px: float
     delta_px: float
     focus_sigma_px: float
@@ -75,7 +78,7 @@ class Heading:
 def situation(config: Config, pinhole: Pinhole, heading: Heading, motion: Motion) -> Situation:
     """What the experts need to know about this frame."""
     settings, vehicle = config.filter, config.vehicle
-    focus = heading.focus
+    focus, speed = heading.focus, motion.speed_mps
     return Situation(
         pinhole=pinhole,
         focus=focus,
@@ -84,8 +87,9 @@ def situation(config: Config, pinhole: Pinhole, heading: Heading, motion: Motion
         half_width_m=vehicle.half_width_m,
         height_m=vehicle.height_m,
         horizon_s=vehicle.horizon_s,
-        speed_mps=motion.speed_mps,
+        speed_mps=speed,
         yaw_rate_radps=motion.yaw_rate_radps,
+        scene_flow_pxps=abs(speed) * pinhole.focal / settings.scene_depth_m if math.isfinite(speed) else math.inf,
         noise_px=settings.edge_noise_px,
         delta_px=settings.delta_rebel_px,
         focus_sigma_px=settings.focus_sigma_px,

@@ -1,0 +1,92 @@
+"""Every command and every piece of Python in the documents runs."""
+
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from lcf_edge.command_line import main
+from lcf_edge.config import Publish, Zenoh, load
+from lcf_edge.pipeline import run
+from lcf_edge.recordings import open_recording
+from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene
+from lcf_edge.zenoh_link import ScenePublisher, open_session
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
+USUAL_ENDPOINT = "tcp/127.0.0.1:7447"
+PATIENCE_S = 60.0
+
+Blocks = Callable[[str, str], list[str]]
+
+
+def commands(document: str) -> list[str]:
+    text = (ROOT / document).read_text(encoding="utf-8")
+    return [line for block in re.findall(r"^```sh\n(.*?)^```$", text, re.M | re.S) for line in block.splitlines()]
+
+
+COMMANDS = sorted({command for document in DOCUMENTS for command in commands(document)})
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith("lcf-edge ")], ids=str)
+def test_the_commands_run(place: Path, monkeypatch: pytest.MonkeyPatch, endpoint: str, command: str) -> None:
+    monkeypatch.chdir(place)
+    _, *arguments = shlex.split(command)
+    if "--publish" in arguments:
+        arguments += ["--set", f'zenoh.listen=["{endpoint}"]']
+    assert main(arguments) == 0
+
+
+@pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
+@pytest.mark.parametrize("command", [command for command in COMMANDS if not command.startswith("lcf-edge ")])
+def test_what_else_is_typed_is_a_target_of_make(command: str) -> None:
+    make, target = shlex.split(command)
+    done = subprocess.run([make, "--dry-run", target], cwd=ROOT, check=True, capture_output=True, text=True)
+    assert {"demo": "lcf-edge demo --out demo-out", "test": "-m pytest"}[target] in done.stdout
+
+
+def first_line(code: str, endpoint: str, publish: Callable[[ScenePublisher], object]) -> str:
+    """What a subscriber prints first."""
+    command = (sys.executable, "-u", "-c", code.replace(USUAL_ENDPOINT, endpoint))
+    with (
+        open_session(Zenoh(listen=[endpoint])) as session,
+        subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as subscriber,
+    ):
+        publisher = ScenePublisher(session, Publish())
+        try:
+            assert publisher.wait_for_subscriber(PATIENCE_S)
+            publish(publisher)
+            assert subscriber.stdout
+            return subscriber.stdout.readline()
+        finally:
+            subscriber.kill()
+
+
+def test_the_subscriber_tells_what_the_demo_finds(blocks: Blocks, place: Path, endpoint: str) -> None:
+    (code,) = blocks("README.md", "python")
+    assert USUAL_ENDPOINT in code
+    config = load(place / "demo-out/config.toml")
+
+    def publish(publisher: ScenePublisher) -> None:
+        for _, outcome in run(open_recording(place / "demo-out/recording", config), config):
+            publisher.put(outcome.scene)
+            if (outcome.scene.circles["kind"] == Kind.REBEL).any():
+                break
+
+    line = first_line(code, endpoint, publish)
+    assert re.fullmatch(r"\d+: (crossing|incoming|leading) at \(\d+, \d+\) px, contact in (\d+\.\d|inf) s\n", line)
+
+
+def test_a_subscriber_needs_no_more_than_numpy_and_zenoh(blocks: Blocks, endpoint: str) -> None:
+    code = "\n".join(blocks("docs/wire-format.md", "python"))
+    assert "lcf_edge" not in code
+    circles = np.zeros(2, CIRCLE)
+    circles["kind"], circles["x"] = (0, 1), (1.5, 2.5)
+    scene = Scene(1_700_000_000_000_000_001, 7, 640, 480, 1.5, circles, np.zeros(1, PSI_REGION))
+    assert first_line(code, endpoint, lambda publisher: publisher.put(scene)) == "7 [(0, 2.5, 0., 0.)]\n"

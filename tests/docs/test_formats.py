@@ -1,0 +1,100 @@
+"""Result lines, options and the wire format are as the documents say."""
+
+import json
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcf_edge.cdr import encode_scene
+from lcf_edge.command_line import main
+from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Shape
+from lcf_edge.sinks.results import encode_line
+from lcf_edge.zenoh_link import ATTACHMENT, SCENE_ENCODING
+
+ROOT = Path(__file__).parents[2]
+CDR_TYPES = {"uint8": "u1", "uint16": "<u2", "uint32": "<u4", "float32": "<f4"}
+
+Text = Callable[[str], str]
+Blocks = Callable[[str, str], list[str]]
+Rows = Callable[[str, str], list[list[str]]]
+
+
+def scene(circles: int, regions: int) -> Scene:
+    """Numbers that differ from field to field and from row to row."""
+    random = np.random.default_rng(1)
+    tables = np.zeros(circles, CIRCLE), np.zeros(regions, PSI_REGION)
+    for table in tables:
+        for name in table.dtype.names or ():
+            table[name] = random.integers(1, 200, len(table))
+    return Scene(1_700_000_000_123_456_789, 41, 640, 480, 1.5, *tables)
+
+
+def paths(value: Any, prefix: str = "") -> Iterator[str]:
+    """Dotted names of the fields of a result line; those of a list's items are under the list's name."""
+    for item in value if isinstance(value, list) else [value]:
+        for key, inner in item.items():
+            yield prefix + key
+            if isinstance(inner, dict) or (isinstance(inner, list) and inner and isinstance(inner[0], dict)):
+                yield from paths(inner, f"{prefix}{key}.")
+
+
+def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
+    known = scene(1, 2)
+    known.circles["kind"], known.circles["cause"] = Kind.REBEL, 1
+    known.psi["shape"] = Shape.CIRCLE, Shape.RECTANGLE
+    written = set(paths(json.loads(encode_line(known))))
+    (example,) = blocks("docs/replay.md", "json")
+    assert set(paths(json.loads(example))) == written
+    listed = {name for row in rows("docs/replay.md", "## Result lines") for name in re.findall(r"`([\w.]+)`", row[0])}
+    assert listed | {"sizes", "timing_us"} == written
+
+
+def test_notes_of_a_result_line(rows: Rows) -> None:
+    sources = "".join(
+        (ROOT / "lcf_edge" / name).read_text(encoding="utf-8") for name in ("ego_motion.py", "pipeline.py")
+    )
+    noted = set(re.findall(r'notes\.append\("([^"]+)"\)|\*ego\.notes, "([^"]+)"', sources))
+    table = rows("docs/replay.md", "### Notes")
+    assert {row[0].strip("`") for row in table} == {first or second for first, second in noted}
+
+
+def test_options_of_replay(rows: Rows, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["replay", "--help"])
+    offered = set(re.findall(r"(?<![\w-])(--?\w+)", capsys.readouterr().out))
+    listed = {option for row in rows("docs/replay.md", "## Options") for option in re.findall(r"`(--?\w+)", row[0])}
+    assert listed == offered - {"-h", "--help"}
+
+
+@given(frame_id=st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=12), n=st.integers(0, 3))
+def test_the_wire_format_is_decoded_as_written(frame_id: str, n: int) -> None:
+    text = (ROOT / "docs/wire-format.md").read_text(encoding="utf-8")
+    names: dict[str, Any] = {}
+    exec(re.findall(r"```python\n(.*?)```", text, re.S)[0], names)
+    sent = scene(n, 3 - n)
+    stamp_ns, seq, size, speed, circles, psi = names["decode"](encode_scene(sent, frame_id))
+    assert (stamp_ns, seq, size, speed) == (sent.stamp_ns, sent.seq, (640, 480), 1.5)
+    for got, wanted in ((circles, sent.circles), (psi, sent.psi)):
+        assert all(np.array_equal(got[name], wanted[name]) for name in wanted.dtype.names or ())
+
+
+@pytest.mark.parametrize(("message", "dtype"), [("Circle", CIRCLE), ("PsiRegion", PSI_REGION)])
+def test_messages_are_the_records(text: Text, message: str, dtype: np.dtype[np.void]) -> None:
+    heading = re.search(rf"# lcf_msgs/msg/{message}, (\d+) bytes\n((?:\w+ \w+.*\n)+)", text("docs/wire-format.md"))
+    assert heading
+    fields = [line.split()[:2] for line in heading[2].splitlines()]
+    assert int(heading[1]) == dtype.itemsize
+    assert [name for _, name in fields] == list(dtype.names or ())
+    assert [np.dtype(CDR_TYPES[kind]) for kind, _ in fields] == [dtype[name] for _, name in fields]
+
+
+def test_what_goes_with_a_payload(text: Text) -> None:
+    document = text("docs/wire-format.md")
+    assert f"`{SCENE_ENCODING}`" in document
+    assert f"{ATTACHMENT.size} bytes, as rmw_zenoh has it" in document
