@@ -7,6 +7,7 @@ import numpy as np
 
 from lcf_edge.config import Config
 from lcf_edge.filter.alpha import Alpha
+from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.derotation import derotate, missing_rotation
 from lcf_edge.filter.edge_equations import Estimate
 from lcf_edge.filter.edge_expert import EdgeExpert
@@ -57,8 +58,9 @@ class LineCircleFilter:
         self._line_expert = LineExpert(settings, self._matcher, self.edges, self.psi)
         self._edge_expert = EdgeExpert(settings, self._matcher, self.edges, self.normal)
         self._alpha = Alpha(settings, self.edges, self._keys)
-        self._normal_circles = NormalCircles(settings)
-        self._rebel_circles = RebelCircles(settings, config.vehicle.horizon_s)
+        ids = Ids()  # one count, so that an id names one circle of either kind
+        self._normal_circles = NormalCircles(settings, ids)
+        self._rebel_circles = RebelCircles(settings, config.vehicle.horizon_s, ids)
         self._feedback = Feedback(settings, self._matcher)
         self._missing_px = settings.leap_px  # by which the gyro lately missed the rotation
 

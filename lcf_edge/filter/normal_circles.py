@@ -41,9 +41,9 @@ class Flowing:
 class NormalCircles:
     """Groups normal edges into circles (C_n) and keeps the circles from frame to frame."""
 
-    def __init__(self, settings: Filter) -> None:
+    def __init__(self, settings: Filter, ids: Ids) -> None:
         self._settings = settings
-        self._ids = Ids()
+        self._ids = ids
         self._dt_s = 1.0
 
     def predict(self, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:

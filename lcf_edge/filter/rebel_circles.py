@@ -19,6 +19,7 @@ VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over wh
 STILL_PX = 6.0  # circles that moved less over that time have no direction
 LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
 MEMBER_MARGIN_PX = 8.0
+LEAST_RANGE_M = 0.01
 LEAST_RATE = 1e-6  # 1/s, slower expansions are none
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
 LOOMS = 4.0  # fastest expansion of one object, over one horizon
@@ -30,11 +31,11 @@ LEAST_TTC_SHARE = 0.0125
 class RebelCircles:
     """Groups rebel edges into circles (C_r) and keeps the circles from frame to frame."""
 
-    def __init__(self, settings: Filter, horizon_s: float) -> None:
+    def __init__(self, settings: Filter, horizon_s: float, ids: Ids) -> None:
         self._settings = settings
         self._horizon_s = horizon_s
         self._least_ttc_s = np.float32(LEAST_TTC_SHARE * horizon_s)
-        self._ids = Ids()
+        self._ids = ids
 
     def predict(self, circles: CircleTable, dt_s: float) -> None:
         """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
@@ -159,7 +160,8 @@ class RebelCircles:
         expanding = standing_expansion(rebels, members)[groups]
         range_m = members.mean(links.depth_m / links.elapsed_s)[groups] / np.maximum(expanding, LEAST_RATE)
         speed = around.speed_mps
-        rate = np.where(stands, max(speed, 0.0) / range_m, own_expansion(rebels, members)[groups])
+        closing = max(speed, 0.0) / np.maximum(range_m, LEAST_RANGE_M) if math.isfinite(speed) else expanding
+        rate = np.where(stands, closing, own_expansion(rebels, members)[groups])
         before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], self._least_ttc_s), rate)
         rate = update_position(circles.trust[rows], self._settings.tr_cr, before, rate)
         ttc = np.where(rate > LEAST_RATE, 1 / np.maximum(rate, LEAST_RATE), np.inf)
