@@ -19,6 +19,7 @@ VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over wh
 STILL_PX = 6.0  # circles that moved less over that time have no direction
 LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
 MEMBER_MARGIN_PX = 8.0
+SIDEWAYS = 0.2  # what leads moves to the side with no more than this share of the vehicle's speed
 LEAST_RANGE_M = 0.01
 LEAST_RATE = 1e-6  # 1/s, slower expansions are none
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
@@ -174,6 +175,7 @@ class RebelCircles:
         if not math.isfinite(speed):
             range_m, lateral = np.full_like(range_m, np.nan), np.full_like(lateral, np.nan)
         inwards = members.mean(verdict.mover & (verdict.short > np.abs(verdict.drift)))[groups] > 0.5
+        inwards &= ~(np.abs(on_ground_m * drift) > SIDEWAYS * abs(speed))  # who walks in from the side crosses
         meets = stands | ((ttc < around.horizon_s) & ~(np.abs(lateral) > around.half_width_m))
         circles.cause[rows] = np.where(meets, Cause.INCOMING, np.where(inwards, Cause.LEADING, Cause.CROSSING))
         circles.ttc[rows], circles.lateral[rows] = ttc, lateral
