@@ -152,10 +152,6 @@ class Pipeline:
         rebel = edges.rebel[:n]
         place = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
         centres = self._lens.distort(np.stack([groups.x, groups.y], axis=1))
-        group_of = np.full(self._config.memory.circles_normal, -1)
-        named = groups.row >= 0
-        group_of[groups.row[named]] = np.flatnonzero(named)
-        circle = edges.circle[:n][~rebel]
         focus = self._lens.distort(np.array([self._filter.focus], np.float32))[0]
         return View(
             corners=pixel,
@@ -163,7 +159,7 @@ class Pipeline:
             edges=place[~rebel],
             rebels=place[rebel],
             groups=np.concatenate([centres, groups.bs[:, None]], axis=1),
-            edge_group=np.where(circle >= 0, group_of[np.maximum(circle, 0)], -1),
+            edge_group=groups.assign(edges.x[:n][~rebel], edges.y[:n][~rebel]).astype(np.intp),
             focus=focus,
         )
 

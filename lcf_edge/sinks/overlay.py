@@ -76,7 +76,7 @@ def _line_expert(panel: Picture, scene: Scene, view: View) -> None:
     _caption(
         panel,
         (
-            (f"frame {scene.seq}  {scene.stamp_ns / 1e9:.2f} s  {speed}", WHITE),
+            (f"frame {scene.seq}  {scene.stamp_ns / 1e9 % 1000:.2f} s  {speed}", WHITE),
             (f"{sizes.corners} corners", YELLOW),
             (f"{sizes.omitted} omitted", LIGHT_RED),
             (f"{sizes.edges_normal} edges", BLUE),
