@@ -23,7 +23,7 @@ def derotate(
     """H = K·R·K⁻¹ on every stored image position; own directions turn with the picture."""
     h = pinhole.homography(rotation)
     n = edges.count
-    roll = np.float32(math.atan2(h[1, 0], h[0, 0]))
+    roll = np.float32(math.atan2(rotation[1, 0], rotation[0, 0]))
     places = [(edges.x[:n], edges.y[:n]), (edges.origin_x[:n], edges.origin_y[:n])]
     places += [(table.x, table.y) for table in (*circles, psi)]
     x, y = carry(h, np.concatenate([x for x, _ in places]), np.concatenate([y for _, y in places]))

@@ -155,5 +155,7 @@ class LineExpert:
         )
         end_surprised(psi, of_edge[held], seen, of_corner[inside], expected)
         edges.held[:n] = (of_edge != NO_CIRCLE) & psi.active[of_edge]
-        edges.born_key[:n][edges.held[:n]] = key_number  # what is only predicted is no history
+        # What is only predicted is no history, and is trusted like its circle, so that its corner soon corrects it.
+        edges.born_key[:n][edges.held[:n]] = key_number
+        edges.trust[:n][edges.held[:n]] = np.minimum(edges.trust[:n][edges.held[:n]], self._settings.tr_s)
         return np.asarray((of_corner != NO_CIRCLE) & psi.active[of_corner])

@@ -17,6 +17,7 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
+MOST_ASTRAY = 0.5  # share of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
 GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
@@ -141,7 +142,8 @@ def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
     over = outward - r * travelled / np.float32(NEAREST_M)
     if not np.isfinite(around.speed_mps):  # then ΔZ has a direction and no size: only what leaves its line moves
         short, over = np.zeros_like(short), np.zeros_like(over)
-    tolerance = around.delta_px + np.float32(around.focus_sigma_px) * np.abs(mu) + links.sigma_px
+    astray = np.float32(around.focus_sigma_px) * np.minimum(np.abs(mu), np.float32(MOST_ASTRAY))
+    tolerance = around.delta_px + astray + links.sigma_px
     mover = (np.abs(drift) > tolerance) | (short > tolerance) | (over > tolerance)
 
     closing = np.maximum(mu, np.float32(1e-6))
