@@ -16,7 +16,7 @@ RING_PX = (
     (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
 )  # fmt: skip
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
-THRESHOLDS = (8, 90)
+THRESHOLDS = (13, 90)
 
 
 class CornerDetector:

@@ -42,7 +42,9 @@ class Alpha:
             moved_px = float(np.median(np.abs(edges.speed[:n]))) * keys.since_s
             if moved_px < settings.key_motion_px:
                 return False
+        held = edges.held[:n]
         slot = keys.mark()
+        edges.born_key[:n][held] = keys.number  # where ψ had it predicted is no key position
         edges.key_x[slot, :n] = edges.x[:n]
         edges.key_y[slot, :n] = edges.y[:n]
         return True

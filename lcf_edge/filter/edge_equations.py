@@ -59,7 +59,8 @@ def classify(
     delta_px: Floats | float,
     eps_beta_rad: float,
 ) -> npt.NDArray[np.int8]:
-    """λ* class of each pair of an edge and a corner, int8 (n,), in the order 2, 3, 1, 5, 4.
+    """λ* class of each pair of an edge and a corner, int8 (n,), in the order 2, 3, 5, 1, 4: λ*5
+    is a part of λ*1 and would never come after it.
 
     ``x``, ``y``: L, where the edge was (derotated), px. ``bl``: BL, px. ``delta_px``: δ. All float32 (n,).
     Speed agrees when the corner lies within half of BL of L' along the line, direction when the corner moved along

@@ -30,6 +30,7 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
 LEAST_CORR = 0.25
+SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
 DEVIATION_MOST_RAD = 0.5  # DL is bounded
 ORIGIN_LEAST_PX = 2.0  # an edge nearer to its origin has no direction from it
 
@@ -155,10 +156,11 @@ class EdgeExpert:
         circle = edges.circle[rows]
         grouped = (circle >= 0) & ~edges.rebel[rows]
         corr = np.where(grouped, np.maximum(self._normal.corr.take(circle, mode="clip"), np.float32(LEAST_CORR)), 1)
-        edges.bl[rows] = update_gate(
-            edges.bl[rows], edges.speed[rows], at.speed, corr, dt_s, settings.bl_min_px, settings.bl0_px
-        )
-        rows = rows[edges.rebel[rows] | (edges.links[rows] > 0)]
+        gate = update_gate(edges.bl[rows], edges.speed[rows], at.speed, corr, dt_s, settings.bl_min_px, settings.bl0_px)
+        own_way = edges.rebel[rows] | (edges.links[rows] > 0)
+        swing = np.float32(SWING_SHARE * dt_s) * np.abs(edges.speed[rows])  # what comes near accelerates in the picture
+        edges.bl[rows] = np.where(own_way, np.maximum(gate, swing), gate)
+        rows = rows[own_way]
         dx, dy = edges.x[rows] - edges.origin_x[rows], edges.y[rows] - edges.origin_y[rows]
         before = edges.beta[rows]
         beta = np.where(np.hypot(dx, dy) > ORIGIN_LEAST_PX, np.arctan2(dy, dx), before)

@@ -1,0 +1,120 @@
+"""Step 0: the rotation is taken out of everything; what the gyro missed, the flow tells."""
+
+import math
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcf_edge.filter.derotation import derotate, missing_rotation
+from lcf_edge.filter.flow import Pinhole, carry, line_distance
+from lcf_edge.filter.tables import CircleTable, EdgeTable, PsiTable
+
+PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
+SIGMA_RAD = 0.01
+
+angle = st.floats(-0.006, 0.006)
+
+
+def rotation_of(axis: tuple[float, float, float]) -> npt.NDArray[np.float64]:
+    return np.asarray(cv2.Rodrigues(np.array(axis))[0])
+
+
+def spread(number: int, seed: int = 0) -> npt.NDArray[np.float32]:
+    """(2, n) places in the picture."""
+    return np.random.default_rng(seed).uniform([[10], [10]], [[630], [470]], (2, number)).astype(np.float32)
+
+
+# Everything stored
+
+
+def test_every_stored_position_is_carried() -> None:
+    edges, circles, psi = EdgeTable(20, 10, 10), (CircleTable(5), CircleTable(3)), PsiTable(4)
+    edges.append(20)
+    before = spread(20)
+    edges.x[:20], edges.y[:20] = before
+    edges.origin_x[:20], edges.origin_y[:20] = before[::-1]
+    for table in (*circles, psi):
+        table.x[:], table.y[:] = before[:, : table.capacity]
+    rotation = rotation_of((0.0, 0.0, 0.1)) @ rotation_of((0.01, -0.02, 0.0))
+    derotate(PINHOLE, rotation, edges, circles, psi)
+
+    after = np.stack(carry(PINHOLE.homography(rotation), *before))
+    assert np.allclose([edges.x[:20], edges.y[:20]], after, atol=1e-3)
+    origins = np.stack(carry(PINHOLE.homography(rotation), *before[::-1]))
+    assert np.allclose([edges.origin_x[:20], edges.origin_y[:20]], origins, atol=1e-3)
+    for table in (*circles, psi):
+        assert np.allclose([table.x, table.y], after[:, : table.capacity], atol=1e-3)
+
+
+@pytest.mark.parametrize(
+    ("axis", "roll"),
+    [
+        ((0, 0, 0.1), 0.1),
+        ((0, 0, -0.3), -0.3),
+        ((0.04, 0, 0), 0),
+        ((0, 0.04, 0), 0),
+    ],
+)
+def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float, float, float], roll: float) -> None:
+    """As the middle of the picture does."""
+    edges, circles = EdgeTable(4, 2, 2), (CircleTable(3), CircleTable(3))
+    edges.append(4)
+    edges.beta[:4] = 0.5
+    for table in circles:
+        table.beta[:] = -1.0
+    derotate(PINHOLE, rotation_of(axis), edges, circles, PsiTable(2))
+    assert edges.beta[:4] == pytest.approx(0.5 + roll, abs=2e-3)
+    for table in circles:
+        assert table.beta == pytest.approx(-1.0 + roll, abs=2e-3)
+
+
+# What the gyro missed
+
+
+def off_the_lines(
+    missed: npt.NDArray[np.float64], outliers: float, number: int = 200, seed: int = 0
+) -> tuple[npt.NDArray[np.float32], ...]:
+    """x, y, px off the flow line, β: edges along their lines at any depth, corners where ``missed`` puts them."""
+    random = np.random.default_rng(seed)
+    x, y = spread(number, seed)
+    beta = np.arctan2(y - PINHOLE.cy, x - PINHOLE.cx).astype(np.float32)
+    along = random.uniform(-6, 6, number)  # the depth is not known
+    seen_x, seen_y = carry(PINHOLE.homography(missed), x + along * np.cos(beta), y + along * np.sin(beta))
+    noise = random.normal(0, 0.4, (2, number))
+    odd = random.random(number) < outliers
+    noise[:, odd] += random.choice([-1, 1], (2, np.count_nonzero(odd))) * random.uniform(8, 30)
+    seen_x, seen_y = seen_x + noise[0], seen_y + noise[1]
+    off = line_distance(seen_x - x, seen_y - y, beta)
+    return tuple(np.asarray(part, np.float32) for part in (seen_x, seen_y, off, beta))
+
+
+@given(st.tuples(angle, angle, angle), st.integers(0, 1000))
+def test_a_small_rotation_is_recovered_although_a_third_moves(axis: tuple[float, float, float], seed: int) -> None:
+    missed = rotation_of(axis)
+    found, sigma_rad = missing_rotation(PINHOLE, *off_the_lines(missed, 0.3, seed=seed), SIGMA_RAD)
+    assert found == pytest.approx(missed, abs=1.2e-3)
+    assert 0 < sigma_rad < 0.1 * SIGMA_RAD
+
+
+def test_edges_on_their_lines_ask_for_no_rotation() -> None:
+    found, _ = missing_rotation(PINHOLE, *off_the_lines(np.eye(3), 0.0), SIGMA_RAD)
+    assert found == pytest.approx(np.eye(3), abs=2e-4)
+
+
+def test_a_gyro_that_is_sure_is_believed() -> None:
+    told = off_the_lines(rotation_of((0.004, 0.004, 0.0)), 0.0)
+    found, sigma_rad = missing_rotation(PINHOLE, *told, 1e-6)
+    assert found == pytest.approx(np.eye(3), abs=1e-5)
+    assert sigma_rad == pytest.approx(1e-6, rel=0.1)
+
+
+def test_more_edges_leave_less_uncertain() -> None:
+    sigmas = [
+        missing_rotation(PINHOLE, *off_the_lines(np.eye(3), 0.0, number), SIGMA_RAD)[1] for number in (25, 100, 200)
+    ]
+    assert sigmas == sorted(sigmas, reverse=True)
+    assert all(math.isfinite(sigma) for sigma in sigmas)

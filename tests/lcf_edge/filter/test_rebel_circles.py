@@ -1,0 +1,294 @@
+"""C_r: rebels that go together, why they rebel, when and where they will be met."""
+
+import math
+from collections.abc import Callable
+from dataclasses import fields, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Config, Filter, Vehicle
+from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.rebel_circles import RebelCircles, link
+from lcf_edge.filter.rebel_detection import Links, Rebels, judge
+from lcf_edge.filter.tables import CircleTable, EdgeTable
+from lcf_edge.records import Cause
+
+SETTINGS = Filter()
+TR_CR, TR_S, TR_MAX = SETTINGS.tr_cr, SETTINGS.tr_s, SETTINGS.tr_max
+NEWBORN = 0.5 * (TR_CR + TR_S)
+HORIZON_S = 4.0
+SEEN_S = 0.4
+
+Drive = Callable[..., Any]
+Landmarks = Callable[..., npt.NDArray[np.float64]]
+Situation = Callable[..., Any]
+Floats = npt.NDArray[np.float32]
+
+
+def rebels_at(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> Rebels:
+    """Rebel edges that moved so for a while, px and px/s."""
+    one = np.ones(len(x), np.float32)
+    focus_x, focus_y, depth_m = (one * value for value in (*around.focus, SEEN_S * around.speed_mps))
+    links = Links(x - SEEN_S * vx, y - SEEN_S * vy, focus_x, focus_y, depth_m, SEEN_S * one, 0 * one)
+    links = Links(*(np.asarray(getattr(links, each.name), np.float32) for each in fields(Links)))
+    return Rebels(np.arange(len(x)), x, y, vx, vy, links, judge(links, x, y, around))
+
+
+class Scene:
+    """Rebel edges that move as told, and the circles that they make."""
+
+    def __init__(self, around: Any, **settings: Any) -> None:
+        self.around = around
+        self.edges = EdgeTable(50, 50, 10)
+        self.circles = CircleTable(4)
+        self.expert = RebelCircles(Filter(**settings), around.horizon_s, Ids())
+
+    def update(self, *groups: tuple[float, float, float, float], number: int = 8, flowing: int = 0) -> "Scene":
+        """One frame with groups of rebels (x, y, direction in rad, px/s), and normal edges among the first of them."""
+        self.edges.remove(np.ones(self.edges.count, np.bool_))
+        if not groups:
+            self.expert.update(self.edges, self.circles, None, self.around)
+            return self
+        off = np.random.default_rng(0).uniform(-12, 12, (len(groups), number, 2))
+        where = np.array([group[:2] for group in groups])
+        x, y = (where[:, None] + off).reshape(-1, 2).astype(np.float32).T
+        beta, speed = np.repeat(np.array([group[2:] for group in groups], np.float32), number, axis=0).T
+        rows = self.edges.append(len(x))
+        self.edges.x[rows], self.edges.y[rows], self.edges.rebel[rows], self.edges.trust[rows] = x, y, True, TR_S
+        crowd = self.edges.append(flowing)
+        self.edges.x[crowd], self.edges.y[crowd] = np.resize(x[:number], flowing), np.resize(y[:number], flowing)
+        self.edges.trust[crowd], self.edges.matched[crowd] = TR_MAX, True
+        rebels = rebels_at(x, y, speed * np.cos(beta), speed * np.sin(beta), self.around)
+        self.expert.update(self.edges, self.circles, rebels, self.around)
+        return self
+
+    @property
+    def trust(self) -> list[float]:
+        return self.circles.trust[self.circles.active].tolist()
+
+
+@pytest.fixture
+def scene(situation: Situation) -> Scene:
+    return Scene(situation())
+
+
+# Grouping
+
+CROSSING = (300.0, 150.0, 0.0, 120.0)
+
+
+def test_rebels_that_go_together_make_one_circle(scene: Scene) -> None:
+    scene.update(CROSSING)
+    assert scene.trust == [NEWBORN]
+    (row,) = np.flatnonzero(scene.circles.active)
+    assert scene.circles.support[row] == 8
+    assert math.hypot(scene.circles.x[row] - 300, scene.circles.y[row] - 150) < 8
+    assert scene.circles.beta[row] == pytest.approx(0.0, abs=1e-3)
+    assert scene.circles.speed[row] == pytest.approx(120, rel=1e-3)
+    assert scene.circles.radius[row] <= SETTINGS.bs_px
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        (300.0, 150.0, math.pi, 120.0),
+        (300.0, 150.0, 1.5, 120.0),
+        (500.0, 150.0, 0.0, 120.0),
+        (300.0, 150.0, 0.0, 420.0),
+    ],
+    ids=["the other way", "across", "elsewhere", "much faster"],
+)
+def test_rebels_that_do_not_go_together_make_two(scene: Scene, other: tuple[float, float, float, float]) -> None:
+    assert scene.update(CROSSING, other).trust == [NEWBORN, NEWBORN]
+
+
+@pytest.mark.parametrize("number", range(1, 6))
+def test_too_few_rebels_make_no_circle(scene: Scene, number: int) -> None:
+    assert bool(scene.update(CROSSING, number=number).trust) == (number >= SETTINGS.rebel_support)
+
+
+def linked(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> list[int]:
+    """Group of each rebel."""
+    return [int(label) for label in link(rebels_at(x, y, vx, vy, around), SETTINGS, around)]
+
+
+def test_parts_of_an_object_that_grows_are_linked_though_they_fly_apart(situation: Situation) -> None:
+    x, y = (part.astype(np.float32) for part in np.random.default_rng(1).uniform(-30, 30, (2, 25)))
+    assert len(set(linked(300 + x, 150 + y, 0.8 * x, 0.8 * y, situation()))) == 1
+
+
+def test_links_reach_through_neighbours_and_no_farther_than_they_do(situation: Situation) -> None:
+    step = np.float32(0.9 * SETTINGS.rebel_link_px)
+    x = step * np.arange(10, dtype=np.float32)
+    x[5:] += step
+    still = np.zeros(10, np.float32)
+    label = linked(x, still + 150, still + 100, still, situation())
+    assert len(set(label[:5])) == len(set(label[5:])) == 1
+    assert label[0] != label[9]
+
+
+def test_a_few_rebels_in_a_crowd_that_flows_make_and_keep_no_circle(situation: Situation) -> None:
+    few = SETTINGS.rebel_support
+    assert not Scene(situation()).update(CROSSING, number=few, flowing=40).trust
+    scene = Scene(situation()).update(CROSSING, number=few).update(CROSSING, number=few)
+    (trust,) = scene.trust
+    assert scene.update(CROSSING, number=few, flowing=40).trust == [trust - 1]
+
+
+# Trust
+
+
+def test_an_aligned_circle_gains_one_a_frame_up_to_the_most(scene: Scene) -> None:
+    seen = [scene.update(CROSSING).trust[0] for _ in range(6)]
+    assert seen == [min(NEWBORN + frame, TR_MAX) for frame in range(6)]
+
+
+def test_a_deviated_circle_takes_the_new_direction_and_loses_one(scene: Scene) -> None:
+    for _ in range(3):
+        scene.update(CROSSING)
+    before = scene.trust[0]
+    assert scene.update((*CROSSING[:2], 0.8, 120.0)).trust == [before - 1]
+    (row,) = np.flatnonzero(scene.circles.active)
+    assert scene.circles.beta[row] == pytest.approx(0.8, abs=1e-3)
+
+
+def test_a_circle_without_rebels_loses_one_a_frame_until_it_goes(situation: Situation) -> None:
+    scene = Scene(situation(horizon_s=1.0))
+    for _ in range(4):
+        scene.update(CROSSING)
+    trust = scene.trust[0]
+    while trust - 1 >= TR_CR:
+        trust -= 1
+        assert scene.update().trust == [trust]
+    assert scene.update().trust == []
+
+
+def test_a_circle_keeps_its_identity_and_another_has_another(scene: Scene) -> None:
+    away = (500.0, 150.0, 0.0, 120.0)
+    scene.update(CROSSING)
+    (first,) = scene.circles.id[scene.circles.active]
+    scene.update(CROSSING, away)
+    ids = scene.circles.id[scene.circles.active].tolist()
+    assert first in ids
+    assert 0 not in ids
+    assert len(set(ids)) == 2
+
+
+# Prediction
+
+
+def test_without_a_time_to_contact_the_centre_goes_on_as_it_went() -> None:
+    circles = CircleTable(1)
+    circles.active[0], circles.x[0], circles.y[0], circles.radius[0] = True, 100, 50, 20
+    circles.speed[0], circles.beta[0], circles.ttc[0] = 60, math.pi / 2, math.inf
+    RebelCircles(SETTINGS, HORIZON_S, Ids()).predict(circles, 0.5)
+    assert (circles.x[0], circles.y[0], circles.radius[0]) == pytest.approx((100, 80, 20), abs=1e-3)
+
+
+@pytest.mark.parametrize(("dt_s", "steps"), [(0.05, 10), (0.01, 50)])
+def test_what_looms_grows_as_its_range_shrinks(dt_s: float, steps: int) -> None:
+    """A disc of 0.5 m that comes at constant velocity from 4 m away, 2 s before contact, 0.4 m to the right."""
+    circles = CircleTable(1)
+    circles.active[0], circles.radius[0], circles.ttc[0] = True, 500 * 0.25 / 4, 2.0
+    circles.x[0], circles.y[0] = 320 + 500 * 0.4 / 4, 240
+    circles.speed[0], circles.beta[0] = 500 * 0.4 / 4 / 2.0, 0.0  # x/τ
+    expert = RebelCircles(SETTINGS, HORIZON_S, Ids())
+    for _ in range(steps):
+        expert.predict(circles, dt_s)
+    left_m = 4 * (1 - 0.5 / 2.0)
+    assert circles.ttc[0] == pytest.approx(1.5, rel=1e-3)
+    assert circles.radius[0] == pytest.approx(500 * 0.25 / left_m, rel=1e-3)
+    assert circles.x[0] == pytest.approx(320 + 500 * 0.4 / left_m, abs=1.0)
+
+
+# Cause, time to contact, lateral miss: whole steps
+
+
+def settled(drive: Any, config: Config | None = None) -> tuple[LineCircleFilter, list[int], int]:
+    """The filter, the rows of its published rebel circles, and the number of the last frame."""
+    tables = LineCircleFilter(config or Config(), drive.lens)
+    for corners, motion in drive:
+        tables.step(corners, motion)
+    rebel = tables.rebel
+    return tables, np.flatnonzero(rebel.active & (rebel.trust >= TR_S)).tolist(), drive.frames - 1
+
+
+def test_a_wall_ahead_is_incoming_with_its_time_to_contact(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    for wall_m in (6.0, 7.0, 8.0):
+        way = drive(clutter(150)) + drive(box((0.0, -0.4, wall_m), (0.5, 0.9, 0.0), landmarks=40))
+        tables, rows, last = settled(replace(way, frames=26))
+        assert rows
+        left_m = wall_m - 2.0 * last / 20
+        for row in rows:
+            assert tables.rebel.cause[row] == Cause.INCOMING
+            assert tables.rebel.ttc[row] == pytest.approx(left_m / 2.0, rel=0.05)
+            assert tables.rebel.range[row] == pytest.approx(left_m, rel=0.05)
+            assert abs(tables.rebel.lateral[row]) < 0.15
+
+
+@pytest.mark.parametrize("closing_mps", [0.6, 1.5])
+def test_what_comes_towards_us_has_the_time_of_its_closing_speed(
+    drive: Drive, box: Landmarks, closing_mps: float
+) -> None:
+    way = drive(box((0.0, -0.4, 7.0), (0.6, 1.0, 0.0), landmarks=40), np.array([0, 0, -closing_mps]), frames=26)
+    tables, rows, last = settled(way)
+    assert rows
+    left_s = 7.0 / (2.0 + closing_mps) - last / 20
+    for row in rows:
+        assert tables.rebel.cause[row] == Cause.INCOMING
+        assert tables.rebel.ttc[row] == pytest.approx(left_s, rel=0.05)
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_what_crosses_is_crossing_to_the_side_it_goes_to(drive: Drive, box: Landmarks, side: int) -> None:
+    """Most of a walker is above the camera."""
+    way = drive(box((-0.8 * side, -1.2, 6.0), (0.5, 0.6, 0.2), landmarks=40), np.array([1.2 * side, 0, 0]), frames=20)
+    tables, rows, _ = settled(way, Config(vehicle=Vehicle(horizon_s=1.5)))
+    assert rows
+    for row in rows:
+        assert tables.rebel.cause[row] == Cause.CROSSING
+        assert np.sign(math.cos(tables.rebel.beta[row])) == side
+
+
+def test_what_drives_ahead_of_us_is_leading(drive: Drive, box: Landmarks) -> None:
+    leader = drive(box((0.0, 0.2, 2.5), (0.6, 0.15, 0.0), landmarks=40), np.array([0, 0, 2.0]), frames=26)
+    tables, rows, _ = settled(leader)
+    assert rows
+    assert {int(cause) for cause in tables.rebel.cause[rows]} == {Cause.LEADING}
+
+
+@pytest.mark.parametrize("yaw_rate_radps", [0.35, -0.35])
+def test_on_an_arc_the_miss_is_that_of_the_arc(drive: Drive, box: Landmarks, yaw_rate_radps: float) -> None:
+    """A wall where the turn leads, 1.9 s of it ahead at the end."""
+    frames, arc_m = 24, 2.0 / yaw_rate_radps
+    turn = yaw_rate_radps * ((frames - 1) / 20 + 1.9)
+    middle = (-arc_m * (1 - math.cos(turn)), -0.4, arc_m * math.sin(turn))
+    way = drive(box(middle, (0.3, 0.9, 0.3), landmarks=50), frames=frames, yaw_rate_radps=yaw_rate_radps)
+    tables, rows, last = settled(way)
+    assert rows
+    at = way.in_camera(last).mean(axis=0)
+    for row in rows:
+        assert tables.rebel.cause[row] == Cause.INCOMING
+        assert abs(tables.rebel.lateral[row]) < 0.15
+        assert tables.rebel.range[row] == pytest.approx(at[2], rel=0.05)
+        assert abs(at[0]) > 0.5  # it does not lie straight ahead
+
+
+def test_what_lies_straight_ahead_of_a_turn_is_no_rebel(drive: Drive, box: Landmarks) -> None:
+    way = drive(box((0.0, -0.4, 7.5), (0.4, 0.9, 0.0), landmarks=40), yaw_rate_radps=0.6)
+    _, rows, _ = settled(replace(way, frames=20))
+    assert not rows
+
+
+def test_with_the_speed_unknown_nothing_is_said_in_metres(drive: Drive, box: Landmarks) -> None:
+    way = drive(box((-2, -0.6, 5), (0.5, 1.2, 0.3)), np.array([1.2, 0, 0]))
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, replace(motion, speed_mps=math.nan))
+    assert tables.rebel.active.any()
+    assert np.isnan(tables.rebel.range[tables.rebel.active]).all()
+    assert np.isnan(tables.rebel.lateral[tables.rebel.active]).all()

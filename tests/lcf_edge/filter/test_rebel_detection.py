@@ -1,0 +1,328 @@
+"""What breaks the flow of what stands still, and what does not; the chain that makes a rebel."""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from lcf_edge.filter.flow import KeyFrames
+from lcf_edge.filter.rebel_detection import Links, Verdict, agree, give_birth, judge, links_since, miss
+from lcf_edge.filter.situation import Situation
+from lcf_edge.filter.tables import EdgeTable
+
+AHEAD = np.array([0.0, 0.0, 1.0])
+STEPS = 8  # of 0.05 s
+HEIGHT_M = 0.3  # of the camera
+
+Around = Callable[..., Situation]
+Drive = Callable[..., Any]
+
+
+@dataclass(frozen=True)
+class Watched:
+    """A drive with landmarks, each seen at its start, in its middle and at its end."""
+
+    drive: Any
+    around: Situation
+    rounded: bool = False
+
+    def links(self, key: int = 0) -> Links:
+        """From key frame 0 (the start) or 1 (the middle) to the end."""
+        keys, number = KeyFrames(), len(self.drive.points_m)
+        edges = EdgeTable(number, 1, 1)
+        edges.append(number)
+        for seq, (_, motion) in enumerate(self.drive):
+            if seq:
+                keys.advance(motion.rotation, AHEAD, motion.speed_mps, motion.dt_s)
+            if seq in {0, STEPS // 2}:
+                slot = keys.mark()
+                edges.key_x[slot, :number], edges.key_y[slot, :number] = self.place(seq)
+        return links_since(edges, np.arange(number), np.full(number, key), keys, self.around)
+
+    def place(self, seq: int) -> npt.NDArray[np.float32]:
+        """(2, n) px."""
+        at = self.drive.in_picture(seq).T
+        return np.asarray(np.rint(at) if self.rounded else at, np.float32)
+
+    def verdict(self, key: int = 0) -> Verdict:
+        return judge(self.links(key), *self.place(STEPS), self.around)
+
+    def agreed(self) -> npt.NDArray[np.bool_]:
+        whole, recent = self.links(0), self.links(1)
+        place = self.place(STEPS)
+        return agree(
+            judge(whole, *place, self.around),
+            whole.elapsed_s,
+            judge(recent, *place, self.around),
+            recent.elapsed_s,
+            0.8,
+        )
+
+
+@pytest.fixture(scope="session")
+def watch(drive: Drive, situation: Around) -> Callable[..., Watched]:
+    def _watch(points_m: Any, velocity_mps: Any = (0, 0, 0), *, rounded: bool = False, **other: Any) -> Watched:
+        speed, yaw_rate = other.pop("speed_mps", 2.0), other.pop("yaw_rate_radps", 0.0)
+        way = drive(
+            np.atleast_2d(np.asarray(points_m, float)),
+            np.asarray(velocity_mps, float),
+            frames=STEPS + 1,
+            speed_mps=speed,
+            yaw_rate_radps=yaw_rate,
+        )
+        around = situation(speed_mps=speed, yaw_rate_radps=yaw_rate, camera_height_m=HEIGHT_M, **other)
+        return Watched(way, around, rounded)
+
+    return _watch
+
+
+Watch = Callable[..., Watched]
+
+
+# What stands still
+
+depth = st.floats(2.0, 40.0)
+beside = st.one_of(st.floats(0.6, 8.0), st.floats(-8.0, -0.6))
+
+
+@given(depth, beside, st.floats(-3.0, 0.29), st.sampled_from([0.5, 2.0, -1.0]))
+def test_what_stands_beside_the_path_is_neither_mover_nor_incoming_at_any_depth(
+    watch: Watch, z: float, x: float, y: float, speed_mps: float
+) -> None:
+    verdict = watch((x, y, z), speed_mps=speed_mps).verdict()
+    assert not verdict.mover
+    assert not verdict.incoming
+
+
+@given(depth, beside, st.floats(-3.0, 0.29))
+def test_nor_when_its_corners_are_at_whole_pixels(watch: Watch, z: float, x: float, y: float) -> None:
+    assume(abs(x) > 0.06 * z)  # farther away, a pixel of flow does not tell beside from before
+    verdict = watch((x, y, z), rounded=True).verdict()
+    assert not verdict.mover
+    assert not verdict.incoming
+
+
+@given(st.floats(2.0, 6.0), beside, st.floats(-1.0, 0.25), st.sampled_from([-0.5, -0.2, 0.3, 0.6]))
+def test_nor_on_an_arc(watch: Watch, z: float, x: float, y: float, yaw_rate_radps: float) -> None:
+    arc_m = 2.0 / yaw_rate_radps
+    off_path = abs(math.hypot(x + arc_m, z) - abs(arc_m))
+    watched = watch((x, y, z), yaw_rate_radps=yaw_rate_radps)
+    assume(off_path > 0.6 and watched.drive.in_camera(STEPS)[0, 2] > 0.6)
+    verdict = watched.verdict()
+    assert not verdict.mover
+    assert not verdict.incoming
+
+
+@given(st.floats(1.5, 20.0), st.floats(-2.0, 2.0))
+def test_the_ground_ahead_is_no_threat(watch: Watch, z: float, x: float) -> None:
+    verdict = watch((x, HEIGHT_M, z)).verdict()
+    assert not verdict.mover
+    assert not verdict.incoming
+
+
+def test_range_miss_and_time_to_contact_of_what_stands_still(watch: Watch) -> None:
+    watched = watch([(0.2, -0.3, 4.0), (-1.5, -0.5, 6.0), (2.0, 0.1, 9.0)])
+    verdict = watched.verdict()
+    x, _, z = watched.drive.in_camera(STEPS).T
+    assert verdict.range_m == pytest.approx(z, rel=1e-3)
+    assert verdict.lateral_m == pytest.approx(x, rel=1e-3)
+    assert verdict.ttc_s == pytest.approx(z / 2.0, rel=1e-3)
+    assert verdict.drift == pytest.approx(np.zeros(3), abs=1e-2)
+
+
+# Incoming
+
+WALL = [(x, y, 4.0) for x in (-0.2, 0.2) for y in (-0.9, -0.5, -0.2, 0.05)]
+
+
+def test_a_wall_ahead_is_incoming(watch: Watch) -> None:
+    verdict = watch(WALL).verdict()
+    assert verdict.incoming.all()
+    assert not verdict.mover.any()
+
+
+@pytest.mark.parametrize(
+    "why",
+    [
+        {"horizon_s": 1.0},
+        {"half_width_m": 0.1},
+        {"height_m": 0.2},
+        {"speed_mps": -2.0},
+        {"speed_mps": 0.0},
+    ],
+    ids=["contact is late", "the vehicle is narrow", "it is high enough above", "it drives away", "it stands"],
+)
+def test_a_wall_is_not_incoming_when(watch: Watch, why: dict[str, float]) -> None:
+    points = [(x, y, z) for x, y, z in WALL if y < -0.15]
+    assert not watch(points, **why).verdict().incoming.any()
+
+
+def test_on_an_arc_what_stands_on_it_is_incoming_and_what_lies_straight_ahead_is_not(watch: Watch) -> None:
+    yaw_rate_radps, turn = 0.5, 0.9  # rad, from the start to contact
+    arc_m = 2.0 / yaw_rate_radps
+    on_it = (-arc_m * (1 - math.cos(turn)), -0.5, arc_m * math.sin(turn))
+    straight = (0.0, -0.5, arc_m * turn)
+    verdict = watch([on_it, straight], yaw_rate_radps=yaw_rate_radps).verdict()
+    assert verdict.incoming.tolist() == [True, False]
+    assert not verdict.mover.any()
+    x, _, z = watch(straight, yaw_rate_radps=yaw_rate_radps).drive.in_camera(STEPS)[0]
+    assert verdict.lateral_m[1] == pytest.approx(math.hypot(x + arc_m, z) - arc_m, abs=0.05)
+
+
+@pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5])
+def test_the_miss_is_the_distance_from_the_arc_to_the_right(situation: Around, yaw_rate_radps: float) -> None:
+    around = situation(speed_mps=2.0, yaw_rate_radps=yaw_rate_radps)
+    arc_m, turn = 2.0 / yaw_rate_radps, 0.7
+    for off in (-0.8, 0.0, 0.8):  # right of the path
+        radius = arc_m + off
+        right, ahead = radius * math.cos(turn) - arc_m, abs(radius) * math.sin(turn)
+        found = miss(np.array([right], np.float32), np.array([ahead], np.float32), around)
+        assert found == pytest.approx(off, abs=1e-5)
+
+
+def test_the_miss_of_a_straight_drive_is_the_offset(situation: Around) -> None:
+    right, ahead = np.array([-2.0, 0.5], np.float32), np.array([3.0, 9.0], np.float32)
+    for around in (situation(), situation(speed_mps=math.nan, yaw_rate_radps=1.0), situation(speed_mps=0.0)):
+        assert miss(right, ahead, around).tolist() == right.tolist()
+
+
+# Movers
+
+
+@given(st.floats(3.0, 4.0), st.floats(-0.4, 0.4), st.floats(-1.6, -1.0), st.sampled_from([-1.2, -0.9, 0.9, 1.2]))
+def test_what_crosses_moves(watch: Watch, z: float, x: float, y: float, velocity_mps: float) -> None:
+    """High up, where aside is across the flow: along it one eye cannot tell a motion from another depth."""
+    verdict = watch((x, y, z), (velocity_mps, 0, 0)).verdict()
+    assert verdict.mover
+    assert not verdict.incoming
+
+
+def test_what_crosses_right_before_us_moves(watch: Watch) -> None:
+    """Nothing that stands still leaves the focus so fast."""
+    velocities = [(-1.2, 0, 0), (1.2, 0, 0), (0, -1.2, 0), (1.2, 0.6, 0)]
+    near_the_focus = [(off_m, 0.5 * off_m, 3.0) for off_m in (0.005, 0.01, 0.03, 0.1)]
+    points = [point for point in near_the_focus for _ in velocities]
+    assert watch(points, velocities * len(near_the_focus)).verdict().mover.all()
+
+
+def test_what_crosses_drifts_to_the_side_it_goes_to(watch: Watch) -> None:
+    high_up = [(0.0, -0.8, 4.0)] * 2
+    right, left = watch(high_up, [(1, 0, 0), (-1, 0, 0)]).verdict().drift
+    assert right == pytest.approx(-left)
+    assert abs(right) == pytest.approx(0.4 * 500 / 3.2, rel=0.01)
+
+
+def test_what_leads_keeps_station_where_the_ground_would_flow(watch: Watch) -> None:
+    near_the_ground = [(x, 0.25, 2.0) for x in (-0.2, 0.0, 0.2)]
+    verdict = watch(near_the_ground, (0, 0, 2.0)).verdict()
+    assert verdict.mover.all()
+    assert (verdict.short > np.abs(verdict.drift)).all()
+    assert not verdict.incoming.any()
+    assert not watch(near_the_ground).verdict().mover.any()
+
+
+def test_what_comes_towards_us_on_the_path_is_incoming_as_a_nearer_wall_would_be(watch: Watch) -> None:
+    oncoming = [(x, y, 6.0) for x in (-0.15, 0.15) for y in (-0.9, -0.6)]
+    verdict = watch(oncoming, (0, 0, -1.5)).verdict()
+    assert verdict.incoming.all()
+    left_m = 6.0 - 3.5 * 0.4
+    assert verdict.ttc_s == pytest.approx(left_m / 3.5, rel=1e-3)
+
+
+def test_faster_than_anything_that_stands_still_can_go_out_is_a_mover(watch: Watch) -> None:
+    """Nothing stands nearer than the nearest depth."""
+    verdict = watch((0.4, -0.4, 6.0), (0, 0, -12.0), speed_mps=0.2).verdict()
+    assert verdict.mover
+    assert verdict.over > 0
+
+
+def test_uncertain_rotation_and_noise_widen_the_error_span(watch: Watch) -> None:
+    watched = watch((0.0, -0.8, 4.0), (0.25, 0, 0))
+    links, place = watched.links(), watched.place(STEPS)
+    assert judge(links, *place, watched.around).mover
+    links.sigma_px[:] = 30
+    assert not judge(links, *place, watched.around).mover
+
+
+# Chains
+
+
+def test_a_steady_crossing_agrees_with_itself(watch: Watch) -> None:
+    assert watch([(0, -0.8, 4.0), (0.5, -0.5, 5.0)], (1.0, 0, 0)).agreed().all()
+
+
+def test_a_wall_ahead_agrees_with_itself(watch: Watch) -> None:
+    assert watch(WALL).agreed().all()
+    assert watch(WALL, rounded=True).agreed().all()
+
+
+def told(mover: bool, drift: float = 0.0, expansion: float = 0.0) -> Verdict:
+    """A verdict of one edge 100 px from the focus."""
+    column = [np.array([value], np.float32) for value in (100.0, drift, -50.0, -50.0, expansion, 5.0, 0.0, 2.5)]
+    return Verdict(*column, np.array([mover]), np.array([not mover]))
+
+
+def agrees(whole: Verdict, recent: Verdict) -> bool:
+    """A chain of 0.4 s of which the recent link took 0.2 s."""
+    return bool(agree(whole, np.float32([0.4]), recent, np.float32([0.2]), 0.8)[0])
+
+
+@pytest.mark.parametrize("sign", [-1, 1])
+def test_a_jump_is_no_motion(sign: int) -> None:
+    assert agrees(told(True, sign * 60), told(True, sign * 30))
+    assert not agrees(told(True, sign * 60), told(True, sign * 60))  # all of it in the recent link
+    assert not agrees(told(True, sign * 60), told(False, 0.0))  # all of it before
+    assert not agrees(told(True, sign * 60), told(True, sign * -30))
+
+
+def test_an_expansion_that_jumps_comes_from_no_wall() -> None:
+    assert agrees(told(False, expansion=0.5), told(False, expansion=0.5))
+    assert not agrees(told(False, expansion=0.5), told(False, expansion=1.5))
+    assert not agrees(told(False, expansion=0.5), told(False, expansion=0.0))
+
+
+def born(*l123: tuple[float, float]) -> EdgeTable:
+    """E_r from key positions L1, L2, L3, the last two 0.1 s apart."""
+    edges = EdgeTable(4, 2, 2)
+    edges.append(1)
+    first, second, last = (tuple(np.float32([value]) for value in place) for place in l123)
+    edges.x[0], edges.y[0], edges.links[0] = *l123[2], 2
+
+    def link(place: tuple[npt.NDArray[np.float32], ...], elapsed_s: float) -> Links:
+        return Links(*place, *np.zeros((3, 1), np.float32), np.float32([elapsed_s]), np.zeros(1, np.float32))
+
+    give_birth(edges, np.array([0]), link(first, 0.2), link(second, 0.1))
+    assert len(last) == 2
+    return edges
+
+
+def test_a_rebel_is_born_with_the_papers_numbers() -> None:
+    """L1 = (10, 10), L2 = (20, 10), L3 = (30, 14)."""
+    edges = born((10, 10), (20, 10), (30, 14))
+    beta = math.atan2(4, 20)
+    assert edges.rebel[0]
+    assert edges.links[0] == 0
+    assert edges.beta[0] == pytest.approx(beta)  # ∠(L3 - L1)
+    assert edges.deviation[0] == pytest.approx(beta - 0.0)  # ∠(L3 - L1) - ∠(L2 - L1)
+    assert edges.speed[0] == pytest.approx(math.hypot(10, 4) / 0.1)  # |L3 - L2| / t
+    assert (edges.origin_x[0], edges.origin_y[0]) == (10, 10)  # L1
+
+
+@pytest.mark.parametrize("quarter", range(4))
+def test_birth_does_not_depend_on_the_direction(quarter: int) -> None:
+    turn = np.round([[math.cos(a), -math.sin(a)] for a in (quarter * math.pi / 2,)])[0]
+    places = [(x * turn[0] + y * turn[1], -x * turn[1] + y * turn[0]) for x, y in ((-10, -2), (-20, 1), (-30, -1))]
+    edges, upright = born(*places), born((-10, -2), (-20, 1), (-30, -1))
+    assert edges.deviation[0] == pytest.approx(upright.deviation[0], abs=1e-5)
+    assert edges.speed[0] == pytest.approx(upright.speed[0], rel=1e-5)
+    assert -math.pi < edges.deviation[0] <= math.pi
+
+
+def test_a_first_link_too_short_for_a_direction_has_no_deviation() -> None:
+    assert born((10, 10), (10.5, 9), (30, 14)).deviation[0] == 0
