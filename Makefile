@@ -3,11 +3,12 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test lint types clean help
+.PHONY: demo test bench lint types clean help
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
 	@echo "make test   run the tests"
+	@echo "make bench  measure detection quality and speed against other methods (tables in benchmarks/results/)"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 
 # One stamp per set of dependencies, so that the demo does not install the test tools.
@@ -26,6 +27,9 @@ demo: $(VENV)/.run
 
 test: $(VENV)/.dev
 	$(BIN)/python -m pytest
+
+bench: $(VENV)/.dev
+	$(BIN)/python -m benchmarks.run $(BENCH)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -1,1 +1,11 @@
-"""Measurements: `score` compares results with the truth of rendered drives."""
+"""Measurements: detection quality and speed of the filter and its peers (``python -m benchmarks.run``).
+
+``score``    compares results with the truth of rendered drives
+``methods``  the filter and its peers behind one interface; ``peers`` holds the peers
+``playing``  feeds drives and recordings to methods
+``quality``, ``speed``, ``memory``  what is measured; ``report`` makes tables of it
+"""
+
+import os
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as on the vehicle; only before NumPy is loaded does it count

@@ -1,0 +1,103 @@
+"""The filter and its peers behind one interface, so that all of them get the same frames and samples."""
+
+import time
+from typing import Protocol
+
+import numpy as np
+
+from benchmarks.peers import PEERS, LandmarkMap
+from benchmarks.peers.peer import Peer
+from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Config
+from lcf_edge.ego_motion import EgoMotionEstimator
+from lcf_edge.filter import Motion
+from lcf_edge.lens import Lens
+from lcf_edge.pipeline import LEAST_DT_S, Pipeline
+from lcf_edge.records import CIRCLE, PSI_REGION, Scene, Sizes, Timing
+
+FILTER = "filter"
+MAP = "landmark_map"
+NOTHING = "nothing"
+NAMES = (FILTER, *PEERS)
+"""The methods that find circles."""
+
+
+class Method(Protocol):
+    """One method on one drive."""
+
+    def add(self, sample: ImuSample | SpeedSample) -> None:
+        """Take a sample, in stamp order."""
+
+    def process(self, frame: Frame) -> Scene:
+        """Circles (and ψ) of one frame; ``timing`` tells how long it took."""
+
+
+class FilterMethod:
+    """The filter, through the pipeline."""
+
+    def __init__(self, config: Config, lens: Lens) -> None:
+        self._pipeline = Pipeline(config, lens)
+
+    def add(self, sample: ImuSample | SpeedSample) -> None:
+        """Take a sample, in stamp order."""
+        self._pipeline.add(sample)
+
+    def process(self, frame: Frame) -> Scene:
+        """Circles and ψ of one frame."""
+        return self._pipeline.process(frame).scene
+
+
+class PeerMethod:
+    """A peer, with the filter's own ego-motion."""
+
+    def __init__(self, peer: Peer, config: Config) -> None:
+        self.peer = peer
+        self._motion = EgoMotionEstimator(config.imu, config.vehicle)
+
+    def add(self, sample: ImuSample | SpeedSample) -> None:
+        """Take a sample, in stamp order."""
+        if isinstance(sample, ImuSample):
+            self._motion.add_imu(sample)
+        else:
+            self._motion.add_speed(sample)
+
+    def process(self, frame: Frame) -> Scene:
+        """Circles of one frame."""
+        started = time.perf_counter_ns()
+        ego = self._motion.advance(frame.stamp_ns)
+        dt_s = max(ego.dt_s, LEAST_DT_S)
+        motion = Motion(dt_s, ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.path_yaw_rate_radps)
+        circles = self.peer.process(frame.image, motion)
+        total_us = (time.perf_counter_ns() - started) // 1000
+        height, width = frame.image.shape
+        landmarks = self.peer.landmarks if isinstance(self.peer, LandmarkMap) else 0
+        return Scene(
+            frame.stamp_ns,
+            frame.seq,
+            width,
+            height,
+            ego.speed_mps,
+            circles,
+            np.zeros(0, PSI_REGION),
+            Sizes(edges_normal=landmarks),
+            Timing(total=total_us),
+        )
+
+
+class _Nothing:
+    """What every method needs: pictures and ego-motion."""
+
+    def __init__(self, config: Config, lens: Lens) -> None:
+        del config, lens
+
+    def process(self, image: np.ndarray, motion: Motion) -> np.ndarray:
+        del image, motion
+        return np.zeros(0, CIRCLE)
+
+
+def make(name: str, config: Config, lens: Lens) -> Method:
+    """The method of a name: one of ``NAMES``, ``MAP``, or ``NOTHING``, which reads the frames and no more."""
+    if name == FILTER:
+        return FilterMethod(config, lens)
+    kinds: dict[str, type[Peer]] = {**PEERS, MAP: LandmarkMap, NOTHING: _Nothing}
+    return PeerMethod(kinds[name](config, lens), config)
