@@ -247,10 +247,20 @@ def test_a_configuration_file_is_heard_and_the_keys_go_on_top(tmp_path: Path, en
 
 
 def test_a_liveliness_token_tells_that_the_publisher_is_there(session: zenoh.Session, endpoint: str) -> None:
-    with open_session(Zenoh(connect=[endpoint], listen=[])) as other:
-        ScenePublisher(session, Publish(prefix="fleet", robot="seven"))
-        replies = other.liveliness().get("fleet/@alive/*", timeout=PATIENCE_S)
-        assert [str(reply.ok.key_expr) for reply in replies] == ["fleet/@alive/seven"]
+    alive, told = threading.Event(), []
+
+    def tell(sample: zenoh.Sample) -> None:
+        told.append((str(sample.key_expr), sample.kind))
+        alive.set()
+
+    with (
+        open_session(Zenoh(connect=[endpoint], listen=[])) as other,
+        other.liveliness().declare_subscriber("fleet/@alive/*", tell, history=True),
+    ):
+        publisher = ScenePublisher(session, Publish(prefix="fleet", robot="seven"))
+        assert alive.wait(PATIENCE_S)
+    assert publisher.sent == 0
+    assert told[0] == ("fleet/@alive/seven", zenoh.SampleKind.PUT)
 
 
 @pytest.mark.parametrize("publish", [Publish(prefix="a/*"), Publish(robot="r*"), Publish(robot="")])
