@@ -24,7 +24,7 @@ _OPEN = np.ones((3, 3), np.uint8)
 _CLOSE = np.ones((21, 13), np.uint8)
 _AREA_PX = 60  # of the small picture
 _FOOT_PX = 4.0  # least below the horizon: farther away the range says nothing
-_TALL_M = 0.4  # least height of a column
+_TALL_M, _TALL_SHARE = 0.4, 0.8  # least height of a column, and as a share of the camera's, whichever is less
 
 
 class FrameDifference:
@@ -68,7 +68,8 @@ class FrameDifference:
         """Connected parts of the mask, of the columns that stand in the way."""
         foot = mask.shape[0] - 1 - np.argmax(mask[::-1] > 0, axis=0)
         range_m, lateral_m = self._stands(foot)
-        tall = _SHRINK * np.count_nonzero(mask, axis=0) > _TALL_M * self._ego.focal_px / range_m
+        least_m = min(_TALL_M, _TALL_SHARE * self._config.camera.height_m)
+        tall = _SHRINK * np.count_nonzero(mask, axis=0) > least_m * self._ego.focal_px / range_m
         ttc = range_m / np.float32(self._ego.speed_mps)
         vehicle = self._config.vehicle
         in_way: Mask = tall & (ttc < vehicle.horizon_s) & (np.abs(lateral_m) < vehicle.half_width_m)
