@@ -154,7 +154,7 @@ class RebelCircles:
     ) -> None:
         """Cause, time to contact, range and lateral miss of circles; ``groups``: the group of members of each.
 
-        What stands still expands about the focus, what moves about itself: 1/TTC = V_e/r, fitted over the members.
+        What stands still expands about the focus, what moves about the horizon: 1/TTC = V_e/r, fitted over the members.
         """
         links, verdict = rebels.links, rebels.verdict
         stands = members.mean(verdict.incoming)[groups] >= 0.5
@@ -162,7 +162,7 @@ class RebelCircles:
         range_m = members.mean(links.depth_m / links.elapsed_s)[groups] / np.maximum(expanding, LEAST_RATE)
         speed = around.speed_mps
         closing = max(speed, 0.0) / np.maximum(range_m, LEAST_RANGE_M) if math.isfinite(speed) else expanding
-        rate = np.where(stands, closing, own_expansion(rebels, members)[groups])
+        rate = np.where(stands, closing, own_expansion(rebels, members, around.horizon_y)[groups])
         before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], self._least_ttc_s), rate)
         rate = update_position(circles.trust[rows], self._settings.tr_cr, before, rate)
         ttc = np.where(rate > LEAST_RATE, 1 / np.maximum(rate, LEAST_RATE), np.inf)
@@ -189,12 +189,14 @@ def standing_expansion(rebels: Rebels, members: Members) -> Floats:
     return members.mean(rebels.verdict.expansion * weight) / np.maximum(members.mean(weight), 1)
 
 
-def own_expansion(rebels: Rebels, members: Members) -> Floats:
-    """V_e/r about the group's own centre, 1/s, float32 (groups,); 0 where it is not above its noise."""
-    x, y, label = rebels.links.x, rebels.links.y, members.label
-    px, py = x - members.mean(x)[label], y - members.mean(y)[label]
-    extent2 = np.maximum(members.mean(px * px + py * py), 1)
-    rate = members.mean(px * rebels.vx + py * rebels.vy) / extent2
+def own_expansion(rebels: Rebels, members: Members, horizon_y: float) -> Floats:
+    """V_e/r of what moves on the ground, 1/s, float32 (groups,); 0 where it is not above its noise.
+
+    Fitted to the vertical motion about the horizon, at ``horizon_y`` px, which motion to the side does not touch.
+    """
+    below = rebels.links.y - np.float32(horizon_y)
+    extent2 = np.maximum(members.mean(below * below), 1)
+    rate = members.mean(below * rebels.vy) / extent2
     sigma = np.float32(VELOCITY_NOISE_PX) / members.mean(rebels.links.elapsed_s) / np.sqrt(extent2 * members.size)
     return np.where(rate > 2 * sigma, rate, 0).astype(np.float32)
 
