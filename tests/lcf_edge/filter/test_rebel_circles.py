@@ -11,9 +11,9 @@ import pytest
 
 from lcf_edge.config import Config, Filter, Vehicle
 from lcf_edge.filter import LineCircleFilter
-from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.rebel_circles import RebelCircles, link
-from lcf_edge.filter.rebel_detection import Links, Rebels, judge
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.rebel_circles import RebelCircles, link, own_expansion
+from lcf_edge.filter.rebel_detection import Links, Rebels, Verdict, judge
 from lcf_edge.filter.tables import CircleTable, EdgeTable
 from lcf_edge.records import Cause
 
@@ -292,3 +292,18 @@ def test_with_the_speed_unknown_nothing_is_said_in_metres(drive: Drive, box: Lan
     assert tables.rebel.active.any()
     assert np.isnan(tables.rebel.range[tables.rebel.active]).all()
     assert np.isnan(tables.rebel.lateral[tables.rebel.active]).all()
+
+
+@pytest.mark.parametrize("aside_pxps", [-200.0, 0.0, 200.0])
+def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(aside_pxps: float) -> None:
+    """Motion to the side does not touch it."""
+    y = np.linspace(160, 320, 9, dtype=np.float32)
+    x = np.full(9, 400, np.float32)
+    ones = np.ones(9, np.float32)
+    links = Links(x, y, 320 * ones, 240 * ones, ones, 0.5 * ones, 0 * ones)
+    verdict = Verdict(*[ones] * 8, ones > 0, ones < 0)
+    vx, vy = aside_pxps * ones, np.float32(0.5) * (y - 240)
+    rebels = Rebels(np.arange(9), x, y, vx, vy, links, verdict)
+    members = Members(np.zeros(9, np.intp), 1, x, y)
+    assert own_expansion(rebels, members, 240.0) == pytest.approx([0.5], rel=1e-5)
+    assert own_expansion(replace(rebels, vy=0 * vy), members, 240.0) == [0]
