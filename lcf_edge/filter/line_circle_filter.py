@@ -112,11 +112,11 @@ class LineCircleFilter:
         speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0  # of an unknown speed, the direction
         self._keys.advance(motion.rotation, self._heading.forward, speed, motion.dt_s)
         self._carry(motion.rotation)
-        self._feedback.advance(self.psi, self.normal, self.focus, motion.dt_s)
         self._normal_circles.predict(self.normal, self.focus, motion.dt_s)
         self._rebel_circles.predict(self.rebel, motion.dt_s)
         for circles in (self.normal, self.rebel):
             circles.active &= self._matcher.in_frame(circles.x, circles.y)
+        self._feedback.advance(self.psi, self.normal, self.focus, motion.dt_s)  # ψ ends with its circle
         return situation(self._config, self._pinhole, self._heading, motion)
 
     def _carry(self, rotation: Matrix) -> None:

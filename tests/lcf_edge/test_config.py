@@ -333,7 +333,7 @@ def values(kind: inspect.Type) -> st.SearchStrategy[Any]:
             return st.lists(values(kind.item_type), max_size=5)
         case inspect.UnionType():
             return st.one_of([values(each) for each in kind.types if not isinstance(each, inspect.NoneType)])
-    raise NotImplementedError(kind)
+    raise TypeError(f"no values for {kind}")
 
 
 def tables(table: type[Table], **given_here: st.SearchStrategy[Any]) -> st.SearchStrategy[Any]:
