@@ -14,7 +14,7 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.lens import Lens
 
 # A shared machine may be slow at any moment; what failed once is printed, not kept in the tree.
-settings.register_profile("lcf-edge", deadline=None, database=None, print_blob=True)
+settings.register_profile("lcf-edge", deadline=None, database=None, print_blob=True, derandomize=True)
 settings.load_profile("lcf-edge")
 
 Grey = npt.NDArray[np.uint8]

@@ -68,8 +68,8 @@ def _line_expert(panel: Picture, scene: Scene, view: View) -> None:
         if region["shape"] == Shape.CIRCLE:
             _circle(panel, (region["x"], region["y"], region["width"] / 2), YELLOW, 2)
         else:
-            size = np.array((region["width"], region["height"]), np.float32)
-            corners = np.array((region["x"], region["y"]), np.float32) + size * _SQUARE / 6
+            size = np.array((region["width"], region["height"]), np.float64)
+            corners = np.array((region["x"], region["y"]), np.float64) + size * _SQUARE / 6
             _outlines(panel, corners[None], YELLOW, 2)
     speed = f"{scene.vehicle_speed:.2f} m/s" if np.isfinite(scene.vehicle_speed) else "speed unknown"
     sizes = scene.sizes
