@@ -1,6 +1,7 @@
 """What a source delivers: pictures, inertial samples, speeds.
 
-SI units and the camera's axes: x right, y down, z forward.
+SI units. An IMU's samples come in its own axes; ``imu.axes`` turns them into the camera's: x right, y down,
+z forward.
 """
 
 from dataclasses import dataclass
@@ -25,6 +26,7 @@ class ImuSample:
     stamp_ns: int
     gyro: tuple[float, float, float]  # rad/s
     accel: tuple[float, float, float]  # m/s², specific force: at rest it points away from the ground
+    saturated: bool = False  # an axis was at the end of its range
 
 
 @dataclass(frozen=True, slots=True)

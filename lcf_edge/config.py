@@ -26,6 +26,26 @@ Side = Annotated[int, msgspec.Meta(ge=1, le=16384)]
 Tilt = Annotated[float, msgspec.Meta(gt=-1.5, lt=1.5)]
 
 
+ImuDriver = Literal[
+    "none",
+    "mpu6050",
+    "mpu6500",
+    "mpu9250",
+    "icm20948",
+    "lsm6ds3",
+    "lsm6dso",
+    "bmi160",
+    "bmi270",
+    "bno055",
+    "iio",
+    "witmotion",
+    "bno08x_rvc",
+    "xsens",
+    "csv",
+    "recording",
+]
+
+
 class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """A table of the file; unknown keys are refused."""
 
@@ -33,9 +53,16 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 class Camera(Table, frozen=True):
     """What the camera is and where it sits."""
 
+    driver: Literal["v4l2", "recording"] = "v4l2"
+    device: str = "/dev/video0"  # path, /dev/v4l/by-id/... or the name that the camera gives itself
+    recording: str = ""  # what driver = "recording" replays
     width: Side = 640
     height: Side = 480
-    fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # of pictures that carry no stamps
+    fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # asked of the camera; of pictures without stamps
+    format: Literal["auto", "GREY", "YUYV", "UYVY", "NV12", "MJPG"] = "auto"
+    exposure_s: Positive | None = None  # not given: the camera's own automatic
+    gain: int | None = None  # in the camera's own units; not given: the camera's own automatic
+    power_line_hz: Literal[0, 50, 60] | None = None  # against flicker; 0: off
     intrinsics: list[float] = []  # fx, fy, cx, cy in px; empty: the recording's, else by the field of view
     horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else tells
     distortion_model: Literal["none", "radial-tangential", "equidistant"] = "none"
@@ -48,6 +75,17 @@ class Camera(Table, frozen=True):
 class Imu(Table, frozen=True):
     """How the IMU's samples become the camera's axes."""
 
+    driver: ImuDriver = "none"
+    bus: Annotated[int, msgspec.Meta(ge=0, le=255)] = 1  # /dev/i2c-N
+    address: Annotated[int, msgspec.Meta(ge=0, le=0x77)] = 0  # 0: the chip's usual one
+    port: str = "/dev/ttyUSB0"  # path or /dev/serial/by-id/...
+    baud: Annotated[int, msgspec.Meta(ge=0, le=4_000_000)] = 0  # 0: the protocol's usual one
+    device: str = ""  # of driver = "iio": the chip's name or iio:deviceN; empty: the first with a gyro
+    firmware: str = "/lib/firmware/bmi270-init-data.fw"  # what a bmi270 must be given at every start
+    recording: str = ""  # what driver = "recording" replays
+    rate_hz: Annotated[float, msgspec.Meta(ge=10, le=1000)] = 200.0
+    gyro_range_dps: Literal[250, 500, 1000, 2000] = 500
+    accel_range_g: Literal[2, 4, 8, 16] = 4
     axes: list[list[float]] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity
     time_offset_s: Annotated[float, msgspec.Meta(ge=-4e9, le=4e9)] = 0.0  # camera time = IMU time + offset
     gyro_noise_radps: NotNegative = 0.005  # 1 sigma of what is left after the bias
@@ -74,7 +112,7 @@ class Filter(Table, frozen=True):
     tr_s: NotNegative = 3.0
     tr_max: NotNegative = 5.0
     delta_px: Positive = 1.5  # δ, corner noise off the flow line
-    delta_rebel_px: Positive = 4.0  # δ over the chain of key frames
+    delta_rebel_px: Positive = 2.5  # δ over the chain of key frames
     bl0_px: Positive = 12.0  # BL at birth
     leap_px: Positive = 40.0  # farthest that a landmark may move between its first two frames
     bl_min_px: Positive = 3.0
@@ -95,10 +133,10 @@ class Filter(Table, frozen=True):
     rebel_support: Count = 3  # edges that make a rebel circle
     rebel_share: Share = 0.15  # of the edges in a rebel circle must be rebels
     rebel_link_px: Positive = 40.0  # rebels farther apart are not of one circle
-    edge_noise_px: Positive = 0.8  # 1 sigma of an edge's position
+    edge_noise_px: Positive = 0.4  # 1 sigma of an edge's position
     focus_sigma_px: NotNegative = 6.0  # uncertainty of O
-    ground_margin: Share = 0.3  # share by which the ground may be misjudged
-    pitch_sigma_rad: NotNegative = 0.015
+    ground_margin: Share = 0.2  # share by which the ground may be misjudged
+    pitch_sigma_rad: NotNegative = 0.008
     psi_life_s: Positive = 0.3  # ψ expires and the region is looked at again
 
 

@@ -145,7 +145,8 @@ class Pipeline:
         rows = np.flatnonzero(wanted)
         place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
         seen = np.isfinite(place[:, 0])
-        return rows[seen], place[seen]
+        # What is nearly met may have its middle beside the picture.
+        return rows[seen], np.clip(place[seen], 0, (self._lens.width - 1, self._lens.height - 1))
 
     def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
         edges, n, groups = self._filter.edges, self._filter.edges.count, self._filter.groups

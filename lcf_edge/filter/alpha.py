@@ -10,6 +10,7 @@ from lcf_edge.filter.rebel_detection import (
     Rebels,
     Verdict,
     agree,
+    find_incoming,
     give_birth,
     judge,
     links_since,
@@ -60,6 +61,7 @@ class Alpha:
         x, y = edges.x[rows], edges.y[rows]
         first = links_since(edges, rows, oldest[rows], keys, around)
         whole = judge(first, x, y, around)
+        find_incoming(whole, first, x, y, edges.rebel[rows], around)
         breaks = whole.mover | whole.incoming
         rebel = edges.rebel[rows]
         self._pardon(rows[rebel & ~breaks], rows[~rebel & ~breaks & (edges.links[rows] > 0)], around)

@@ -114,8 +114,8 @@ class LineCircleFilter:
         self._carry(motion.rotation)
         self._normal_circles.predict(self.normal, self.focus, motion.dt_s)
         self._rebel_circles.predict(self.rebel, motion.dt_s)
-        for circles in (self.normal, self.rebel):
-            circles.active &= self._matcher.in_frame(circles.x, circles.y)
+        self.normal.active &= self._matcher.in_frame(self.normal.x, self.normal.y)
+        self.rebel.active &= self._matcher.in_frame(*self._rebel_circles.innermost(self.rebel, self._pinhole))
         self._feedback.advance(self.psi, self.normal, self.focus, motion.dt_s)  # ψ ends with its circle
         return situation(self._config, self._pinhole, self._heading, motion)
 

@@ -8,11 +8,11 @@ import numpy.typing as npt
 from lcf_edge.config import Filter
 from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
 from lcf_edge.filter.edge_equations import change_trust, update_position
-from lcf_edge.filter.flow import wrap
+from lcf_edge.filter.flow import Pinhole, wrap
 from lcf_edge.filter.matching import one_to_one
 from lcf_edge.filter.rebel_detection import Rebels, miss
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Rows
+from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
@@ -26,6 +26,7 @@ LEAST_RATE = 1e-6  # 1/s, slower expansions are none
 LOOMS = 4.0  # fastest expansion of one object, over one horizon
 LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
+COAST_LEAST_PX = 40.0  # what is that near is not small
 LEAST_TTC_SHARE = 0.0125
 
 
@@ -52,8 +53,26 @@ class RebelCircles:
         circles.x += step * np.cos(circles.beta)
         circles.y += step * np.sin(circles.beta)
         circles.speed *= grow * grow
-        circles.radius[:] = np.where(looming, circles.radius * grow, circles.radius)
+        for size in (circles.radius, circles.width, circles.height):
+            size[:] = np.where(looming, size * grow, size)
         circles.ttc -= dt
+
+    def coasting(self, circles: CircleTable) -> Mask:
+        """Trusted circles so near to contact that they grow too fast to be followed; bool (capacity,)."""
+        near = np.abs(circles.ttc) < COAST_SHARE * self._horizon_s
+        large = np.maximum(circles.width, circles.height) > np.float32(COAST_LEAST_PX)
+        return circles.active & near & large & (circles.trust >= self._settings.tr_s)
+
+    def innermost(self, circles: CircleTable, pinhole: Pinhole) -> tuple[Floats, Floats]:
+        """The point of each circle that must leave the frame for the circle to end, px.
+
+        What is about to be met fills the picture, and is not gone because its middle has left.
+        """
+        half = np.where(self.coasting(circles), np.float32(0.5), np.float32(0))
+        most_x, most_y = half * circles.width, half * circles.height
+        x = circles.x + np.clip(np.float32(pinhole.cx) - circles.x, -most_x, most_x)
+        y = circles.y + np.clip(np.float32(pinhole.cy) - circles.y, -most_y, most_y)
+        return x, y
 
     def motion_at(self, circles: CircleTable, x: Floats, y: Floats) -> tuple[npt.NDArray[np.intp], Floats, Floats]:
         """Circle that holds each point (-1: none) and the image velocity there, px/s: the circle's own plus looming.
@@ -85,12 +104,20 @@ class RebelCircles:
             if len(size):
                 updated, evicted = self._meet(edges, circles, rebels, label, size, around)
         missed = np.setdiff1d(live[circles.active[live]], updated)
-        near = np.abs(circles.ttc[missed]) < COAST_SHARE * self._horizon_s
-        coasts = near & (circles.trust[missed] >= self._settings.tr_s)
-        circles.trust[missed[~coasts]] -= 1
+        waits = self.coasting(circles)[missed] | self._hidden(circles, missed)
+        circles.trust[missed[~waits]] -= 1
         circles.active &= (circles.ttc > 0) & (circles.trust >= self._settings.tr_cr)
         release(edges, circles, rebel=True)
         return evicted
+
+    def _hidden(self, circles: CircleTable, rows: Rows) -> Mask:
+        """Whether each circle lies behind another one that will be met earlier; bool (rows,)."""
+        dx, dy = np.abs(circles.x[rows, None] - circles.x), np.abs(circles.y[rows, None] - circles.y)
+        reach = circles.radius + np.float32(MEMBER_MARGIN_PX)
+        covers = (dx < np.maximum(circles.width / 2, reach)) & (dy < np.maximum(circles.height / 2, reach))
+        nearer = circles.active & (circles.trust >= self._settings.tr_s) & (circles.ttc < circles.ttc[rows, None])
+        trusted = circles.trust[rows] >= self._settings.tr_s
+        return np.asarray((covers & nearer).any(axis=1) & trusted & np.isfinite(circles.ttc[rows]))
 
     def _group(self, rebels: Rebels, around: Situation) -> tuple[Rebels, Rows, Rows]:
         """The rebels in groups with support, the group of each, and the groups' sizes."""
@@ -125,7 +152,9 @@ class RebelCircles:
         turn = np.abs(wrap(beta[known] - circles.beta[rows]))
         like = speed[known] <= circles.speed[rows] + settings.eps_v_circle_rebel * around.scene_flow_pxps
         aligned = like & (turn < settings.eps_beta_circle_rebel_rad + np.arctan2(still[known], speed[known]))
+        extents = circles.width[rows], circles.height[rows]
         blend(circles, rows, members, known, settings)
+        self._remember_extents(circles, rows, *extents)
         change = np.where(aligned, np.float32(1), np.float32(-1))
         circles.trust[rows] = change_trust(circles.trust[rows], change, settings.tr_max)
 
@@ -140,6 +169,12 @@ class RebelCircles:
         self._contact(circles, rows, groups, rebels, members, around)
         edges.circle[rebels.rows] = row[label]
         return rows, evicted
+
+    def _remember_extents(self, circles: CircleTable, rows: Rows, width: Floats, height: Floats) -> None:
+        """An object shows ever other parts of itself: its extent grows at once and shrinks slowly."""
+        for column, before in ((circles.width, width), (circles.height, height)):
+            seen = column[rows]
+            column[rows] = np.maximum(seen, update_position(circles.trust[rows], self._settings.tr_cr, before, seen))
 
     def _normal_inside(self, edges: EdgeTable, members: Members, radius: Floats) -> Rows:
         """Edges that were seen to follow the flow inside the circle of each group; int (groups,)."""

@@ -6,6 +6,7 @@ ground. Whatever leaves that segment of a line moves by itself (a *mover*); what
 the horizon inside the vehicle's width, and stands above the ground, is *incoming*.
 """
 
+import math
 from dataclasses import dataclass, fields
 from typing import Self
 
@@ -18,9 +19,15 @@ from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 MOST_ASTRAY = 0.5  # share of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
+ASKEW = 0.25  # share of its way outwards that a corner between two things at different depths drifts
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
 GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
+NEIGHBOUR_PX = 28.0  # edges nearer than this, at a like depth, tell it together
+NEAR_PATH = 1.5  # half widths from the path, within which edges are looked at
+MOST_CANDIDATES = 200  # edges in the way; all pairs are compared
+NEWCOMER = 0.97  # share of the horizon within which a threat begins, so that it does not flicker at its end
+CERTAIN = 1.0  # standard deviations above the ground
 DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
 
 
@@ -131,54 +138,103 @@ def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
     slack = np.float32(focal * around.pitch_sigma_rad)
     reach = np.float32(around.camera_height_m) * focal
     ground_far = below - slack  # px below the horizon if the camera looks as far down as it may
-    ground_near = below + slack
     if around.camera_height_m > 0:
         least_mu = travelled * np.maximum(ground_far, 0) / (reach * np.float32(1 + GROUND_DIPS))
-        ground_mu = travelled * np.maximum(ground_near, 0) / reach
     else:
         least_mu = np.zeros_like(mu)
-        ground_mu = np.zeros_like(mu)
     short = r * least_mu - outward
     over = outward - r * travelled / np.float32(NEAREST_M)
     if not np.isfinite(around.speed_mps):  # then ΔZ has a direction and no size: only what leaves its line moves
         short, over = np.zeros_like(short), np.zeros_like(over)
     astray = np.float32(around.focus_sigma_px) * np.minimum(np.abs(mu), np.float32(MOST_ASTRAY))
     tolerance = around.delta_px + astray + links.sigma_px
-    mover = (np.abs(drift) > tolerance) | (short > tolerance) | (over > tolerance)
+    askew = np.float32(ASKEW) * np.abs(outward)
+    mover = (np.abs(drift) > tolerance + askew) | (short > tolerance) | (over > tolerance)
 
     closing = np.maximum(mu, np.float32(1e-6))
     range_m = travelled / closing
     speed = np.float32(around.speed_mps)
-    lateral = (x - np.float32(pinhole.cx)) / np.float32(pinhole.fx) - np.float32(
-        (around.focus[0] - pinhole.cx) / pinhole.fx
-    )
-    lateral_m = miss(lateral * range_m, range_m, around)
+    lateral_m = miss((x - np.float32(around.focus[0])) / np.float32(pinhole.fx) * range_m, range_m, around)
     ttc = range_m / np.maximum(speed, np.float32(1e-3))
+    incoming = np.zeros(len(x), np.bool_)
+    return Verdict(r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming)
+
+
+def find_incoming(verdict: Verdict, links: Links, x: Floats, y: Floats, known: Mask, around: Situation) -> None:
+    """Mark the edges of what stands in the way, and give them the range that they have together.
+
+    Near the focus a single edge hardly moves; its neighbours at a like depth lend it their evidence. 1/Z = V_e/(r V),
+    by least squares over the neighbours, with its standard deviation.
+    """
+    if not around.speed_mps > 0:
+        return
+    pinhole, focal, speed = around.pinhole, np.float32(around.pinhole.focal), np.float32(around.speed_mps)
+    lever = verdict.r * links.depth_m  # px m
+    reach_m = speed * np.float32(around.horizon_s)
+    sigma = np.float32(math.sqrt(2) * around.noise_px) + links.sigma_px
+    outward = verdict.expansion * links.elapsed_s * verdict.r
+    rows = np.flatnonzero((links.depth_m > 0) & ~verdict.mover & ((outward + 2 * sigma) * reach_m > lever))
+    nearest = np.minimum(reach_m / np.maximum(verdict.range_m[rows], np.float32(1e-3)), 1)
+    rows = rows[np.abs(verdict.lateral_m[rows]) * nearest < np.float32(NEAR_PATH * around.half_width_m)]
+    rows = rows[:: 1 + len(rows) // MOST_CANDIDATES]
+    if not len(rows):
+        return
+    x, y, lever, sigma, outward = x[rows], y[rows], lever[rows], sigma[rows], outward[rows]
+    inverse = outward / lever  # 1/Z
+    doubt = sigma / lever
+    below = y - np.float32(around.horizon_y)
+    if around.camera_height_m > 0:
+        lowest = np.maximum(below + focal * np.float32(around.pitch_sigma_rad), 0)
+        ground = lowest * np.float32((1 + around.ground_margin) / (around.camera_height_m * focal))
+    else:
+        ground = np.zeros_like(below)
+    away2 = np.square(x[:, None] - x) + np.square(y[:, None] - y)
+    weight = np.where(away2 < np.float32(NEIGHBOUR_PX**2), np.float32(1), np.float32(0))
+    weight *= np.abs(inverse[:, None] - inverse) < 2 * (doubt[:, None] + doubt)
+    weight *= np.square(1 / doubt)
+    total = weight.sum(axis=1)
+    inverse = (weight @ inverse) / total
+    excess = inverse - (weight @ ground) / total
+    doubt = 1 / np.sqrt(total) + links.sigma_px[rows] / lever
+    range_m = 1 / np.maximum(inverse, np.float32(1e-6))
+    right_m = (x - np.float32(around.focus[0])) / np.float32(pinhole.fx) * range_m
+    lateral = miss(right_m, range_m, around)
     height_m = np.float32(around.camera_height_m) - below / focal * range_m  # above the ground
-    noise = np.float32(2 * around.noise_px)
-    slowest = np.maximum(outward - np.float32(np.sqrt(2) * around.noise_px) - links.sigma_px, 0)
-    sure = slowest * np.float32(DOUBT * around.horizon_s) * speed > travelled * r
-    incoming = (
-        ~mover
-        & (sign > 0)
-        & (ttc < around.horizon_s)
-        & sure
-        & (np.abs(lateral_m) < around.half_width_m)
-        & (outward > noise + links.sigma_px)
-        & (outward - r * ground_mu * np.float32(1 + around.ground_margin) > noise)
+    soon = reach_m * np.where(known[rows], np.float32(1), np.float32(NEWCOMER))
+    meets = (
+        (way_to(right_m, range_m, around) < soon)
+        & (np.abs(lateral) < around.half_width_m)
         & (height_m < around.height_m)
     )
-    return Verdict(r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming)
+    meets &= (inverse - doubt) * np.float32(DOUBT) * reach_m > 1
+    meets &= (inverse > 2 * doubt) & (excess > np.float32(CERTAIN) * doubt)
+    verdict.incoming[rows] = meets
+    verdict.range_m[rows], verdict.lateral_m[rows], verdict.ttc_s[rows] = range_m, lateral, range_m / speed
 
 
 def miss(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
     """Distance of points from the vehicle's path, m, right positive: from the arc of speed and yaw rate."""
-    speed = around.speed_mps
-    if not np.isfinite(speed) or abs(around.yaw_rate_radps) < 1e-3 * max(abs(speed), 0.05):
+    radius = arc_radius_m(around)
+    if radius is None:
         return right_m
-    radius = np.float32(speed / around.yaw_rate_radps)  # of the arc, its centre to the left when positive
     distance = np.hypot(right_m + radius, ahead_m)
     return np.asarray((distance - np.abs(radius)) * np.sign(radius))
+
+
+def way_to(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
+    """How far the vehicle goes along its arc until points are beside it, m."""
+    radius = arc_radius_m(around)
+    if radius is None:
+        return ahead_m
+    return np.asarray(np.abs(radius) * np.arctan2(ahead_m, (right_m + radius) * np.sign(radius)))
+
+
+def arc_radius_m(around: Situation) -> np.float32 | None:
+    """Radius of the path, m, its centre to the left when positive; None: as good as straight."""
+    speed = around.speed_mps
+    if not np.isfinite(speed) or abs(around.yaw_rate_radps) < 1e-3 * max(abs(speed), 0.05):
+        return None
+    return np.float32(speed / around.yaw_rate_radps)
 
 
 def agree(whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float) -> Mask:

@@ -15,7 +15,7 @@ Rows = npt.NDArray[np.signedinteger[Any]]
 Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.floating[Any]]
 
-KEYS = 11  # key frames that an edge remembers
+KEYS = 16  # key frames that an edge remembers
 NO_CIRCLE = -1
 
 _EDGE_FIELDS = ("x", "y", "beta", "speed", "bl", "trust", "deviation", "origin_x", "origin_y")

@@ -116,7 +116,7 @@ def test_a_rebel_that_obeys_goes_home(crowd: Any, drive: Drive, box: Landmarks) 
 
 
 def test_a_rebel_that_obeys_takes_its_history_home(drive: Drive) -> None:
-    way = drive(np.array([(1.5, -1.2, 8.0)]), np.array([0.6, 0, 0]), until_s=0.6, frames=30)
+    way = drive(np.array([(1.5, -1.2, 8.0)]), np.array([0.6, 0, 0]), until_s=0.5, frames=30)
     assert {0} in rebels_by_frame(way)
     tables = LineCircleFilter(EVERY_FRAME, way.lens)
     for corners, motion in way:

@@ -167,6 +167,53 @@ def test_a_circle_without_rebels_loses_one_a_frame_until_it_goes(situation: Situ
     assert scene.update().trust == []
 
 
+def test_what_is_about_to_be_met_coasts_when_it_is_large(situation: Situation) -> None:
+    for extent_px, keeps in ((80.0, True), (20.0, False)):
+        scene = Scene(situation())
+        scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
+        scene.circles.ttc[:], scene.circles.width[:], scene.circles.height[:] = 0.2 * HORIZON_S, extent_px, extent_px
+        before = scene.trust
+        assert (scene.update().trust == before) == keeps
+
+
+def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
+    circles, pinhole = scene.circles, scene.around.pinhole
+    row = int(np.flatnonzero(circles.active)[0])
+    circles.ttc[row], circles.width[row], circles.height[row] = 0.2 * HORIZON_S, 100.0, 60.0
+    circles.x[row], circles.y[row] = 680.0, pinhole.cy
+    x, y = scene.expert.innermost(circles, pinhole)
+    assert (x[row], y[row]) == pytest.approx((630.0, pinhole.cy))
+    circles.ttc[row] = HORIZON_S
+    assert scene.expert.innermost(circles, pinhole)[0][row] == 680.0
+
+
+def test_what_a_nearer_circle_hides_waits_behind_it(situation: Situation) -> None:
+    scene = Scene(situation())
+    two = ((300, 200, 0.0, 60.0), (300, 320, math.pi, 60.0))
+    scene.update(*two).update(*two)
+    hidden, nearer = np.flatnonzero(scene.circles.active)[np.argsort(scene.circles.y[scene.circles.active])]
+    scene.circles.ttc[hidden], scene.circles.ttc[nearer] = 0.9 * HORIZON_S, 0.5 * HORIZON_S
+    scene.circles.trust[hidden] = trust = TR_MAX
+    scene.update(two[1])
+    assert scene.circles.trust[hidden] == trust - 1
+    scene.circles.y[nearer] = 210.0  # before it
+    scene.update((300, 210, math.pi, 60.0))
+    assert scene.circles.trust[hidden] == trust - 1
+
+
+def test_the_extent_grows_at_once_and_shrinks_slowly(scene: Scene) -> None:
+    scene.update((200, 200, 0.0, 60.0))
+    scene.circles.width[:] = 100.0
+    scene.update((203, 200, 0.0, 60.0))
+    shrunk = scene.circles.width[0]
+    assert 40 < shrunk < 100
+    scene.circles.width[:] = 1.0
+    scene.update((206, 200, 0.0, 60.0))
+    assert 20 < scene.circles.width[0] < shrunk
+
+
 def test_a_circle_keeps_its_identity_and_another_has_another(scene: Scene) -> None:
     away = (500.0, 150.0, 0.0, 120.0)
     scene.update(CROSSING)

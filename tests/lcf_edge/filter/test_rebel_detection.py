@@ -12,7 +12,17 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from lcf_edge.filter.flow import KeyFrames
-from lcf_edge.filter.rebel_detection import Links, Verdict, agree, give_birth, judge, links_since, miss
+from lcf_edge.filter.rebel_detection import (
+    Links,
+    Verdict,
+    agree,
+    find_incoming,
+    give_birth,
+    judge,
+    links_since,
+    miss,
+    way_to,
+)
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import EdgeTable
 
@@ -50,8 +60,11 @@ class Watched:
         at = self.drive.in_picture(seq).T
         return np.asarray(np.rint(at) if self.rounded else at, np.float32)
 
-    def verdict(self, key: int = 0) -> Verdict:
-        return judge(self.links(key), *self.place(STEPS), self.around)
+    def verdict(self, *, known: bool = False) -> Verdict:
+        links, (x, y) = self.links(), self.place(STEPS)
+        verdict = judge(links, x, y, self.around)
+        find_incoming(verdict, links, x, y, np.full(len(x), known), self.around)
+        return verdict
 
     def agreed(self) -> npt.NDArray[np.bool_]:
         whole, recent = self.links(0), self.links(1)
@@ -190,6 +203,32 @@ def test_the_miss_of_a_straight_drive_is_the_offset(situation: Around) -> None:
     right, ahead = np.array([-2.0, 0.5], np.float32), np.array([3.0, 9.0], np.float32)
     for around in (situation(), situation(speed_mps=math.nan, yaw_rate_radps=1.0), situation(speed_mps=0.0)):
         assert miss(right, ahead, around).tolist() == right.tolist()
+
+
+@pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5, 0.0])
+def test_the_way_to_a_point_is_as_long_as_the_arc_that_ends_beside_it(situation: Around, yaw_rate_radps: float) -> None:
+    around = situation(speed_mps=2.0, yaw_rate_radps=yaw_rate_radps)
+    for off in (-0.8, 0.0, 0.8):
+        right, ahead = off, 2.8
+        if yaw_rate_radps:
+            arc_m, turn = 2.0 / yaw_rate_radps, 0.7  # 2.8 m on the arc
+            right, ahead = (arc_m + off) * math.cos(turn) - arc_m, abs(arc_m + off) * math.sin(turn)
+        found = way_to(np.array([right], np.float32), np.array([ahead], np.float32), around)
+        assert found == pytest.approx(2.8, abs=1e-5)
+
+
+def test_neighbours_tell_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
+    """10 px from the focus an edge moves by a pixel or so; a dozen of them leave no doubt."""
+    few = [(0.06, -0.08, 6.5)]
+    many = [(x, y, 6.5) for x in (-0.08, 0.0, 0.08) for y in (-0.16, -0.12, -0.08, -0.04)]
+    assert not watch(few, noise_px=0.4).verdict().incoming.any()
+    assert watch(many, noise_px=0.4).verdict().incoming.sum() >= 9
+
+
+def test_a_threat_begins_a_little_inside_the_horizon_and_ends_at_it(watch: Watch) -> None:
+    wall = [(x, y, 4.75) for x in (-0.2, 0.2) for y in (-0.9, -0.5, -0.2)]  # 1.98 s from contact at the end
+    assert not watch(wall, horizon_s=2.0).verdict().incoming.any()
+    assert watch(wall, horizon_s=2.0).verdict(known=True).incoming.all()
 
 
 # Movers

@@ -1,0 +1,89 @@
+"""What every driver looks like from outside, and how one is kept open for as long as a vehicle runs."""
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Generic, Protocol, TypeVar
+
+from drivers.clock import SYSTEM_CLOCK, Clock
+from drivers.errors import DriverError
+
+Record = TypeVar("Record")
+Delivered = TypeVar("Delivered", covariant=True)
+
+FIRST_PAUSE_S = 0.1
+LONGEST_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
+LONGEST_HOPELESS_PAUSE_S = 10.0  # what only the user can mend
+
+
+class Device(Protocol[Delivered]):
+    """An open camera (``Delivered`` = ``Frame``) or IMU (``ImuSample``).
+
+    ``name``: as the user calls it. ``counts``: what was lost, late or refused, by reason; only grows.
+    """
+
+    name: str
+    counts: Counter[str]
+
+    def read(self) -> Sequence[Delivered]:
+        """Wait for what comes next and answer with it, oldest first; the wait is bounded by the device's rate.
+
+        An empty answer: what came was refused and counted. Raises ``DriverError`` when the device must be opened
+        again.
+        """
+        ...
+
+    def close(self) -> None:
+        """Let the device go; never raises, may be called twice."""
+        ...
+
+
+class KeptOpen(Generic[Record]):
+    """A device that is opened again whenever it fails, with pauses that grow to ``LONGEST_PAUSE_S``.
+
+    ``error``: why it is not open, None while it is. ``counts``: the device's own of all its openings, and
+    ``opened``, ``failed``.
+    """
+
+    def __init__(self, name: str, open_device: Callable[[], Device[Record]], clock: Clock = SYSTEM_CLOCK) -> None:
+        self.name = name
+        self.error: DriverError | None = None
+        self._open = open_device
+        self._clock = clock
+        self._device: Device[Record] | None = None
+        self._past: Counter[str] = Counter()
+        self._pause_s = FIRST_PAUSE_S
+
+    @property
+    def counts(self) -> Counter[str]:
+        """What was counted so far."""
+        return self._past if self._device is None else self._past + self._device.counts
+
+    def read(self) -> Sequence[Record]:
+        """What the device delivers; nothing, after a pause, while it is away. Never raises ``DriverError``."""
+        try:
+            if self._device is None:
+                self._device = self._open()
+                self._past["opened"] += 1
+                self.error = None
+            records = self._device.read()
+        except DriverError as error:
+            self._fail(error)
+            return []
+        if records:
+            self._pause_s = FIRST_PAUSE_S
+        return records
+
+    def _fail(self, error: DriverError) -> None:
+        self._past["failed"] += 1
+        self.close()
+        self.error = error
+        self._clock.sleep_s(self._pause_s)
+        longest_s = LONGEST_PAUSE_S if error.retry else LONGEST_HOPELESS_PAUSE_S
+        self._pause_s = min(2 * self._pause_s, longest_s)
+
+    def close(self) -> None:
+        """Let the device go."""
+        if self._device is not None:
+            self._device.close()
+            self._past += self._device.counts
+            self._device = None
