@@ -44,11 +44,23 @@ def test_the_commands_run(place: Path, monkeypatch: pytest.MonkeyPatch, endpoint
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
-@pytest.mark.parametrize("command", [command for command in COMMANDS if not command.startswith("lcf-edge ")])
+@pytest.mark.parametrize(
+    "command", [command for command in COMMANDS if not command.startswith(("lcf-edge ", "python "))]
+)
 def test_what_else_is_typed_is_a_target_of_make(command: str) -> None:
     make, target = shlex.split(command)
     done = subprocess.run([make, "--dry-run", target], cwd=ROOT, check=True, capture_output=True, text=True)
     assert {"demo": "lcf-edge demo --out demo-out", "test": "-m pytest"}[target] in done.stdout
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith("python ")])
+def test_a_driver_by_hand_understands_it_and_says_in_one_line_what_is_missing(command: str) -> None:
+    _, *arguments = shlex.split(command)
+    done = subprocess.run(
+        (sys.executable, *arguments), cwd=ROOT, check=False, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode in {0, 1}  # 2 would be wrong usage
+    assert len(done.stderr.splitlines()) == done.returncode
 
 
 def first_line(code: str, endpoint: str, publish: Callable[[ScenePublisher], object]) -> str:

@@ -1,0 +1,118 @@
+"""Exposure, gain and power-line frequency: set, read back, refused where the camera does not do it."""
+
+import errno
+from contextlib import suppress
+
+from drivers.camera.v4l2_errors import NOT_IMPLEMENTED
+from drivers.camera.v4l2_ioctl import (
+    CID_ANALOGUE_GAIN,
+    CID_AUTOGAIN,
+    CID_EXPOSURE_ABSOLUTE,
+    CID_EXPOSURE_AUTO,
+    CID_EXPOSURE_AUTO_PRIORITY,
+    CID_GAIN,
+    CID_POWER_LINE_FREQUENCY,
+    CTRL_DISABLED,
+    G_CTRL,
+    QUERYCTRL,
+    QUERYMENU,
+    S_CTRL,
+    Control,
+    ControlQuery,
+    MenuQuery,
+    Node,
+)
+from drivers.errors import UnsupportedSettingError
+
+EXPOSURE_UNIT_S = 1e-4
+_AUTOMATIC, _MANUAL, _SHUTTER_FIRST, _APERTURE_FIRST = 0, 1, 2, 3  # of CID_EXPOSURE_AUTO; 0 and 3 expose by themselves
+_POWER_LINE = {0: 0, 50: 1, 60: 2}
+_REFUSALS = (*NOT_IMPLEMENTED, errno.ERANGE, errno.EACCES, errno.EBUSY)  # of a value, not of the device
+
+
+def set_exposure(node: Node, exposure_s: float | None) -> None:
+    """Lock the exposure; None: the camera's automatic, without lowering its rate in the dark.
+
+    Raises ``UnsupportedSettingError``, ``OSError``.
+    """
+    if exposure_s is not None:
+        if _query(node, CID_EXPOSURE_AUTO):
+            _set(node, "the exposure's lock", CID_EXPOSURE_AUTO, _MANUAL)
+        _set(node, "the exposure in units of 100 µs", CID_EXPOSURE_ABSOLUTE, round(exposure_s / EXPOSURE_UNIT_S))
+        return
+    if _query(node, CID_EXPOSURE_AUTO) and _get(node, CID_EXPOSURE_AUTO) in {_MANUAL, _SHUTTER_FIRST}:
+        modes = [mode for mode in (_AUTOMATIC, _APERTURE_FIRST) if _in_menu(node, CID_EXPOSURE_AUTO, mode)]
+        if modes:  # else it has no automatic
+            _set(node, "the exposure's automatic", CID_EXPOSURE_AUTO, modes[0])
+    if _query(node, CID_EXPOSURE_AUTO_PRIORITY):
+        with suppress(UnsupportedSettingError):  # some cameras have it only for show
+            _set(node, "the rate's priority", CID_EXPOSURE_AUTO_PRIORITY, 0)
+
+
+def set_gain(node: Node, gain: int | None) -> None:
+    """Lock the gain, in the camera's own units; None: the camera's automatic.
+
+    Raises ``UnsupportedSettingError``, ``OSError``.
+    """
+    automatic = _query(node, CID_AUTOGAIN) is not None
+    if gain is None:
+        if automatic:
+            _set(node, "the gain's automatic", CID_AUTOGAIN, 1)
+        return
+    if automatic:
+        _set(node, "the gain's lock", CID_AUTOGAIN, 0)
+    _set(node, "the gain", CID_GAIN if _query(node, CID_GAIN) else CID_ANALOGUE_GAIN, gain)
+
+
+def set_power_line(node: Node, power_line_hz: int | None) -> None:
+    """Against flicker: 50 or 60 Hz, 0: off; None: as the camera is. Raises ``UnsupportedSettingError``, ``OSError``."""
+    if power_line_hz is not None:
+        _set(node, "the power-line frequency", CID_POWER_LINE_FREQUENCY, _POWER_LINE[power_line_hz])
+
+
+def _query(node: Node, control: int) -> ControlQuery | None:
+    """The control's range; None: the camera does not have it."""
+    try:
+        query = node.ask(QUERYCTRL, ControlQuery(id=control))
+    except OSError as error:
+        if error.errno in NOT_IMPLEMENTED:
+            return None
+        raise
+    return None if query.flags & CTRL_DISABLED else query
+
+
+def _in_menu(node: Node, control: int, index: int) -> bool:
+    try:
+        node.ask(QUERYMENU, MenuQuery(id=control, index=index))
+    except OSError as error:
+        if error.errno in NOT_IMPLEMENTED:
+            return False
+        raise
+    return True
+
+
+def _get(node: Node, control: int) -> int:
+    return int(node.ask(G_CTRL, Control(id=control)).value)
+
+
+def _set(node: Node, what: str, control: int, value: int) -> None:
+    query = _query(node, control)
+    if query is None:
+        raise UnsupportedSettingError(f"{node.name}: {what} cannot be set; leave it unset")
+    if not query.minimum <= value <= query.maximum:
+        raise UnsupportedSettingError(
+            f"{node.name}: {what} cannot be {value}; choose {query.minimum} to {query.maximum}, or leave it unset"
+        )
+    try:
+        node.ask(S_CTRL, Control(id=control, value=value))
+        taken = _get(node, control)
+    except OSError as error:
+        if error.errno not in _REFUSALS:
+            raise
+        raise UnsupportedSettingError(
+            f"{node.name}: {what} cannot be {value} ({error.strerror}); leave it unset"
+        ) from error
+    if abs(taken - value) >= max(query.step, 1):
+        raise UnsupportedSettingError(
+            f"{node.name}: {what} became {taken} instead of {value}; set {taken} or leave it unset"
+        )

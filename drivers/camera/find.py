@@ -1,0 +1,74 @@
+"""Which node is meant: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's own name."""
+
+import contextlib
+import errno
+from collections.abc import Iterator
+
+from drivers.camera.v4l2_errors import driver_error
+from drivers.camera.v4l2_ioctl import CAP_VIDEO_CAPTURE_MPLANE, LINUX, Kernel, Node
+from drivers.errors import DeviceMissingError, WrongDeviceError
+
+
+def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
+    """The capture node that is meant by ``device``: a path, or a name such as "HD Pro Webcam C920".
+
+    A name may be a part of the camera's, in any case; whole names go first. Raises ``DriverError``, among them
+    ``DeviceMissingError`` that tells which cameras there are, and ``WrongDeviceError`` for a node that gives no
+    pictures and for a name that two cameras have.
+    """
+    return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)
+
+
+def cameras(kernel: Kernel = LINUX) -> Iterator[Node]:
+    """All capture nodes that can be opened, each open until the next one is asked for."""
+    for path in kernel.nodes():
+        with contextlib.suppress(OSError), contextlib.closing(Node(path, path, kernel)) as node:
+            if node.is_camera:
+                yield node
+
+
+def _by_path(path: str, kernel: Kernel) -> Node:
+    try:
+        node = Node(path, path, kernel)
+    except OSError as error:
+        if error.errno in {errno.ENOENT, errno.ENODEV, errno.ENXIO}:
+            raise DeviceMissingError(f"{path}: no such camera; {_found(kernel)}") from error
+        raise driver_error(path, error) from error
+    if node.is_camera:
+        return node
+    node.close()
+    if node.caps & CAP_VIDEO_CAPTURE_MPLANE:
+        raise WrongDeviceError(
+            f"{path}: speaks only the multi-planar interface, which is not supported; {_found(kernel)}"
+        )
+    raise WrongDeviceError(f"{path}: gives no pictures (metadata, output or radio); {_found(kernel)}")
+
+
+def _by_name(name: str, kernel: Kernel) -> Node:
+    cards: dict[str, str] = {}
+    refused: OSError | None = None
+    for path in kernel.nodes():
+        try:
+            with contextlib.closing(Node(path, path, kernel)) as node:
+                if node.is_camera:
+                    cards[path] = node.card.casefold()
+        except OSError as error:
+            refused = error
+    wanted = name.casefold()
+    whole = [path for path, card in cards.items() if card == wanted]
+    paths = whole or [path for path, card in cards.items() if wanted in card]
+    if not paths:
+        if refused is not None and refused.errno in {errno.EACCES, errno.EPERM}:
+            raise driver_error(name, refused) from refused
+        raise DeviceMissingError(f"{name}: no camera of that name; {_found(kernel)}")
+    if len(paths) > 1:
+        raise WrongDeviceError(f"{name}: {' and '.join(paths)} are called so; name one by /dev/v4l/by-id/…")
+    try:
+        return Node(paths[0], name, kernel)
+    except OSError as error:
+        raise driver_error(name, error) from error
+
+
+def _found(kernel: Kernel) -> str:
+    found = ", ".join(f"{node.path} ({node.card})" for node in cameras(kernel))
+    return f"found: {found}" if found else "no camera is plugged in"

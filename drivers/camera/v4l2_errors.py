@@ -1,0 +1,51 @@
+"""What the kernel's error numbers mean to the user of a camera."""
+
+import errno
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from drivers.errors import (
+    DeviceBusyError,
+    DeviceForbiddenError,
+    DeviceLostError,
+    DeviceMissingError,
+    DriverError,
+    UnsupportedSettingError,
+    WrongDeviceError,
+)
+
+NOT_IMPLEMENTED = (errno.EINVAL, errno.ENOTTY)  # what a driver answers to a request that it does not know
+
+
+_MEANINGS: dict[int, tuple[type[DriverError], str]] = {
+    errno.ENOENT: (DeviceMissingError, "no such camera; plug it in, or name another one"),
+    errno.ENODEV: (DeviceLostError, "unplugged; plug it in again"),
+    errno.ENXIO: (DeviceLostError, "unplugged; plug it in again"),
+    errno.EBUSY: (DeviceBusyError, "in use by another program; close that (fuser -v /dev/video* names it)"),
+    errno.EACCES: (DeviceForbiddenError, "no permission; add this user to the group video and log in again"),
+    errno.EPERM: (DeviceForbiddenError, "no permission; add this user to the group video and log in again"),
+    errno.ENOTTY: (WrongDeviceError, "not a video device; name one of /dev/video* or /dev/v4l/by-id/*"),
+    errno.EISDIR: (WrongDeviceError, "not a video device; name one of /dev/video* or /dev/v4l/by-id/*"),
+    errno.ENOSPC: (
+        UnsupportedSettingError,
+        "its USB bus has not enough bandwidth left; choose MJPG, a smaller size or rate, or another port",
+    ),
+}
+
+
+def driver_error(name: str, error: OSError) -> DriverError:
+    """The error that tells the user what to do about ``error`` of the camera ``name``."""
+    known = _MEANINGS.get(error.errno or 0)
+    if known is None:
+        return DeviceLostError(f"{name}: fails ({error.strerror}); check cable and power")
+    kind, text = known
+    return kind(f"{name}: {text}")
+
+
+@contextmanager
+def told(name: str) -> Iterator[None]:
+    """Turns ``OSError`` into ``DriverError``."""
+    try:
+        yield
+    except OSError as error:
+        raise driver_error(name, error) from error

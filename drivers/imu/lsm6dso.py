@@ -1,0 +1,101 @@
+"""ST LSM6DSO and LSM6DSOX, which say the same of themselves.
+
+LSM6DSO data sheet DS12140 revision 2; LSM6DSOX data sheet DS12814 revision 3. Each word of the FIFO has a tag that
+says which sensor it is of and, by a count of two bits, of which moment.
+"""
+
+import struct
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+
+from drivers.imu.fifo_imu import FifoImu, closest
+from drivers.imu.i2c_chips import run_by_hand
+from drivers.imu.i2c_imu import Counts, Thermometer
+from drivers.imu.lsm6ds3 import (
+    ACCEL_RANGES,
+    CONTINUOUS,
+    CTRL1_XL,
+    CTRL2_G,
+    CTRL3_C,
+    FIFO_STATUS1,
+    GYRO_RANGES,
+    ODR_HZ,
+    OUT_TEMP_L,
+    RESET_S,
+    STEADY_WORDS,
+    SW_RESET,
+    WHO_AM_I,
+)
+
+FIFO_CTRL3 = 0x09  # 7:4 BDR_GY, 3:0 BDR_XL
+FIFO_CTRL4 = 0x0A  # 2:0 FIFO_MODE
+FIFO_DATA_OUT_TAG = 0x78  # 7:3 TAG_SENSOR, 2:1 TAG_CNT; a burst goes round to here after the 6 bytes of data
+
+GYRO, ACCEL = 1, 2  # TAG_SENSOR
+OVER_RUN_OR_FULL = 0x6800  # FIFO_OVR_IA, FIFO_FULL_IA, FIFO_OVR_LATCHED; of FIFO_STATUS1 and 2
+
+IDENTITIES = {0x6C: "LSM6DSO or LSM6DSOX"}
+
+
+class Lsm6dso(FifoImu):
+    """LSM6DSO or LSM6DSOX; see ``I2cImu``. ``counts["unpaired"]``: words whose other half never came."""
+
+    chip = "LSM6DSO"
+    usual_address = 0x6A
+    identity_register = WHO_AM_I
+    identities = IDENTITIES
+    gyro_ranges = GYRO_RANGES
+    accel_ranges = ACCEL_RANGES
+    thermometer = Thermometer(OUT_TEMP_L, "little", lsb_per_c=256, zero_c=25.0)
+    fifo_register = FIFO_DATA_OUT_TAG
+    fifo_bytes = 512 * 7
+    word_bytes = 7
+    frame = struct.Struct("<B3h")
+
+    def _granted_rate_hz(self, rate_hz: float) -> float:
+        return closest(ODR_HZ, rate_hz)
+
+    def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
+        odr = ODR_HZ[self.rate_hz]
+        return {
+            CTRL3_C: STEADY_WORDS,
+            CTRL1_XL: odr << 4 | accel_code << 2,
+            CTRL2_G: odr << 4 | gyro_code << 2,
+            FIFO_CTRL3: odr << 4 | odr,
+        }
+
+    def _reset(self) -> None:
+        self._write(CTRL3_C, SW_RESET)
+        self._clock.sleep_s(RESET_S)
+
+    def _fifo_level(self) -> int:
+        status = int.from_bytes(self._read(FIFO_STATUS1, 2), "little")
+        return self.fifo_bytes if status & OVER_RUN_OR_FULL else self.word_bytes * (status & 0x3FF)
+
+    def _empty_fifo(self) -> None:
+        self._write(FIFO_CTRL4, 0)
+        self._write(FIFO_CTRL4, CONTINUOUS)
+        self._halves: dict[int, Counts] = {}  # of the sample that is coming, by sensor
+        self._moment = 0
+
+    def _frames(self, data: bytes) -> Iterator[tuple[Counts, Counts]]:
+        for tag, x, y, z in self.frame.iter_unpack(data):
+            moment = tag & 0x06
+            if moment != self._moment:
+                if self._halves:
+                    self.counts["unpaired"] += 1
+                self._halves.clear()
+                self._moment = moment
+            self._halves[tag >> 3] = (x, y, z)
+            if GYRO in self._halves and ACCEL in self._halves:
+                yield self._halves[GYRO], self._halves[ACCEL]
+                self._halves.clear()
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run the chip by hand."""
+    return run_by_hand("lsm6dso", argv)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

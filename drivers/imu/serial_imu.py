@@ -1,0 +1,150 @@
+"""An IMU at a serial port that sends by itself: the port, a parser, and the times of its samples put together."""
+
+import argparse
+from collections import Counter
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+from drivers.by_hand import watch
+from drivers.clock import SYSTEM_CLOCK, Clock
+from drivers.errors import DeviceStalledError, WrongDeviceError
+from drivers.imu.serial_frames import Parser, Reading
+from drivers.imu.serial_port import SerialPort
+from drivers.imu.settings import ImuSettings
+from drivers.records import ImuSample
+from drivers.sample_clock import SampleClock
+
+FIRST_BYTE_S = 4.0  # many boards start anew when their port is opened
+STALLED_S = 1.0
+LONGEST_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
+FRAMES_BY_CHANCE = 3  # that noise can look like
+TICKS = 2**32  # counters of devices begin anew after so many
+LONGEST_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
+
+
+@dataclass(frozen=True, slots=True)
+class SerialProtocol:
+    """How a family of IMUs speaks. ``bauds``: those in use, the one taken unless told otherwise first."""
+
+    name: str
+    bauds: tuple[int, ...]
+    parser: Callable[[], Parser]
+    needs: str  # what must be switched on in the IMU, for the user
+    rate_hz: float | None = None  # where it is always the same
+    tick_hz: float | None = None  # of the device's own clock, where readings can have its time
+
+
+class SerialImu:
+    """A ``Device[ImuSample]``. Rate and ranges are those set in the IMU itself; nothing is written to it.
+
+    Raises what ``SerialPort`` raises; ``read`` also ``DeviceStalledError``, and ``WrongDeviceError`` when there are
+    bytes but no readings. Counts what the parser refuses, and ``restarted`` when the device's clock began anew.
+    """
+
+    def __init__(
+        self, protocol: SerialProtocol, port: str, baud: int = 0, rate_hz: float = 200.0, clock: Clock = SYSTEM_CLOCK
+    ) -> None:
+        self.name = f"{protocol.name} at {port}"
+        self._protocol = protocol
+        self._clock = clock
+        self._parser = protocol.parser()
+        self.counts: Counter[str] = self._parser.counts
+        self._rate_hz = protocol.rate_hz or rate_hz
+        self._stamps: SampleClock | None = None
+        self._unit_hz = self._rate_hz  # what the clock counts: samples, or ticks of the device's own clock
+        self._ticks: int | None = None
+        self._noise_bytes = 0
+        self._frames = 0  # when there last was a reading
+        self._port = SerialPort(port, baud or protocol.bauds[0])
+        self._heard_ns = clock.monotonic_ns()
+        self._patience_s = FIRST_BYTE_S
+
+    def read(self) -> list[ImuSample]:
+        """See ``Device``."""
+        data = self._port.read()
+        now_ns = self._clock.monotonic_ns()
+        if not data:
+            self._complain_of_silence(now_ns)
+            return []
+        self._heard_ns = now_ns
+        self._patience_s = STALLED_S
+        readings = self._parser.feed(data)
+        if not readings:
+            self._complain_of_noise(len(data))
+            return []
+        self._noise_bytes = 0
+        self._frames = self._parser.frames
+        stamps_ns = self._stamps_ns(now_ns, readings)
+        return [self._sample(reading, stamp_ns) for reading, stamp_ns in zip(readings, stamps_ns, strict=True)]
+
+    def close(self) -> None:
+        """See ``Device``."""
+        self._port.close()
+
+    def _complain_of_silence(self, now_ns: int) -> None:
+        silent_s = (now_ns - self._heard_ns) / 1e9
+        if silent_s > self._patience_s:
+            raise DeviceStalledError(
+                f"{self.name}: silent for {silent_s:.1f} s; check its power and wiring, and that it sends by itself"
+            )
+
+    def _complain_of_noise(self, count: int) -> None:
+        self._noise_bytes += count
+        if self._noise_bytes <= LONGEST_NOISE_BYTES:
+            return
+        if self._parser.frames - self._frames > FRAMES_BY_CHANCE:
+            raise WrongDeviceError(f"{self.name}: frames, but no sample in them; make it send {self._protocol.needs}")
+        usual = ", ".join(map(str, self._protocol.bauds))
+        raise WrongDeviceError(
+            f"{self.name}: {self._noise_bytes} bytes at {self._port.baud} baud and no valid frame; "
+            f"usual are {usual}: set imu.baud, or imu.driver if it is another IMU"
+        )
+
+    def _stamps_ns(self, now_ns: int, readings: Sequence[Reading]) -> list[int]:
+        if self._stamps is None:  # the first reading says whether the device tells its own time
+            self._unit_hz = (self._protocol.tick_hz if readings[0].ticks is not None else None) or self._rate_hz
+            self._stamps = SampleClock(self._unit_hz)
+        steps = [self._step(reading) for reading in readings]
+        if 0 in steps:
+            self.counts["restarted"] += 1
+            self._stamps.restart()
+        usual = max(round(self._unit_hz / self._rate_hz), 1)
+        return self._stamps.stamps_of_steps_ns(now_ns, [step or usual for step in steps])
+
+    def _step(self, reading: Reading) -> int:
+        """Units of the clock since the reading before; 0: unknown, the device's clock began anew."""
+        if self._unit_hz != self._protocol.tick_hz or reading.ticks is None:
+            return round((reading.lost + 1) * self._unit_hz / self._rate_hz)
+        before, self._ticks = self._ticks, reading.ticks
+        if before is None:
+            return 1
+        step = (reading.ticks - before) % TICKS
+        return step if step <= LONGEST_PAUSE_S * self._unit_hz else 0
+
+    def _sample(self, reading: Reading, stamp_ns: int) -> ImuSample:
+        gyro = reading.gyro
+        if reading.spans and self._stamps:  # the device took its own period for what it should be
+            scale = self._stamps.rate_hz / self._rate_hz
+            gyro = gyro[0] * scale, gyro[1] * scale, gyro[2] * scale
+            stamp_ns -= round(reading.spans / self._stamps.rate_hz / 2 * 1e9)
+        return ImuSample(stamp_ns, gyro, reading.accel, reading.saturated)
+
+
+def run_by_hand(protocol: SerialProtocol, argv: Sequence[str] | None) -> int:
+    """The command line of a protocol: open a port, print what comes."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("--port", default="/dev/ttyUSB0")
+    parser.add_argument("--baud", type=int, default=0, help=f"0: {protocol.bauds[0]}")
+    parser.add_argument("--rate", type=float, default=ImuSettings().rate_hz, help="that was set in the IMU, Hz")
+    parser.add_argument("--seconds", type=float, default=10.0)
+    arguments = parser.parse_args(argv)
+    return watch(
+        lambda: SerialImu(protocol, arguments.port, arguments.baud, arguments.rate), arguments.seconds, describe
+    )
+
+
+def describe(sample: ImuSample) -> str:
+    """A sample in one line."""
+    gyro = " ".join(f"{rate:+8.4f}" for rate in sample.gyro)
+    accel = " ".join(f"{acceleration:+8.3f}" for acceleration in sample.accel)
+    return f"{gyro} rad/s  {accel} m/s²{'  saturated' if sample.saturated else ''}"

@@ -1,0 +1,82 @@
+"""A serial port that is opened for one reader, read in bounded time, and says in one line what is wrong with it."""
+
+import errno
+import os
+import select
+import termios
+from contextlib import suppress
+from pathlib import Path
+
+import serial
+
+from drivers.errors import (
+    DeviceBusyError,
+    DeviceForbiddenError,
+    DeviceLostError,
+    DeviceMissingError,
+    DriverError,
+    UnsupportedSettingError,
+    WrongDeviceError,
+)
+
+READ_S = 0.1
+LARGEST_READ_BYTES = 4096
+USUAL_PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "serial[0-9]*")
+
+
+class SerialPort:
+    """An open port: 8 data bits, no parity, 1 stop bit. What was received before it was opened is thrown away.
+
+    ``path``: as /dev/ttyUSB0, or better /dev/serial/by-id/..., which is the same after a replug. Raises
+    ``DeviceMissingError``, ``DeviceForbiddenError``, ``DeviceBusyError``, ``WrongDeviceError`` (no serial port) or
+    ``UnsupportedSettingError`` (a baud rate that the port cannot do).
+    """
+
+    def __init__(self, path: str, baud: int) -> None:
+        self.path = path
+        self.baud = baud
+        try:
+            self._serial = serial.Serial(path, baud, timeout=0, exclusive=True)
+        except (OSError, termios.error, ValueError) as error:
+            raise _explained(error, path, baud) from error
+
+    def read(self) -> bytes:
+        """What has come, or what comes first; nothing after ``READ_S``. Raises ``DeviceLostError``."""
+        try:  # one look and one read, where the library's own read takes several
+            come, _, _ = select.select([self._serial], [], [], READ_S)
+            data = os.read(self._serial.fileno(), LARGEST_READ_BYTES) if come else b""
+        except OSError as error:
+            raise self._lost() from error
+        if come and not data:
+            raise self._lost()
+        return data
+
+    def _lost(self) -> DeviceLostError:
+        return DeviceLostError(f"{self.path}: the serial port went away; plug the IMU in again")
+
+    def close(self) -> None:
+        """Let it go."""
+        with suppress(OSError, termios.error):
+            self._serial.close()
+
+
+def ports(devices: Path = Path("/dev")) -> list[str]:
+    """The serial ports that are there, those with a lasting name first."""
+    return [str(path) for pattern in USUAL_PORTS for path in sorted(devices.glob(pattern))]
+
+
+def _explained(error: Exception, path: str, baud: int) -> DriverError:
+    code = error.errno if isinstance(error, OSError) else None
+    if isinstance(error, ValueError):
+        return UnsupportedSettingError(f"{path}: cannot do {baud} baud; set another imu.baud")
+    if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
+        there = ", ".join(ports())
+        found = f"there are {there}; set imu.port" if there else "there is none at all; plug the IMU in"
+        return DeviceMissingError(f"{path}: no such serial port; {found}")
+    if code in (errno.EACCES, errno.EPERM):
+        return DeviceForbiddenError(f"{path}: no permission; add the user to the group dialout and log in again")
+    if code in (errno.EAGAIN, errno.EBUSY):
+        return DeviceBusyError(f"{path}: another program has it open; stop that one (fuser {path} names it)")
+    if code == errno.EIO:
+        return DeviceLostError(f"{path}: the serial port does not answer; plug the IMU in again")
+    return WrongDeviceError(f"{path}: is no serial port; set imu.port")

@@ -1,0 +1,153 @@
+"""When samples were made, told from when they arrived: the device's own steady rate with the jitter removed.
+
+A device makes sample n at ``start + n * period`` of its own clock; the sample arrives later, by a serial adapter's
+latency timer, a poll or the scheduler, and never earlier. So the arrivals lie on or above a straight line, and the line
+wanted is the highest that lies below them all: it goes through the edge of their lower convex hull that spans the mean
+index (the linear program of Zhang, Liu & Xia, "Clock Synchronization Algorithms for Network Measurements", INFOCOM
+2002). A delay that is always there cannot be seen from here: that is what ``imu.time_offset_s`` is for.
+"""
+
+from collections import deque
+from collections.abc import Sequence
+from itertools import accumulate, pairwise
+
+FIRST_BLOCK_NS = 50e6  # of each block only the arrival with the least delay is kept
+BLOCK_NS = 200e6
+BLOCKS = 50  # kept: a rate that drifts is followed within 10 s
+NOMINAL_TRUST_NS = 0.25e9  # after so long only the rate seen counts, not the nominal one
+RATE_TRUST_NS = 2.5e9  # the same for a rate that was known before a gap
+KNOWN_NS = 0.5e9  # a rate that was seen for this long is known
+ASTRAY_PERIODS = 1.5  # as far from the line: samples that nobody counted, or counted twice; polls explain up to 1
+ASTRAY_NS = 10e6  # … and at least so far
+LATE_NS = 100e6  # … and late for so long: a backlog is read faster
+LATE_CALLS = 5
+SLEW = 0.005  # share by which stamps are stretched to follow the line once the rate is known
+FIRST_SLEW = 0.5  # … and shrunk at most before
+
+Point = tuple[int, float]  # sample, ns since the base
+
+
+class SampleClock:
+    """Recovers a device's own steady rate from the times at which its samples arrive (jitter removed).
+
+    Stamps are strictly increasing, also across ``restart``. A rate that is off nominal is known after about 1 s; until
+    then the nominal one helps out. A gap in which nobody counted the samples lost is noticed by what comes after being
+    late, for ``LATE_NS``; up to 1.5 samples lost pass for jitter. Memory is ``BLOCKS`` points.
+    """
+
+    def __init__(self, nominal_rate_hz: float) -> None:
+        if not nominal_rate_hz > 0:
+            raise ValueError(f"a rate must be positive, not {nominal_rate_hz} Hz")
+        self._nominal_ns = 1e9 / nominal_rate_hz
+        self._last_ns: int | None = None
+        self.restart()
+
+    @property
+    def rate_hz(self) -> float:
+        """The rate recovered so far, in seconds of the monotonic clock."""
+        return 1e9 / self._period_ns
+
+    def restart(self) -> None:
+        """Begin anew, after the device was initialised again."""
+        self._anchor(self._nominal_ns, NOMINAL_TRUST_NS)
+
+    def _anchor(self, period_ns: float, trust_ns: float) -> None:
+        """Forget the arrivals; go by ``period_ns`` until arrivals over more than ``trust_ns`` say otherwise."""
+        self._period_ns = self._prior_ns = period_ns
+        self._trust_ns = trust_ns
+        self._base_ns: int | None = None  # of the arrivals below
+        self._sample = 0  # the newest
+        self._offset_ns = 0.0  # of sample 0, since the base
+        self._blocks: deque[Point] = deque(maxlen=BLOCKS)
+        self._lowest: Point = (0, 0.0)  # of the block that is still open
+        self._block_ns = 0.0  # when it began
+        self._seen_ns = 0.0  # what the rate was taken from
+        self._on_time_ns = 0.0  # when an arrival was last not late
+        self._late_calls = 0
+
+    def stamps_ns(self, arrival_ns: int, count: int, lost: int = 0) -> list[int]:
+        """When each of ``count`` samples was made, oldest first, ns.
+
+        All of them were there at ``arrival_ns``, the newest had just been made; ``lost`` samples are known to be
+        missing before them.
+        """
+        return self.stamps_of_steps_ns(arrival_ns, [lost + 1] + [1] * (count - 1)) if count > 0 else []
+
+    def stamps_of_steps_ns(self, arrival_ns: int, steps: Sequence[int]) -> list[int]:
+        """The same for samples of which each was made ``steps`` periods (1 or more) after the one before it.
+
+        With the ticks of a device's own clock for periods, samples need not be evenly spaced.
+        """
+        if not steps:
+            return []
+        self._sample += sum(steps)
+        if self._base_ns is None or self._out_of_step(arrival_ns - self._base_ns):
+            self._base_ns, self._sample = arrival_ns, 0
+        self._take((self._sample, float(arrival_ns - self._base_ns)))
+        oldest = self._sample - sum(steps)
+        return [
+            self._stamp_ns(self._base_ns, oldest + since, step)
+            for since, step in zip(accumulate(steps), steps, strict=True)
+        ]
+
+    def _out_of_step(self, now_ns: float) -> bool:
+        """Whether samples were missed or counted twice, so that the line must be laid anew; keeps the rate."""
+        delay_ns = self._delay_ns((self._sample, now_ns))
+        astray_ns = max(ASTRAY_PERIODS * self._period_ns, ASTRAY_NS)
+        if delay_ns < astray_ns:
+            self._on_time_ns = now_ns
+            self._late_calls = 0
+        else:
+            self._late_calls += 1
+        late = self._late_calls >= LATE_CALLS and now_ns - self._on_time_ns > LATE_NS
+        rate_known = self._seen_ns > KNOWN_NS  # else it may be what is wrong
+        astray = rate_known and (late or delay_ns < -astray_ns)
+        if astray:
+            self._anchor(self._period_ns, RATE_TRUST_NS)
+        return astray
+
+    def _take(self, point: Point) -> None:
+        """Let an arrival of the newest sample move the line."""
+        if point[1] - self._block_ns > min(max(self._seen_ns / 8, FIRST_BLOCK_NS), BLOCK_NS):
+            self._blocks.append(self._lowest)
+            self._lowest, self._block_ns = point, point[1]
+            if len(self._blocks) > 1:
+                self._fit()
+        elif self._delay_ns(point) < self._delay_ns(self._lowest):
+            self._lowest = point
+        self._offset_ns += min(self._delay_ns(point), 0.0)  # nothing arrives before it was made
+
+    def _fit(self) -> None:
+        self._seen_ns = self._blocks[-1][1] - self._blocks[0][1]
+        seen = min(self._seen_ns / self._trust_ns, 1.0)
+        period_ns = self._prior_ns + seen * (_slope_below(self._blocks) - self._prior_ns)
+        self._period_ns = period_ns
+        self._offset_ns = min(now_ns - sample * period_ns for sample, now_ns in self._blocks)
+
+    def _delay_ns(self, point: Point) -> float:
+        return point[1] - self._offset_ns - point[0] * self._period_ns
+
+    def _stamp_ns(self, base_ns: int, sample: int, step: int) -> int:
+        stamp_ns = base_ns + round(self._offset_ns + sample * self._period_ns)
+        if self._last_ns is not None:
+            step_ns = step * self._period_ns
+            slew = SLEW if self._seen_ns > KNOWN_NS else FIRST_SLEW
+            stamp_ns = max(stamp_ns, self._last_ns + max(round((1 - slew) * step_ns), 1))
+            if self._seen_ns > KNOWN_NS:
+                stamp_ns = min(stamp_ns, self._last_ns + max(round((1 + slew) * step_ns), 1))
+        self._last_ns = stamp_ns
+        return stamp_ns
+
+
+def _slope_below(points: deque[Point]) -> float:
+    """Slope of the line below all points with the least distance to them, ns a sample."""
+    hull: list[Point] = []
+    for x, y in points:
+        while len(hull) > 1:
+            (x1, y1), (x2, y2) = hull[-2:]
+            if (y2 - y1) * (x - x2) < (y - y2) * (x2 - x1):
+                break
+            hull.pop()
+        hull.append((x, y))
+    mean = sum(x for x, _ in points) / len(points)
+    return next((y2 - y1) / (x2 - x1) for (x1, y1), (x2, y2) in pairwise(hull) if x2 >= mean)

@@ -1,0 +1,29 @@
+"""I2C IMUs as their registers, behind the interface of smbus2: the shipped drivers talk to them.
+
+``bus`` has the chips and the faults of the wire, ``chip`` what all chips share, ``motion`` what they feel (a
+recording). ``CHIPS`` has a model by the name that ``imu.driver`` gives to its driver. Sensitivities are written down
+here a second time, from the full scale, not taken from the drivers.
+"""
+
+from hil_mocks.i2c.bmi import Bmi160, Bmi270
+from hil_mocks.i2c.bno055 import Bno055
+from hil_mocks.i2c.bus import SimulatedBus
+from hil_mocks.i2c.chip import SimulatedChip
+from hil_mocks.i2c.icm20948 import Icm20948
+from hil_mocks.i2c.lsm6 import Lsm6ds3, Lsm6dso
+from hil_mocks.i2c.motion import Motion, replay
+from hil_mocks.i2c.mpu import Mpu6050, Mpu6500, Mpu9250
+
+CHIPS: dict[str, type[SimulatedChip]] = {
+    "mpu6050": Mpu6050,
+    "mpu6500": Mpu6500,
+    "mpu9250": Mpu9250,
+    "icm20948": Icm20948,
+    "lsm6ds3": Lsm6ds3,
+    "lsm6dso": Lsm6dso,
+    "bmi160": Bmi160,
+    "bmi270": Bmi270,
+    "bno055": Bno055,
+}
+
+__all__ = ["CHIPS", "Motion", "SimulatedBus", "SimulatedChip", "replay"]

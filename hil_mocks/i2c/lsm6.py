@@ -1,0 +1,131 @@
+"""LSM6DS3 and LSM6DSO as registers (DocID026899 rev. 8, DS12140 rev. 2)."""
+
+import math
+import struct
+from abc import abstractmethod
+from collections import deque
+from collections.abc import Mapping
+from typing import ClassVar
+
+from hil_mocks.i2c.chip import G_MPS2, SimulatedChip, counts
+from hil_mocks.i2c.motion import Vector
+
+SIX = struct.Struct("<hhh")
+ODR_HZ = (0.0, 12.5, 26.0, 52.0, 104.0, 208.0, 416.0, 833.0, 1660.0)
+FORCE_MG_PER_COUNT = (0.061, 0.488, 0.122, 0.244)  # by FS_XL: 2, 16, 4, 8 g
+TURN_MDPS_PER_COUNT = (8.75, 17.5, 35.0, 70.0)  # by FS_G
+
+
+class Lsm6(SimulatedChip):
+    """What both have alike."""
+
+    address = 0x6A
+    lsb_per_c: float
+
+    def rate_hz(self) -> float:
+        """Sample rate; 0 switched off."""
+        return min(ODR_HZ[self.registers[0x10] >> 4], ODR_HZ[self.registers[0x11] >> 4])
+
+    def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
+        """OUT_TEMP_L to OUTZ_H_XL."""
+        turn_radps = math.radians(TURN_MDPS_PER_COUNT[self.registers[0x11] >> 2 & 3]) / 1e3
+        force_mps2 = G_MPS2 * FORCE_MG_PER_COUNT[self.registers[0x10] >> 2 & 3] / 1e3
+        warmth = round((self.celsius - 25) * self.lsb_per_c)
+        return {
+            0x20: warmth.to_bytes(2, "little", signed=True),
+            0x22: SIX.pack(*counts(gyro, turn_radps, 1)),
+            0x28: SIX.pack(*counts(accel, force_mps2, 1)),
+        }
+
+    def _set(self, register: int, value: int) -> None:
+        if register == 0x12 and value & 0x01:
+            self.power_up()
+        elif register == self.mode_register and not value & 7:
+            super()._set(register, value)
+            self.clear_fifo()  # bypass
+        elif register != 0x0F:
+            super()._set(register, value)
+
+    @property
+    @abstractmethod
+    def mode_register(self) -> int:
+        """2:0 FIFO_MODE."""
+
+
+class Lsm6ds3(Lsm6):
+    """LSM6DS3: a FIFO of words of 2 bytes, gyro before accelerometer."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x69, 0x12: 0x04}
+    fifo_bytes = 8192
+    lsb_per_c = 16.0
+    mode_register = 0x0A
+
+    def push(self, packed: Mapping[int, bytes]) -> None:
+        """Both sensors, undecimated."""
+        if self.registers[0x0A] & 7 != 6 or not self.registers[0x0A] >> 3:
+            return
+        for bits, register in ((0x08, 0x22), (0x01, 0x28)):
+            if self.registers[0x08] & bits:
+                self._fifo += packed[register]
+        if len(self._fifo) > self.fifo_bytes:
+            del self._fifo[: len(self._fifo) - self.fifo_bytes]
+            self._overrun = True
+
+    def clear_fifo(self) -> None:
+        """Empty it."""
+        self._fifo = bytearray()
+        self._overrun = False
+
+    def _burst(self, register: int, length: int) -> bytes:
+        full = len(self._fifo) + 12 > self.fifo_bytes
+        words = 0 if full else len(self._fifo) // 2  # the count runs over too
+        flags = self._overrun << 14 | full << 13 | (not self._fifo) << 12
+        self.registers[0x3A:0x3C] = (flags | words).to_bytes(2, "little")
+        if register != 0x3E:
+            return super()._burst(register, length)
+        data = bytes(self._fifo[:length])
+        del self._fifo[:length]
+        return data.ljust(length, b"\x00")
+
+
+class Lsm6dsTrC(Lsm6ds3):
+    """LSM6DS3TR-C."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6A, 0x12: 0x04}
+    fifo_bytes = 4096
+    lsb_per_c = 256.0
+
+
+class Lsm6dso(Lsm6):
+    """LSM6DSO: a FIFO of tagged words of 7 bytes."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6C, 0x12: 0x04}
+    lsb_per_c = 256.0
+    mode_register = 0x0A
+    _moment = 0
+
+    def push(self, packed: Mapping[int, bytes]) -> None:
+        """Both sensors at the rates of FIFO_CTRL3."""
+        if self.registers[0x0A] & 7 != 6:
+            return
+        self._moment = (self._moment + 1) % 4
+        for sensor, rate, register in ((1, self.registers[0x09] >> 4, 0x22), (2, self.registers[0x09] & 15, 0x28)):
+            if rate:
+                tag = sensor << 3 | self._moment << 1
+                tag |= tag.bit_count() & 1  # even parity
+                self._overrun |= len(self._fifo) == self._fifo.maxlen
+                self._fifo.append(bytes([tag]) + packed[register])
+
+    def clear_fifo(self) -> None:
+        """Empty it."""
+        self._fifo: deque[bytes] = deque(maxlen=512)
+        self._overrun = False
+
+    def _burst(self, register: int, length: int) -> bytes:
+        full = len(self._fifo) == self._fifo.maxlen
+        flags = self._overrun << 14 | full << 13 | self._overrun << 11
+        self.registers[0x3A:0x3C] = (flags | len(self._fifo)).to_bytes(2, "little")
+        if register != 0x78:
+            return super()._burst(register, length)
+        words = [self._fifo.popleft() for _ in range(min(-(-length // 7), len(self._fifo)))]
+        return b"".join(words).ljust(length, b"\x00")[:length]

@@ -1,0 +1,95 @@
+"""From the bytes of a buffer to grey."""
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.camera.luminance import PIXEL_FORMATS, FrameError, least_stride, luminance
+from hil_mocks.v4l2_device import encode, picture
+
+WIDTH, HEIGHT = 64, 48
+IMAGE = picture(7, WIDTH, HEIGHT)
+RAW = tuple(name for name in PIXEL_FORMATS if name != "MJPG")
+JPEG = encode(IMAGE, "MJPG")
+
+
+def read(pixel_format: str, data: bytes, padding: int = 0) -> np.ndarray:
+    stride = least_stride(pixel_format, WIDTH) + padding
+    return luminance(pixel_format, memoryview(data), WIDTH, HEIGHT, stride)
+
+
+@pytest.mark.parametrize("padding", [0, 32])
+@pytest.mark.parametrize("pixel_format", RAW)
+def test_raw_formats_give_their_luminance_to_the_bit(pixel_format: str, padding: int) -> None:
+    image = read(pixel_format, encode(IMAGE, pixel_format, padding), padding)
+    assert np.array_equal(image, IMAGE)
+    assert image.flags.owndata
+    assert image.flags.c_contiguous
+
+
+def test_a_jpeg_of_colours_gives_its_luminance() -> None:
+    colour = np.dstack([IMAGE, np.roll(IMAGE, 9, axis=1), IMAGE[:, ::-1]])
+    jpeg = bytes(cv2.imencode(".jpg", colour, [cv2.IMWRITE_JPEG_QUALITY, 95])[1])
+    difference = cv2.absdiff(read("MJPG", jpeg), cv2.cvtColor(colour, cv2.COLOR_BGR2GRAY))
+    assert difference.mean() < 2
+
+
+def test_a_jpeg_may_be_filled_up_after_its_end() -> None:
+    assert np.abs(read("MJPG", JPEG + bytes(500)).astype(int) - IMAGE).max() < 10
+
+
+def test_a_jpeg_without_huffman_tables_has_the_standard_ones() -> None:
+    """As USB cameras send it."""
+    at = JPEG.index(b"\xff\xc4")
+    bare = JPEG
+    while (at := bare.find(b"\xff\xc4")) >= 0:
+        bare = bare[:at] + bare[at + 2 + int.from_bytes(bare[at + 2 : at + 4]) :]
+    assert np.abs(read("MJPG", bare).astype(int) - IMAGE).max() < 10
+
+
+def test_a_jpegs_orientation_does_not_turn_the_picture() -> None:
+    exif = bytes.fromhex("ffe1002245786966000049492a00080000000100120103000100000006000000000000000000")[:36]
+    assert read("MJPG", JPEG[:2] + exif + JPEG[2:]).shape == (HEIGHT, WIDTH)
+
+
+@pytest.mark.parametrize("pixel_format", RAW)
+def test_too_few_bytes_are_refused(pixel_format: str) -> None:
+    data = encode(IMAGE, pixel_format)
+    needed = least_stride(pixel_format, WIDTH) * HEIGHT
+    with pytest.raises(FrameError, match="short"):
+        read(pixel_format, data[: needed - 1])
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "short"),
+        (JPEG[: len(JPEG) // 2], "corrupt"),
+        (JPEG[:-2], "corrupt"),
+        (JPEG[2:], "corrupt"),
+        (b"\xff\xd8" + bytes(1000), "corrupt"),
+        (JPEG[: len(JPEG) // 2] + b"\xff\xe1" + JPEG[len(JPEG) // 2 :], "corrupt"),
+        (encode(picture(7, 2 * WIDTH, HEIGHT), "MJPG"), "wrong size"),
+    ],
+    ids=["nothing", "cut off", "without its end", "without its start", "zeros", "a lost packet", "another size"],
+)
+def test_a_damaged_jpeg_is_refused(data: bytes, reason: str) -> None:
+    with pytest.raises(FrameError, match=reason):
+        read("MJPG", data)
+
+
+def test_a_jpeg_that_claims_a_huge_size_takes_no_memory() -> None:
+    at = JPEG.index(b"\xff\xc0")
+    with pytest.raises(FrameError, match="wrong size"):
+        read("MJPG", JPEG[: at + 5] + b"\xff\xff\xff\xff" + JPEG[at + 9 :])
+
+
+@given(st.binary(max_size=400), st.integers(0, len(JPEG)), st.sampled_from(PIXEL_FORMATS))
+def test_any_bytes_are_a_picture_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
+    try:
+        outcome: object = read(pixel_format, JPEG[:at] + rubbish + JPEG[at + len(rubbish) :]).shape
+    except FrameError as error:
+        outcome = str(error)
+    assert outcome in ((HEIGHT, WIDTH), "short", "corrupt", "wrong size")

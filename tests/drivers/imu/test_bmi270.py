@@ -1,0 +1,51 @@
+"""BMI270: the vendor's configuration file, and the gyro's lean."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from drivers.errors import DeviceLostError
+from drivers.imu.bmi270 import FirmwareError
+from hil_mocks.i2c.bmi import Bmi270
+
+RigMaker = Callable[..., Any]
+
+
+def test_a_missing_file_is_told(rig: RigMaker, tmp_path: Path) -> None:
+    bench = rig("bmi270")
+    bench.firmware = tmp_path / "nothing.fw"
+    with pytest.raises(FirmwareError) as told:
+        bench.open()
+    assert str(told.value) == (
+        f"{tmp_path}/nothing.fw: cannot be read (No such file or directory);"
+        " put Bosch's bmi270-init-data.fw there or set imu.firmware"
+    )
+    assert not told.value.retry
+    assert bench.wire.closed
+
+
+@pytest.mark.parametrize("size", [0, 8191, 8193, 100_000])
+def test_a_file_of_another_size_is_told(rig: RigMaker, tmp_path: Path, size: int) -> None:
+    bench = rig("bmi270")
+    bench.firmware = tmp_path / "other.fw"
+    bench.firmware.write_bytes(bytes(size))
+    with pytest.raises(FirmwareError, match=r"other\.fw: not the 8192 bytes that a BMI270 wants"):
+        bench.open()
+
+
+def test_a_file_that_the_chip_refuses_is_told(rig: RigMaker, tmp_path: Path) -> None:
+    bench = rig("bmi270")
+    bench.firmware = tmp_path / "other.fw"
+    bench.firmware.write_bytes(Bmi270.firmware[::-1])
+    with pytest.raises(DeviceLostError, match=r"refuses the configuration file \(status 2\); is .* for a BMI270\?"):
+        bench.open()
+
+
+@pytest.mark.parametrize("lean", [-64, -20, 0, 63])
+def test_the_gyros_lean_is_taken_out(rig: RigMaker, lean: int) -> None:
+    bench = rig("bmi270", motion=lambda _: ((0.2, 0.1, 1.5), (0.0, 0.0, 9.8)))
+    bench.chip.lean = lean
+    samples = bench.read_for(0.2)
+    assert samples[-1].gyro == pytest.approx((0.2, 0.1, 1.5), abs=6e-4)
