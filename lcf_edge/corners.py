@@ -11,6 +11,7 @@ from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 
 BORDER_PX = 7  # the appearance samples must lie inside the picture
+FAST_FROM_PX = BORDER_PX - 3  # FAST itself leaves out 3 px
 RING_PX = (
     (4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3),
     (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
@@ -38,29 +39,33 @@ class CornerDetector:
 
     def detect(self, image: npt.NDArray[np.uint8]) -> tuple[Corners, int]:
         """Corners of a (height, width) picture, and how many were left out because the budget was full."""
-        keypoints = self._fast.detect(image)
+        middle = image[FAST_FROM_PX:-FAST_FROM_PX, FAST_FROM_PX:-FAST_FROM_PX]
+        keypoints = self._fast.detect(middle) if middle.size else ()
         found = len(keypoints)
-        pixel = np.asarray(cv2.KeyPoint.convert(keypoints), np.float32).reshape(-1, 2).astype(np.int32)
-        x, y = pixel[:, 0], pixel[:, 1]
-        inside = (x >= BORDER_PX) & (y >= BORDER_PX)
-        inside &= (x < self._lens.width - BORDER_PX) & (y < self._lens.height - BORDER_PX)
-        position = self._lens.undistort_pixels(x, y)
-        inside &= np.isfinite(position[:, 0])
-        keep = np.flatnonzero(inside)
-        evicted = 0
-        if len(keep) > self._capacity:
-            strength = np.fromiter(map(attrgetter("response"), keypoints), np.float32, found)[keep]
-            evicted = len(keep) - self._capacity
-            keep = keep[strongest_spread(pixel[keep], strength, self._capacity)]
-        pixel = pixel[keep]
-        position = position[keep]
-        base = pixel[:, 1] * np.int32(self._lens.width) + pixel[:, 0]
-        looks = np.take(image.reshape(-1), base[:, None] + self._ring).astype(np.int16)
-        mean = (looks.sum(axis=1, keepdims=True, dtype=np.int32) >> 4).astype(np.int16)
-        appearance = np.clip(looks - mean + np.int16(128), 0, 255).astype(np.uint8)
         if self._settings.fast_adaptive:
             self._adapt(found)
-        return Corners(pixel, position, appearance), evicted
+        pixel = np.asarray(cv2.KeyPoint.convert(keypoints), np.float32).reshape(-1, 2).astype(np.int32)
+        pixel += FAST_FROM_PX
+        position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
+        keep = np.arange(found)
+        if self._lens.bends:
+            keep = np.isfinite(position[:, 0]).nonzero()[0]
+        evicted = max(0, len(keep) - self._capacity)
+        if evicted:
+            strength = np.fromiter(map(attrgetter("response"), keypoints), np.float32, found)[keep]
+            keep = keep[strongest_spread(pixel[keep], strength, self._capacity)]
+        if len(keep) < found:
+            pixel, position = pixel.take(keep, axis=0), position.take(keep, axis=0)
+        return Corners(pixel, position, self._appearance(image, pixel)), evicted
+
+    def _appearance(self, image: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.uint8]:
+        """Grey samples around whole pixels, (n, 16); mean moved to 128, so that a change of light is no change."""
+        base = pixel[:, 1] * np.int32(self._lens.width) + pixel[:, 0]
+        looks: npt.NDArray[np.int16] = image.reshape(-1).take(base[:, None] + self._ring).astype(np.int16)
+        looks += np.int16(128) - (looks.sum(axis=1, keepdims=True, dtype=np.int16) >> 4)
+        np.maximum(looks, 0, out=looks)
+        np.minimum(looks, 255, out=looks)
+        return looks.astype(np.uint8)
 
     def _adapt(self, found: int) -> None:
         """Next frame's threshold.

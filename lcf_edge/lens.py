@@ -101,6 +101,13 @@ class Lens:
         gain[ray > self._reach] = np.nan
         return self._pixels(x * gain + p2 * s, y * gain + p1 * s)
 
+    def distort_xy(self, x: Any, y: Any) -> tuple[Any, Any]:
+        """``distort`` of positions given as two arrays, float32 (n,) px each."""
+        if not self.bends:
+            return x, y
+        placed = self.distort(np.stack((x, y), axis=1))
+        return placed[:, 0], placed[:, 1]
+
     def undistort(self, points: Points) -> Points:
         """Positions of the input frame → of the ideal pinhole (same fx, fy, cx, cy); float32 (n, 2), px.
 

@@ -6,6 +6,7 @@ from lcf_edge.config import Filter
 from lcf_edge.filter.circles import newborn_trust
 from lcf_edge.filter.flow import KeyFrames, wrap
 from lcf_edge.filter.rebel_detection import (
+    Baselines,
     Links,
     Rebels,
     Verdict,
@@ -13,7 +14,6 @@ from lcf_edge.filter.rebel_detection import (
     find_incoming,
     give_birth,
     judge,
-    links_since,
 )
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import KEYS, NO_CIRCLE, EdgeTable, Floats, Mask, Rows
@@ -40,12 +40,12 @@ class Alpha:
         if keys.number and waited_s < settings.key_interval_s:
             return False
         if keys.number and waited_s < 2 * settings.key_interval_s and n:
-            moved_px = float(np.median(np.abs(edges.speed[:n]))) * keys.since_s
+            middle = n // 2
+            moved_px = float(np.partition(np.abs(edges.speed[:n]), middle)[middle]) * keys.since_s
             if moved_px < settings.key_motion_px:
                 return False
-        held = edges.held[:n]
         slot = keys.mark()
-        edges.born_key[:n][held] = keys.number  # where ψ had it predicted is no key position
+        edges.born_key[:n][edges.held[:n]] = keys.number  # where ψ had it predicted is no key position
         edges.key_x[slot, :n] = edges.x[:n]
         edges.key_y[slot, :n] = edges.y[:n]
         return True
@@ -54,41 +54,53 @@ class Alpha:
         """Judge every edge that was seen and has a history; answers the rebels among them and the evictions."""
         edges, keys, n = self._edges, self._keys, self._edges.count
         oldest = np.maximum(edges.born_key[:n], keys.number - KEYS)
-        old_enough = keys.elapsed_s[oldest % KEYS] >= BASELINE_LEAST_S
-        rows = np.flatnonzero(edges.matched[:n] & (oldest < keys.number) & old_enough)
+        old_enough = (keys.elapsed_s >= BASELINE_LEAST_S).take(oldest % KEYS)
+        rows = (edges.matched[:n] & (oldest < keys.number) & old_enough).nonzero()[0]
         if not len(rows):
             return None, 0
-        x, y = edges.x[rows], edges.y[rows]
-        first = links_since(edges, rows, oldest[rows], keys, around)
+        x, y, oldest, rebel = edges.x.take(rows), edges.y.take(rows), oldest.take(rows), edges.rebel.take(rows)
+        baselines = Baselines(keys, around)
+        first = baselines.links(edges, rows, oldest)
         whole = judge(first, x, y, around)
-        find_incoming(whole, first, x, y, edges.rebel[rows], around)
+        find_incoming(whole, first, x, y, rebel, around)
         breaks = whole.mover | whole.incoming
-        rebel = edges.rebel[rows]
-        self._pardon(rows[rebel & ~breaks], rows[~rebel & ~breaks & (edges.links[rows] > 0)], around)
+        obeys = ~breaks
+        self._pardon(rows[rebel & obeys], rows[obeys & ~rebel & (edges.links.take(rows) > 0)], around)
 
-        suspects = np.flatnonzero(~rebel & breaks)
-        middle = (oldest[rows[suspects]] + keys.number - key) // 2
-        has_three = middle > oldest[rows[suspects]]
-        waiting = rows[suspects[~has_three]]
-        edges.links[waiting] = np.clip(edges.links[waiting] + key, 1, PENDING)
-        suspects, middle = suspects[has_three], middle[has_three]
+        suspects = (breaks & ~rebel).nonzero()[0]
         evicted = 0
         if len(suspects):
-            evicted = self._decide(rows[suspects], first.take(suspects), whole.take(suspects), middle, around)
+            middle = (oldest.take(suspects) + keys.number - key) // 2
+            has_three = middle > oldest.take(suspects)
+            self._wait(rows.take(suspects)[~has_three], key, around)
+            suspects, middle = suspects[has_three], middle[has_three]
+            if len(suspects):
+                evicted = self._decide(
+                    rows.take(suspects), first.take(suspects), whole.take(suspects), middle, baselines, around
+                )
 
-        at = np.flatnonzero(edges.rebel[rows] & breaks)
-        rows, links = rows[at], first.take(at)
-        edges.origin_x[rows], edges.origin_y[rows] = (
-            links.x,
-            links.y,
-        )  # O slides with the window of key frames
-        vx, vy = (x[at] - links.x) / links.elapsed_s, (y[at] - links.y) / links.elapsed_s
-        return Rebels(rows, x[at], y[at], vx, vy, links, whole.take(at)), evicted
+        at = (edges.rebel.take(rows) & breaks).nonzero()[0]
+        if not len(at):
+            return None, evicted
+        rows, links, x, y = rows.take(at), first.take(at), x.take(at), y.take(at)
+        edges.origin_x[rows], edges.origin_y[rows] = links.x, links.y  # O slides with the window of key frames
+        vx, vy = (x - links.x) / links.elapsed_s, (y - links.y) / links.elapsed_s
+        return Rebels(rows, x, y, vx, vy, links, whole.take(at)), evicted
 
-    def _decide(self, rows: Rows, first: Links, whole: Verdict, middle: Rows, around: Situation) -> int:
+    def _wait(self, rows: Rows, key: bool, around: Situation) -> None:
+        """Edges that break the flow, and are too young to be judged, are chains that wait for their third key frame."""
+        edges = self._edges
+        fresh = rows[edges.links[rows] == 0]
+        dx, dy = edges.x[fresh] - np.float32(around.focus[0]), edges.y[fresh] - np.float32(around.focus[1])
+        edges.beta[fresh] = np.arctan2(dy, dx)  # until now they followed their flow lines
+        edges.links[rows] = np.clip(edges.links[rows] + key, 1, PENDING)
+
+    def _decide(
+        self, rows: Rows, first: Links, whole: Verdict, middle: Rows, baselines: Baselines, around: Situation
+    ) -> int:
         """Success or failure, both free the chain: three links that agree make a rebel. Answers evictions."""
         edges, settings = self._edges, self._settings
-        second = links_since(edges, rows, middle, self._keys, around)
+        second = baselines.links(edges, rows, middle)
         recent = judge(second, edges.x[rows], edges.y[rows], around)
         ok = agree(whole, first.elapsed_s, recent, second.elapsed_s, settings.edge_noise_px)
         edges.links[rows[~ok]] = 0
@@ -112,10 +124,12 @@ class Alpha:
     def _pardon(self, rebels: Rows, chains: Rows, around: Situation) -> None:
         """What follows the flow again: rebels lose trust and go home to E_n when it runs out, chains are freed."""
         edges = self._edges
-        edges.trust[rebels] -= OBEDIENCE
-        self._send_home(rebels[edges.trust[rebels] < self._settings.tr_cr], around)
-        edges.links[chains] = 0
-        edges.speed[chains] = self._outward_speed(chains, around)
+        if len(rebels):
+            edges.trust[rebels] -= OBEDIENCE
+            self._send_home(rebels[edges.trust[rebels] < self._settings.tr_cr], around)
+        if len(chains):
+            edges.links[chains] = 0
+            edges.speed[chains] = self._outward_speed(chains, around)
 
     def _send_home(self, rows: Rows, around: Situation) -> None:
         edges = self._edges
@@ -133,9 +147,9 @@ class Alpha:
     def looked_at(self, circles: int) -> Mask:
         """Normal circles most of whose edges have a history that tells what moves; bool (circles,)."""
         edges, n, keys = self._edges, self._edges.count, self._keys
-        circle = edges.circle[:n]
-        member = (circle >= 0) & ~edges.rebel[:n]
-        oldest = np.maximum(edges.born_key[:n], keys.number - KEYS)
-        judged = member & (oldest < keys.number) & (keys.elapsed_s[oldest % KEYS] >= BASELINE_SURE_S)
-        members = np.bincount(circle[member], minlength=circles)
+        rows = ((edges.circle[:n] >= 0) & ~edges.rebel[:n]).nonzero()[0]
+        circle = edges.circle.take(rows)
+        oldest = np.maximum(edges.born_key.take(rows), keys.number - KEYS)
+        judged = (oldest < keys.number) & (keys.elapsed_s >= BASELINE_SURE_S).take(oldest % KEYS)
+        members = np.bincount(circle, minlength=circles)
         return np.asarray(2 * np.bincount(circle[judged], minlength=circles) > members)

@@ -45,12 +45,13 @@ def claim(edges: EdgeTable, circles: CircleTable, number: int, settings: Filter,
 
     Answers the rows (perhaps fewer than asked) and how many circles, old or new, found no place.
     """
-    free = np.flatnonzero(~circles.active)[:number]
-    weak = np.flatnonzero(circles.active & (circles.trust < newborn_trust(settings)))
-    weak = weak[np.argsort(circles.trust[weak], kind="stable")][: number - len(free)]
-    circles.active[weak] = False
-    release(edges, circles, rebel)
-    rows = np.concatenate([free, weak])
+    rows = free = (~circles.active).nonzero()[0][:number]
+    if number > len(free):
+        weak = (circles.active & (circles.trust < newborn_trust(settings))).nonzero()[0]
+        weak = weak[np.argsort(circles.trust[weak], kind="stable")][: number - len(free)]
+        circles.active[weak] = False
+        release(edges, circles, rebel)
+        rows = np.concatenate([free, weak])
     circles.active[rows] = True
     return rows, number - len(free)
 
@@ -69,7 +70,7 @@ class Members:
         self.size = np.bincount(label, minlength=groups)
         self._safe = np.maximum(self.size, 1).astype(np.float32)
         self.centre_x, self.centre_y = self.mean(x), self.mean(y)
-        off_x, off_y = x - self.centre_x[label], y - self.centre_y[label]
+        off_x, off_y = x - self.centre_x.take(label), y - self.centre_y.take(label)
         variance_x, variance_y = self.mean(off_x * off_x), self.mean(off_y * off_y)
         self.spread = variance_x + variance_y
         self.width = np.float32(EXTENT_SIGMAS) * np.sqrt(variance_x)
@@ -81,7 +82,8 @@ class Members:
 
     def radius(self, most_px: float) -> Floats:
         """R that holds most of each group, px."""
-        return np.clip(RADIUS_SIGMAS * np.sqrt(self.spread), RADIUS_LEAST_PX, most_px).astype(np.float32)
+        reach = np.float32(RADIUS_SIGMAS) * np.sqrt(self.spread)
+        return np.asarray(np.minimum(np.maximum(reach, np.float32(RADIUS_LEAST_PX)), np.float32(most_px)))
 
 
 def blend(circles: CircleTable, rows: Rows, members: Members, groups: Rows, settings: Filter) -> None:

@@ -10,7 +10,7 @@ from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, PsiTable
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
 LEAST_EDGES = 25  # that a correction of the rotation needs
 MOST_EDGES = 200  # and that are enough
-_ROUNDS = 3
+_ROUNDS = 2
 
 
 def derotate(
@@ -24,7 +24,9 @@ def derotate(
     h = pinhole.homography(rotation)
     n = edges.count
     roll = np.float32(math.atan2(rotation[1, 0], rotation[0, 0]))
-    places = [(edges.x[:n], edges.y[:n]), (edges.origin_x[:n], edges.origin_y[:n])]
+    turned = edges.own_way().nonzero()[0]
+    origin_x, origin_y = edges.origin_x.take(turned), edges.origin_y.take(turned)
+    places = [(edges.x[:n], edges.y[:n]), (origin_x, origin_y)]
     places += [(table.x, table.y) for table in (*circles, psi)]
     x, y = carry(h, np.concatenate([x for x, _ in places]), np.concatenate([y for _, y in places]))
     start = 0
@@ -32,34 +34,39 @@ def derotate(
         stop = start + len(to_x)
         to_x[:], to_y[:] = x[start:stop], y[start:stop]
         start = stop
-    edges.beta[:n] += roll
+    edges.origin_x[turned], edges.origin_y[turned] = origin_x, origin_y
+    edges.beta[turned] += roll
     for table in circles:
         table.beta += roll
 
 
 def missing_rotation(
-    pinhole: Pinhole, x: Floats, y: Floats, off_px: Floats, beta: Floats, prior_sigma_rad: float
+    pinhole: Pinhole, x: Floats, y: Floats, off_px: Floats, cos: Floats, sin: Floats, prior_sigma_rad: float
 ) -> tuple[Matrix, float]:
     """The small rotation that puts edges back on their flow lines; and what stays uncertain of it, rad.
 
     ``x``, ``y``: corners, float32 (n,) px. ``off_px``: their distances from the flow lines (``line_distance``), which
-    do not depend on depth. ``beta``: directions of the lines. Least squares, robust against what moves, with the
+    do not depend on depth. ``cos``, ``sin``: of β. Least squares, robust against what moves, with the
     gyro's uncertainty as prior. Answers a first-order rotation (3, 3), as in ``Motion.rotation``.
     """
     focal = np.float32(pinhole.focal)
-    u, v = (
-        (x - np.float32(pinhole.cx)) / np.float32(pinhole.fx),
-        (y - np.float32(pinhole.cy)) / np.float32(pinhole.fy),
-    )
-    cos, sin = np.cos(beta), np.sin(beta)
+    u = (x - np.float32(pinhole.cx)) * np.float32(1 / pinhole.fx)
+    v = (y - np.float32(pinhole.cy)) * np.float32(1 / pinhole.fy)
+    uv = u * v
     # px across the line for a rotation of 1 rad about x, y and z
-    across = focal * np.stack([sin * u * v - cos * (1 + v * v), -sin * (1 + u * u) + cos * u * v, sin * v + cos * u])
+    across = np.empty((3, len(x)), np.float32)
+    across[0] = sin * uv - cos * (1 + v * v)
+    across[1] = cos * uv - sin * (1 + u * u)
+    across[2] = sin * v + cos * u
+    across *= focal
     prior = np.eye(3) * (CORNER_SIGMA_PX / prior_sigma_rad) ** 2
     turn = np.zeros(3)
     information = prior
     for _ in range(_ROUNDS):
         rest = off_px - turn.astype(np.float32) @ across
-        weighted = across / np.square(1 + np.square(rest / np.float32(2 * CORNER_SIGMA_PX)))
+        rest *= np.float32(0.5 / CORNER_SIGMA_PX)
+        outlying = 1 + rest * rest
+        weighted = across / (outlying * outlying)
         information = (weighted @ across.T).astype(np.float64) + prior
         turn = np.linalg.solve(information, (weighted @ off_px).astype(np.float64))
     a, b, c = turn

@@ -1,5 +1,6 @@
 """The equations of the Circle expert for edges: predict, classify (λ*1 to λ*5), update; whole arrays, no state."""
 
+import math
 from dataclasses import dataclass
 from enum import IntEnum
 
@@ -7,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.filter.flow import line_distance, wrap
-from lcf_edge.filter.tables import Floats, Mask, Rows
+from lcf_edge.filter.tables import Floats, Rows
 
 CORNER_NOISE_PX = 0.7  # below this a displacement has no direction
 
@@ -30,23 +31,27 @@ UNMATCHED = np.float32(-1)
 
 @dataclass(frozen=True, slots=True)
 class Estimate:
-    """Predicted edges E'; float32 (n,): L' (``x``, ``y``, px), V' (``speed``, px/s), and the direction taken (rad)."""
+    """Predicted edges E'; float32 (n,): L' (``x``, ``y``, px), V' (``speed``, px/s), and the direction taken (``cos``,
+    ``sin`` of β)."""
 
     x: Floats
     y: Floats
     speed: Floats
-    beta: Floats
+    cos: Floats
+    sin: Floats
 
-    def take(self, rows: Rows | Mask) -> "Estimate":
+    def take(self, rows: Rows) -> "Estimate":
         """Some of them."""
-        return Estimate(self.x[rows], self.y[rows], self.speed[rows], self.beta[rows])
+        return Estimate(*(column.take(rows) for column in (self.x, self.y, self.speed, self.cos, self.sin)))
 
 
-def predict(x: Floats, y: Floats, beta: Floats, speed: Floats, expected_speed: Floats, dt_s: float) -> Estimate:
+def predict(
+    x: Floats, y: Floats, cos: Floats, sin: Floats, speed: Floats, expected_speed: Floats, dt_s: float
+) -> Estimate:
     """L' = L + V'·t_f along β; V' = ½(V + expected V) (section Edge Classifications, below eq. of E_n)."""
     halfway = np.float32(0.5) * (speed + expected_speed)
     step = halfway * np.float32(dt_s)
-    return Estimate(x + step * np.cos(beta), y + step * np.sin(beta), halfway, beta)
+    return Estimate(x + step * cos, y + step * sin, halfway, cos, sin)
 
 
 def classify(
@@ -56,38 +61,36 @@ def classify(
     corner_x: Floats,
     corner_y: Floats,
     bl: Floats,
-    delta_px: Floats | float,
+    delta_px: float,
     eps_beta_rad: float,
 ) -> npt.NDArray[np.int8]:
     """λ* class of each pair of an edge and a corner, int8 (n,), in the order 2, 3, 5, 1, 4: λ*5
     is a part of λ*1 and would never come after it.
 
-    ``x``, ``y``: L, where the edge was (derotated), px. ``bl``: BL, px. ``delta_px``: δ. All float32 (n,).
+    ``x``, ``y``: L, where the edge was (derotated), px. ``bl``: BL, px. All float32 (n,). ``delta_px``: δ.
     Speed agrees when the corner lies within half of BL of L' along the line, direction when the corner moved along
     the flow within ``eps_beta_rad`` (displacements below corner noise have none).
     """
+    cos, sin = estimate.cos, estimate.sin
     ahead_x, ahead_y = corner_x - estimate.x, corner_y - estimate.y
     moved_x, moved_y = corner_x - x, corner_y - y
-    cos, sin = np.cos(estimate.beta), np.sin(estimate.beta)
-    in_gate = np.hypot(ahead_x, ahead_y) <= bl
-    near_previous = np.hypot(moved_x, moved_y) <= bl
-    on_line = np.abs(line_distance(moved_x, moved_y, estimate.beta)) <= delta_px
-    along = np.abs(ahead_x * cos + ahead_y * sin)
-    moved = np.hypot(moved_x, moved_y)
-    ahead = np.where(estimate.speed < 0, estimate.beta + np.float32(np.pi), estimate.beta)
-    turn = np.abs(wrap(np.arctan2(moved_y, moved_x) - ahead))
-    noise = np.maximum(np.float32(CORNER_NOISE_PX), np.asarray(delta_px, np.float32))
-    agrees = (along <= np.maximum(np.float32(0.5) * bl, noise)) & ((moved <= 2 * noise) | (turn <= eps_beta_rad))
-    return np.select(
-        [in_gate & on_line & agrees, in_gate & on_line, on_line & near_previous, on_line],
-        [
-            np.int8(Relation.FOLLOWS),
-            np.int8(Relation.DISAGREES),
-            np.int8(Relation.STAYS),
-            np.int8(Relation.BEYOND),
-        ],
-        np.int8(Relation.BREAKS),
-    )
+    bl2 = bl * bl
+    in_gate = ahead_x * ahead_x + ahead_y * ahead_y <= bl2
+    moved2 = moved_x * moved_x + moved_y * moved_y
+    on_line = np.abs(line_distance(moved_x, moved_y, cos, sin)) <= np.float32(delta_px)
+    onwards = moved_x * cos + moved_y * sin
+    onwards = np.where(estimate.speed < 0, -onwards, onwards)
+    noise = np.float32(max(CORNER_NOISE_PX, delta_px))
+    agrees = onwards >= np.float32(math.cos(eps_beta_rad)) * np.sqrt(moved2)
+    agrees |= moved2 <= 4 * noise * noise
+    agrees &= np.abs(ahead_x * cos + ahead_y * sin) <= np.maximum(np.float32(0.5) * bl, noise)
+    relation = np.full(len(x), Relation.BREAKS, np.int8)
+    relation[on_line] = Relation.BEYOND
+    relation[on_line & (moved2 <= bl2)] = Relation.STAYS
+    on_line &= in_gate
+    relation[on_line] = Relation.DISAGREES
+    relation[on_line & agrees] = Relation.FOLLOWS
+    return relation
 
 
 def update_position(trust: Floats, tr_cr: float, predicted: Floats, measured: Floats) -> Floats:
@@ -105,7 +108,7 @@ def update_speed(
     enters with the weight that the corner has in L, 1/((Tr - Tr_cr) + 1): with its full weight the corner noise of
     one frame, divided by t_f, would be the noise of V.
     """
-    along = (corner_x - estimate.x) * np.cos(estimate.beta) + (corner_y - estimate.y) * np.sin(estimate.beta)
+    along = (corner_x - estimate.x) * estimate.cos + (corner_y - estimate.y) * estimate.sin
     weight = np.maximum(trust - np.float32(tr_cr), 0) + 1
     return np.asarray(estimate.speed + along / (np.float32(dt_s) * weight))
 
@@ -121,7 +124,7 @@ def update_gate(
 ) -> Floats:
     """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
     wanted = np.abs(estimate_speed - speed) * np.float32(dt_s) / corr
-    return np.clip(np.float32(0.5) * (wanted + bl), np.float32(least_px), np.float32(most_px))
+    return np.minimum(np.maximum(np.float32(0.5) * (wanted + bl), np.float32(least_px)), np.float32(most_px))
 
 
 def update_deviation(deviation: Floats, beta: Floats, beta_before: Floats) -> Floats:

@@ -54,13 +54,20 @@ class EdgeExpert:
         edges, n = self._edges, self._edges.count
         x, y, speed = edges.x[:n], edges.y[:n], edges.speed[:n]
         dx, dy = x - np.float32(around.focus[0]), y - np.float32(around.focus[1])
-        own_way = edges.rebel[:n] | (edges.links[:n] > 0)
-        edges.beta[:n] = np.where(own_way, edges.beta[:n], np.arctan2(dy, dx))
-        circle = edges.circle[:n]
-        newborn = (circle >= 0) & ~own_way & (edges.trust[:n] < self._settings.tr_s)
-        expected = np.where(newborn, self._normal.expansion.take(circle, mode="clip") * np.hypot(dx, dy), speed)
-        heading = edges.beta[:n] + np.where(edges.rebel[:n], edges.deviation[:n], 0)
-        return predict(x, y, heading, speed, expected, dt_s)
+        r = np.sqrt(dx * dx + dy * dy)
+        inverse = 1 / np.maximum(r, np.float32(1e-3))
+        cos, sin = dx * inverse, dy * inverse
+        own_way = edges.own_way()
+        turned = own_way.nonzero()[0]
+        if len(turned):
+            heading = edges.beta[turned] + np.where(edges.rebel[turned], edges.deviation[turned], 0)
+            cos[turned], sin[turned] = np.cos(heading), np.sin(heading)
+        newborn = (edges.trust[:n] < self._settings.tr_s) & ~own_way
+        newborn &= edges.circle[:n] >= 0
+        rows = newborn.nonzero()[0]
+        expected = speed.copy()
+        expected[rows] = self._normal.expansion.take(edges.circle[rows]) * r[rows]
+        return predict(x, y, cos, sin, speed, expected, dt_s)
 
     def find(self, estimate: Estimate, corners: Corners, kept: Rows, slack_px: float) -> Found:
         """Edges and corners that are the same landmark: near L' first, then, for the rest, near L.
@@ -73,34 +80,33 @@ class EdgeExpert:
         wanted = ~edges.held[:n]
         looks = edges.appearance[:n]
         likely = likeness_needed(looks, settings.appearance_max, settings.appearance_share)
-        first = self._matcher.pair(estimate.x, estimate.y, looks, gate, likely, wanted, corners, kept)
-        used = np.zeros(len(corners), np.bool_)
-        used[first.corner] = True
+        free = np.zeros(len(corners), np.bool_)
+        free[kept] = True
+        first = self._matcher.pair(estimate.x, estimate.y, looks, gate, likely, wanted, corners, free)
+        free[first.corner] = False
         wanted[first.edge] = False
-        wanted &= ~edges.rebel[:n] & (edges.links[:n] == 0)
-        left = kept[~used[kept]]
-        if not wanted.any() or not len(left):
+        wanted &= ~edges.own_way()
+        if not wanted.any() or not free.any():
             return first
         young = edges.trust[:n] < settings.tr_s
-        reach = np.maximum(gate, np.where(young, np.float32(settings.leap_px), np.float32(settings.bl0_px)) + slack)
-        half = np.float32(0.5) * likely  # a wider look needs a better likeness
-        second = self._matcher.pair(edges.x[:n], edges.y[:n], looks, reach, half, wanted, corners, left)
+        reach = np.where(young, np.float32(settings.leap_px), np.float32(settings.bl0_px))
+        reach = np.maximum(gate, reach + slack)
+        likely *= np.float32(0.5)  # a wider look needs a better likeness
+        second = self._matcher.pair(edges.x[:n], edges.y[:n], looks, reach, likely, wanted, corners, free)
         return Found(np.concatenate([first.edge, second.edge]), np.concatenate([first.corner, second.corner]))
 
     def off_line(
         self, estimate: Estimate, found: Found, x: Floats, y: Floats
-    ) -> tuple[Floats, Floats, Floats, Floats] | None:
-        """Trusted normal edges that tell about the camera's rotation: corners x, y, px off the flow line, β."""
-        edges = self._edges
-        rows = found.edge
-        steady = ~edges.rebel[rows] & (edges.links[rows] == 0) & (edges.trust[rows] >= self._settings.tr_s)
-        sample = np.flatnonzero(steady)
+    ) -> tuple[Floats, Floats, Floats, Floats, Floats] | None:
+        """Trusted normal edges that tell about the rotation: corners x, y, px off the flow line, cos β, sin β."""
+        edges, rows = self._edges, found.edge
+        sample = ((edges.trust.take(rows) >= self._settings.tr_s) & ~edges.own_way().take(rows)).nonzero()[0]
         if len(sample) < LEAST_EDGES:
             return None
         sample = sample[:: 1 + len(sample) // MOST_EDGES]
-        rows, x, y = rows[sample], x[found.corner[sample]], y[found.corner[sample]]
-        beta = estimate.beta[rows]
-        return x, y, line_distance(x - estimate.x[rows], y - estimate.y[rows], beta), beta
+        at, corner = estimate.take(rows.take(sample)), found.corner.take(sample)
+        x, y = x.take(corner), y.take(corner)
+        return x, y, line_distance(x - at.x, y - at.y, at.cos, at.sin), at.cos, at.sin
 
     def update(
         self,
@@ -120,25 +126,26 @@ class EdgeExpert:
         edge, corner = found.edge, found.corner
         at = estimate.take(edge)
         delta = settings.delta_px + 2 * rotation_px
-        before_x, before_y = edges.x[edge], edges.y[edge]
-        relation = classify(before_x, before_y, at, x[corner], y[corner], edges.bl[edge], delta, settings.eps_beta_rad)
-        relation[edges.rebel[edge] | (edges.links[edge] > 0)] = Relation.FOLLOWS  # λ*r: no flow line to leave
+        before_x, before_y = edges.x.take(edge), edges.y.take(edge)
+        cx, cy = x.take(corner), y.take(corner)
+        relation = classify(before_x, before_y, at, cx, cy, edges.bl.take(edge), delta, settings.eps_beta_rad)
+        relation[edges.own_way().take(edge)] = Relation.FOLLOWS  # λ*r: no flow line to leave
 
         # No match, λ*1, λ*4 and λ*5: the edge goes on as predicted.
         change = np.full(n, UNMATCHED)
         change[edges.held[:n]] = 0
-        change[edge] = TRUST_CHANGE[relation]
+        change[edge] = TRUST_CHANGE.take(relation)
         edges.x[:n], edges.y[:n], edges.speed[:n] = estimate.x, estimate.y, estimate.speed
         edges.matched[:n] = False
 
-        follows = (relation == Relation.FOLLOWS) | (relation == Relation.DISAGREES)
-        rows, seen = edge[follows], corner[follows]
-        self._include(rows, at.take(follows), x[seen], y[seen], motion.dt_s)
-        edges.appearance[rows] = corners.appearance[seen]
+        follows = ((relation == Relation.FOLLOWS) | (relation == Relation.DISAGREES)).nonzero()[0]
+        rows, seen = edge.take(follows), corner.take(follows)
+        self._include(rows, at.take(follows), cx.take(follows), cy.take(follows), motion.dt_s)
+        edges.appearance[rows] = corners.appearance.take(seen, axis=0)
         edges.matched[rows] = True
         edges.trust[:n] = change_trust(edges.trust[:n], change, settings.tr_max)
 
-        strays = np.flatnonzero((relation == Relation.BREAKS) | (relation == Relation.STAYS))
+        strays = ((relation == Relation.BREAKS) | (relation == Relation.STAYS)).nonzero()[0]
         strays = strays[: edges.capacity - n]
         self._stray(edge[strays], corner[strays], before_x[strays], before_y[strays], corners, x, y, motion.dt_s)
         taken = np.zeros(len(corners), np.bool_)
@@ -149,18 +156,21 @@ class EdgeExpert:
     def _include(self, rows: Rows, at: Estimate, x: Floats, y: Floats, dt_s: float) -> None:
         """L, V, BL of edges whose corner was found (eq. EnEstimation); β and DL of rebels and chains."""
         edges, settings = self._edges, self._settings
-        trust = edges.trust[rows]
+        trust = edges.trust.take(rows)
         edges.x[rows] = update_position(trust, settings.tr_cr, at.x, x)
         edges.y[rows] = update_position(trust, settings.tr_cr, at.y, y)
-        edges.speed[rows] = update_speed(trust, settings.tr_cr, at, x, y, dt_s)
-        circle = edges.circle[rows]
-        grouped = (circle >= 0) & ~edges.rebel[rows]
-        corr = np.where(grouped, np.maximum(self._normal.corr.take(circle, mode="clip"), np.float32(LEAST_CORR)), 1)
-        gate = update_gate(edges.bl[rows], edges.speed[rows], at.speed, corr, dt_s, settings.bl_min_px, settings.bl0_px)
-        own_way = edges.rebel[rows] | (edges.links[rows] > 0)
-        swing = np.float32(SWING_SHARE * dt_s) * np.abs(edges.speed[rows])  # what comes near accelerates in the picture
-        edges.bl[rows] = np.where(own_way, np.maximum(gate, swing), gate)
+        speed = update_speed(trust, settings.tr_cr, at, x, y, dt_s)
+        edges.speed[rows] = speed
+        own_way = edges.own_way().take(rows)
+        circle = edges.circle.take(rows)
+        corr = np.maximum(self._normal.corr.take(circle, mode="clip"), np.float32(LEAST_CORR))
+        corr[(circle < 0) | edges.rebel.take(rows)] = 1
+        gate = update_gate(edges.bl.take(rows), speed, at.speed, corr, dt_s, settings.bl_min_px, settings.bl0_px)
+        swing = np.float32(SWING_SHARE * dt_s) * np.abs(speed)  # what comes near accelerates in the picture
+        edges.bl[rows] = np.maximum(gate, swing, out=gate, where=own_way)
         rows = rows[own_way]
+        if not len(rows):
+            return
         dx, dy = edges.x[rows] - edges.origin_x[rows], edges.y[rows] - edges.origin_y[rows]
         before = edges.beta[rows]
         beta = np.where(np.hypot(dx, dy) > ORIGIN_LEAST_PX, np.arctan2(dy, dx), before)
@@ -198,8 +208,7 @@ class EdgeExpert:
     def delete(self) -> None:
         """Edges whose trust ran out, or that left the frame."""
         edges, n = self._edges, self._edges.count
-        inside = self._matcher.in_frame(edges.x[:n], edges.y[:n])
-        edges.remove(~inside | (edges.trust[:n] < self._settings.tr_cr))
+        edges.remove(~(self._matcher.in_frame(edges.x[:n], edges.y[:n]) & (edges.trust[:n] >= self._settings.tr_cr)))
 
     def add(
         self,
@@ -226,14 +235,13 @@ class EdgeExpert:
             edges.remove(dead)
             free = free[: max(0, room) + len(weak)]
         rows = edges.append(len(free))
-        x, y = x[free], y[free]
+        x, y = x.take(free), y.take(free)
         dx, dy = x - np.float32(around.focus[0]), y - np.float32(around.focus[1])
         edges.x[rows], edges.y[rows] = x, y
-        edges.beta[rows] = np.arctan2(dy, dx)
-        edges.speed[rows] = self._first_expansion(x, y, around, groups) * np.hypot(dx, dy)
+        edges.speed[rows] = self._first_expansion(x, y, around, groups) * np.sqrt(dx * dx + dy * dy)
         edges.bl[rows] = settings.bl0_px
         edges.trust[rows] = self._tr_new
-        edges.appearance[rows] = corners.appearance[free]
+        edges.appearance[rows] = corners.appearance.take(free, axis=0)
         edges.born_key[rows] = key_number
         edges.matched[rows] = True
         return rows, evicted

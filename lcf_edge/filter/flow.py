@@ -16,13 +16,13 @@ def wrap(angle: Floats) -> Floats:
     return np.asarray(np.pi - np.remainder(np.pi - angle, 2 * np.pi), np.float32)
 
 
-def line_distance(dx: Floats, dy: Floats, beta: Floats) -> Floats:
-    """Signed distance in px of an offset (dx, dy) from the line through the origin with direction ``beta`` in rad.
+def line_distance(dx: Floats, dy: Floats, cos: Floats, sin: Floats) -> Floats:
+    """Signed distance in px of an offset (dx, dy) from the line through the origin in the direction (cos β, sin β).
 
     The paper's error-span condition with O as IC and tan β as the slope; signed, and without a pole at vertical
     lines. Positive: to the right of the direction of flow as the picture shows it (y down).
     """
-    return dy * np.cos(beta) - dx * np.sin(beta)
+    return dy * cos - dx * sin
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,9 +52,9 @@ class Pinhole:
 
 def carry(h: Matrix, x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Image positions through a homography; x, y: float32 (n,) px."""
-    m = h.astype(np.float32)
-    scale = 1 / np.maximum(m[2, 0] * x + m[2, 1] * y + m[2, 2], np.float32(NEAR))
-    return (m[0, 0] * x + m[0, 1] * y + m[0, 2]) * scale, (m[1, 0] * x + m[1, 1] * y + m[1, 2]) * scale
+    a, b, c, d, e, f, g, i, j = map(np.float32, h.ravel().tolist())
+    scale = 1 / np.maximum(g * x + i * y + j, np.float32(NEAR))
+    return (a * x + b * y + c) * scale, (d * x + e * y + f) * scale
 
 
 class KeyFrames:

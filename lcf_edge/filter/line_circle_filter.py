@@ -83,13 +83,14 @@ class LineCircleFilter:
     def step(self, corners: Corners, motion: Motion) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive."""
         x, y = np.ascontiguousarray(corners.position.T)
+        self._matcher.fill(corners.pixel)
         around = self._derotate(motion)
 
         estimate = self._edge_expert.predict(around, motion.dt_s)
         omitted = self._line_expert.omit(corners, x, y, estimate, self._keys.number)
         evicted = self.groups.collect(self.normal, self.rebel, self._config.filter.tr_cr)
 
-        kept = np.flatnonzero(~omitted)
+        kept = (~omitted).nonzero()[0]
         found = self._edge_expert.find(estimate, corners, kept, self._slack_px(motion))
         estimate, sigma_rad = self._refine(estimate, found, x, y, motion)
         taken = self._edge_expert.update(estimate, found, corners, x, y, motion, sigma_rad * self._pinhole.focal)
@@ -138,7 +139,7 @@ class LineCircleFilter:
             self._keys.correct(rotation)
             self._carry(rotation)
             ex, ey = carry(self._pinhole.homography(rotation), estimate.x, estimate.y)
-            estimate = Estimate(ex, ey, estimate.speed, estimate.beta)
+            estimate = Estimate(ex, ey, estimate.speed, estimate.cos, estimate.sin)
         else:
             self._missing_px = self._config.filter.leap_px  # lost: look everywhere
         self._keys.blur(sigma_rad)

@@ -20,20 +20,20 @@ def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
 
     ``x``, ``y``: float32 (n,) px. Answers int32 (n,). Where regions overlap, the last row.
     """
-    rows = np.flatnonzero(psi.active)
+    rows = psi.active.nonzero()[0]
     holder = np.full(len(x), NO_CIRCLE, np.int32)
     if not len(rows) or not len(x):
         return holder
-    dx, dy = np.abs(x[:, None] - psi.x[rows]), np.abs(y[:, None] - psi.y[rows])
-    half_width, half_height = 0.5 * psi.width[rows], 0.5 * psi.height[rows]
-    inside = np.where(
-        psi.shape[rows] == Shape.CIRCLE,
-        dx * dx + dy * dy < half_width * half_width,
-        (dx < half_width) & (dy < half_height),
-    )
-    last = len(rows) - 1 - np.argmax(inside[:, ::-1], axis=1)
-    held = inside.any(axis=1)
-    holder[held] = rows[last[held]]
+    reach_x, reach_y = 0.5 * psi.width.take(rows), 0.5 * psi.height.take(rows)
+    left, right = psi.x.take(rows) - reach_x, psi.x.take(rows) + reach_x
+    # Most points are in no region's box: those go no farther.
+    point, region = ((x[:, None] > left) & (x[:, None] < right)).nonzero()
+    row = rows.take(region)
+    dx, dy = x.take(point) - psi.x.take(row), y.take(point) - psi.y.take(row)
+    round_ = psi.shape.take(row) == Shape.CIRCLE
+    reach = reach_x.take(region)
+    inside = (np.abs(dy) < reach_y.take(region)) & (~round_ | (dx * dx + dy * dy < reach * reach))
+    holder[point[inside]] = row[inside]
     return holder
 
 
@@ -148,14 +148,15 @@ class LineExpert:
             return np.zeros(len(corners), np.bool_)
         both = inside_psi(psi, np.concatenate([x, estimate.x]), np.concatenate([y, estimate.y]))
         of_corner, of_edge = both[: len(corners)], both[len(corners) :]
-        of_edge[edges.rebel[:n] | (edges.links[:n] > 0)] = NO_CIRCLE
-        held, inside = np.flatnonzero(of_edge != NO_CIRCLE), np.flatnonzero(of_corner != NO_CIRCLE)
+        of_edge[edges.own_way()] = NO_CIRCLE
+        held, inside = (of_edge != NO_CIRCLE).nonzero()[0], (of_corner != NO_CIRCLE).nonzero()[0]
         seen, expected = self._matcher.coincide(
-            estimate.x[held], estimate.y[held], corners.pixel[inside], self._settings.bl_min_px
+            estimate.x.take(held), estimate.y.take(held), inside, self._settings.bl_min_px
         )
-        end_surprised(psi, of_edge[held], seen, of_corner[inside], expected)
-        edges.held[:n] = (of_edge != NO_CIRCLE) & psi.active[of_edge]
+        end_surprised(psi, of_edge.take(held), seen, of_corner.take(inside), expected)
+        held = held[psi.active.take(of_edge.take(held))]
+        edges.held[held] = True
         # What is only predicted is no history, and is trusted like its circle, so that its corner soon corrects it.
-        edges.born_key[:n][edges.held[:n]] = key_number
-        edges.trust[:n][edges.held[:n]] = np.minimum(edges.trust[:n][edges.held[:n]], self._settings.tr_s)
-        return np.asarray((of_corner != NO_CIRCLE) & psi.active[of_corner])
+        edges.born_key[held] = key_number
+        edges.trust[held] = np.minimum(edges.trust[held], self._settings.tr_s)
+        return np.asarray((of_corner != NO_CIRCLE) & psi.active.take(of_corner, mode="clip"))

@@ -1,6 +1,7 @@
 """Corners and predicted edges find each other: by place through cells, by appearance, one to one."""
 
 from dataclasses import dataclass
+from typing import Any
 
 import cv2
 import numpy as np
@@ -16,7 +17,7 @@ LIKENESS_FLOOR = 3.0  # grey levels of camera noise
 _ROUNDS = 2
 
 Pairs = tuple[Rows, Rows]
-Indices = npt.NDArray[np.intp]
+Indices = npt.NDArray[np.signedinteger[Any]]
 
 
 class CornerIndex:
@@ -47,22 +48,22 @@ class CornerIndex:
 
         ``x``, ``y``: float32 (n,) px of the input frame, inside it. ``gate``: px, float32 (n,) or one for all.
         """
-        left = np.maximum(x - gate, 0).astype(np.intp) >> CELL_SHIFT
-        right = np.minimum((x + gate).astype(np.intp) >> CELL_SHIFT, self._columns - 1)
-        top = np.maximum(y - gate, 0).astype(np.intp) >> CELL_SHIFT
-        bottom = np.minimum((y + gate).astype(np.intp) >> CELL_SHIFT, self._rows - 1)
+        left = np.maximum(x - gate, 0).astype(np.int32) >> CELL_SHIFT
+        right = np.minimum((x + gate).astype(np.int32) >> CELL_SHIFT, self._columns - 1)
+        top = np.maximum(y - gate, 0).astype(np.int32) >> CELL_SHIFT
+        bottom = np.minimum((y + gate).astype(np.int32) >> CELL_SHIFT, self._rows - 1)
         who, row = _runs(top, bottom + 1 - top)
         base = row * self._columns
-        first = self._start[base + left[who]]
-        which, place = _runs(first, self._start[base + right[who] + 1] - first)
-        return who[which], self._order[place]
+        first = self._start.take(base + left.take(who))
+        which, place = _runs(first, self._start.take(base + right.take(who) + 1) - first)
+        return who.take(which), self._order.take(place)
 
 
 def _runs(first: Indices, length: Indices) -> tuple[Indices, Indices]:
     """All numbers of the runs first, first + 1, … of each ``length``, and the run that each belongs to."""
-    run = np.repeat(np.arange(len(length)), length)
-    offset = first - np.cumsum(length) + length
-    return run, offset[run] + np.arange(len(run))
+    run = np.arange(len(length)).repeat(length)
+    offset = first - length.cumsum() + length
+    return run, offset.take(run) + np.arange(len(run))
 
 
 def difference(one: npt.NDArray[np.uint8], other: npt.NDArray[np.uint8]) -> Floats:
@@ -79,8 +80,12 @@ def likeness_needed(appearance: npt.NDArray[np.uint8], most: float, share: float
     ``appearance``: uint8 (n, 16), mean at 128. A faint corner must look more alike than a strong one, else it is taken
     for its neighbours. Answers float32 (n,), at most ``most`` grey levels.
     """
-    flat = np.full_like(appearance, 128)
-    wanted = np.float32(LIKENESS_FLOOR) + np.float32(share) * difference(appearance, flat)
+    if not len(appearance):
+        return np.empty(0, np.float32)
+    contrast = cv2.reduce(cv2.absdiff(appearance, np.full_like(appearance, 128)), 1, cv2.REDUCE_SUM, dtype=cv2.CV_32F)[
+        :, 0
+    ]
+    wanted = np.float32(LIKENESS_FLOOR) + np.float32(share / APPEARANCE_SAMPLES) * contrast
     return np.asarray(np.minimum(wanted, np.float32(most)))
 
 
@@ -90,24 +95,23 @@ def one_to_one(edge: Rows, corner: Rows, cost: Floats, edges: int, corners: int)
     Rounds of mutual best choice: the pairs that are each other's cheapest are taken, then what is left chooses again.
     """
     taken: list[Rows] = []
-    left = np.argsort(cost, kind="stable")
+    left = cost.argsort(kind="stable")
     best_of_edge = np.empty(edges, np.intp)
     best_of_corner = np.empty(corners, np.intp)
+    used_edge = np.zeros(edges, np.bool_)
+    used_corner = np.zeros(corners, np.bool_)
     for _ in range(_ROUNDS):
         if not len(left):
             break
-        e, c = edge[left], corner[left]
+        e, c = edge.take(left), corner.take(left)
         backwards = left[::-1]  # the cheapest is written last and stays
         best_of_edge[e[::-1]] = backwards
         best_of_corner[c[::-1]] = backwards
-        mutual = (best_of_edge[e] == left) & (best_of_corner[c] == left)
-        chosen = left[mutual]
-        taken.append(chosen)
-        free_edge = np.ones(edges, np.bool_)
-        free_corner = np.ones(corners, np.bool_)
-        free_edge[edge[chosen]] = False
-        free_corner[corner[chosen]] = False
-        left = left[free_edge[e] & free_corner[c]]
+        mutual = ((best_of_edge.take(e) == left) & (best_of_corner.take(c) == left)).nonzero()[0]
+        taken.append(left.take(mutual))
+        used_edge[e.take(mutual)] = True
+        used_corner[c.take(mutual)] = True
+        left = left[~(used_edge.take(e) | used_corner.take(c))]
     return np.concatenate(taken) if taken else np.empty(0, np.intp)
 
 
@@ -125,18 +129,23 @@ class Matcher:
     def __init__(self, lens: Lens) -> None:
         self._lens = lens
         self._index = CornerIndex(lens.width, lens.height)
+        self._x = self._y = np.empty(0, np.float32)  # of the frame's corners, px of the input frame
 
     @property
     def nbytes(self) -> int:
         """Bytes that the index occupies, for good."""
         return self._index.nbytes
 
+    def fill(self, pixel: npt.NDArray[np.int32]) -> None:
+        """Take the corners of a frame; int32 (n, 2)."""
+        self._index.fill(pixel)
+        self._x, self._y = np.ascontiguousarray(pixel.T).astype(np.float32)
+
     def in_frame(self, x: Floats, y: Floats) -> Mask:
         """Whether positions of the ideal pinhole lie in the picture; bool (n,)."""
-        return self._in_picture(self._lens.distort(np.stack([x, y], axis=1)))
+        return self._in_picture(*self._lens.distort_xy(x, y))
 
-    def _in_picture(self, raw: Floats) -> Mask:
-        x, y = raw[:, 0], raw[:, 1]
+    def _in_picture(self, x: Floats, y: Floats) -> Mask:
         return np.asarray((x >= 0) & (y >= 0) & (x <= self._lens.width - 1) & (y <= self._lens.height - 1))
 
     def pair(
@@ -148,41 +157,44 @@ class Matcher:
         likely: Floats,
         wanted: Mask,
         corners: Corners,
-        among: Rows,
+        free: Mask,
     ) -> Found:
-        """One-to-one pairs of the ``wanted`` edges, looked for at (x, y), and the corners ``among`` those of a frame.
+        """One-to-one pairs of the ``wanted`` edges, looked for at (x, y), and the ``free`` corners of the frame.
 
         ``x``, ``y``, ``gate``: float32 (n,) px. ``looks``: uint8 (n, 16). ``likely``: float32 (n,), see
-        ``likeness_needed``.
+        ``likeness_needed``. ``wanted``: bool (n,); ``free``: bool (corners,).
         """
-        pixel = corners.pixel[among]
-        self._index.fill(pixel)
-        raw = self._lens.distort(np.stack([x, y], axis=1))
-        rows = np.flatnonzero(wanted & self._in_picture(raw))
-        who, what = self._index.candidates(raw[rows, 0], raw[rows, 1], gate[rows])
-        edge = rows[who]
-        off = raw[edge] - pixel[what]
-        away = np.hypot(off[:, 0], off[:, 1])
-        near = np.flatnonzero(away <= gate[edge])
-        edge, what, away = edge[near], what[near], away[near]
-        unlike = difference(looks[edge], corners.appearance[among[what]])
-        good = np.flatnonzero(unlike < likely[edge])
-        edge, what = edge[good], what[good]
-        cost = unlike[good] + np.float32(DISTANCE_COST) * away[good]
-        best = one_to_one(edge, what, cost, len(x), len(pixel))
-        return Found(edge[best], among[what[best]])
+        raw_x, raw_y = self._lens.distort_xy(x, y)
+        rows = (wanted & self._in_picture(raw_x, raw_y)).nonzero()[0]
+        raw_x, raw_y, gate = raw_x.take(rows), raw_y.take(rows), gate.take(rows)
+        who, what = self._index.candidates(raw_x, raw_y, gate)
+        dx, dy = self._x.take(what), self._y.take(what)
+        dx -= raw_x.take(who)
+        dy -= raw_y.take(who)
+        away2 = dx * dx + dy * dy
+        near = ((away2 <= (gate * gate).take(who)) & free.take(what)).nonzero()[0]
+        edge, what = rows.take(who.take(near)), what.take(near)
+        unlike = difference(looks.take(edge, axis=0), corners.appearance.take(what, axis=0))
+        good = (unlike < likely.take(edge)).nonzero()[0]
+        edge, what = edge.take(good), what.take(good)
+        cost = unlike.take(good) + np.float32(DISTANCE_COST) * np.sqrt(away2.take(near.take(good)))
+        best = one_to_one(edge, what, cost, len(x), len(free))
+        return Found(edge.take(best), what.take(best))
 
-    def coincide(self, x: Floats, y: Floats, pixel: npt.NDArray[np.int32], reach_px: float) -> tuple[Mask, Mask]:
+    def coincide(self, x: Floats, y: Floats, corners: Rows, reach_px: float) -> tuple[Mask, Mask]:
         """Which places have a corner within ``reach_px``, and which corners a place, whatever they look like.
 
-        ``x``, ``y``: (n,) px; ``pixel``: (m, 2). Answers bool (n,) and bool (m,).
+        ``x``, ``y``: (n,) px; ``corners``: rows of the frame's, (m,). Answers bool (n,) and bool (m,).
         """
-        raw = self._lens.distort(np.stack([x, y], axis=1))
-        inside = np.flatnonzero(self._in_picture(raw))
-        self._index.fill(pixel)
-        who, what = self._index.candidates(raw[inside, 0], raw[inside, 1], np.float32(reach_px))
-        near = (np.abs(raw[inside[who]] - pixel[what]) <= reach_px).all(axis=1)
-        place, corner = np.zeros(len(x), np.bool_), np.zeros(len(pixel), np.bool_)
-        place[inside[who[near]]] = True
+        raw_x, raw_y = self._lens.distort_xy(x, y)
+        inside = self._in_picture(raw_x, raw_y).nonzero()[0]
+        raw_x, raw_y = raw_x.take(inside), raw_y.take(inside)
+        who, what = self._index.candidates(raw_x, raw_y, np.float32(reach_px))
+        wanted = np.zeros(len(self._x), np.bool_)
+        wanted[corners] = True
+        near = (np.abs(raw_x.take(who) - self._x.take(what)) <= reach_px) & wanted.take(what)
+        near &= np.abs(raw_y.take(who) - self._y.take(what)) <= reach_px
+        place, corner = np.zeros(len(x), np.bool_), np.zeros(len(self._x), np.bool_)
+        place[inside.take(who[near])] = True
         corner[what[near]] = True
-        return place, corner
+        return place, corner.take(corners)

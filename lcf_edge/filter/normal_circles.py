@@ -35,7 +35,8 @@ class Flowing:
 
     def take(self, rows: Rows) -> "Flowing":
         """Some of them."""
-        return Flowing(*(getattr(self, name)[rows] for name in self.__slots__))
+        columns = (self.x, self.y, self.r, self.cos, self.sin, self.expansion)
+        return Flowing(self.rows.take(rows), *(column.take(rows) for column in columns))
 
 
 class NormalCircles:
@@ -73,13 +74,13 @@ class NormalCircles:
         """
         focus = around.focus
         flowing = self._flowing(edges, around)
-        owner, involved = self._involve(flowing, edges.circle[flowing.rows], circles, ignored)
+        owner, involved = self._involve(flowing, edges.circle.take(flowing.rows), circles, ignored)
         edges.circle[flowing.rows] = owner
         self._compare(flowing, owner, involved, circles, ignored)
         self._direct(circles, focus)
         circles.active &= circles.trust >= self._settings.tr_cr
         release(edges, circles, rebel=False)
-        left = np.flatnonzero(edges.circle[flowing.rows] == NO_CIRCLE)
+        left = (edges.circle.take(flowing.rows) == NO_CIRCLE).nonzero()[0]
         evicted = self._found(edges, circles, flowing.take(left), focus)
         self._direct(circles, focus)
         return evicted
@@ -87,30 +88,31 @@ class NormalCircles:
     def _flowing(self, edges: EdgeTable, around: Situation) -> Flowing:
         """The edges that may be grouped; eq. EdgeEncompare's |V_e| ≤ ε_V·V_ν is held to the depth of the scene."""
         settings, n, focus = self._settings, edges.count, around.focus
-        free = ~edges.rebel[:n] & ~edges.held[:n] & (edges.links[:n] == 0)
-        rows = np.flatnonzero(free & (edges.trust[:n] >= settings.tr_s))
-        x, y = edges.x[rows], edges.y[rows]
+        free = (edges.trust[:n] >= settings.tr_s) & ~(edges.own_way() | edges.held[:n])
+        rows = free.nonzero()[0]
+        x, y, speed = edges.x.take(rows), edges.y.take(rows), edges.speed.take(rows)
         dx, dy = x - np.float32(focus[0]), y - np.float32(focus[1])
-        r = np.maximum(np.hypot(dx, dy), np.float32(1))
-        flowing = Flowing(rows, x, y, r, dx / r, dy / r, edges.speed[rows] / r)
+        r = np.maximum(np.sqrt(dx * dx + dy * dy), np.float32(1))
+        flowing = Flowing(rows, x, y, r, dx / r, dy / r, speed / r)
         fastest = settings.eps_v * around.scene_flow_pxps / around.pinhole.focal
-        noise = np.float32(SPEED_NOISE_PX / self._dt_s) / r
-        return flowing.take(np.flatnonzero(np.abs(flowing.expansion) <= fastest + noise))
+        bounded = np.abs(speed) <= np.float32(fastest) * r + np.float32(SPEED_NOISE_PX / self._dt_s)
+        return flowing if bounded.all() else flowing.take(bounded.nonzero()[0])
 
     def _involve(self, flowing: Flowing, owner: Rows, circles: CircleTable, ignored: Mask) -> tuple[Rows, Mask]:
         """Circle of each edge, -1: none; and the circles that most of their edges still lie in (percentinvolve)."""
         capacity = circles.capacity
-        had = owner >= 0
-        before = np.bincount(owner[had], minlength=capacity)
-        fits, inside = self._fits(flowing, np.maximum(owner, 0), circles)
-        included = np.bincount(owner[had & inside], minlength=capacity)
-        owner = np.where(had & fits, owner, NO_CIRCLE)
-        loose, open_circles = np.flatnonzero(owner == NO_CIRCLE), np.flatnonzero(circles.active & ~ignored)
+        had = (owner >= 0).nonzero()[0]
+        members, kept = flowing.take(had), owner.take(had)
+        before = np.bincount(kept, minlength=capacity)
+        fits, inside = self._fits(members, kept, circles)
+        included = np.bincount(kept[inside], minlength=capacity)
+        owner[had[~fits]] = NO_CIRCLE
+        loose, open_circles = (owner == NO_CIRCLE).nonzero()[0], (circles.active & ~ignored).nonzero()[0]
         if len(loose) and len(open_circles):
             alone = flowing.take(loose)
-            away = np.square(alone.x[:, None] - circles.x[open_circles])
-            away += np.square(alone.y[:, None] - circles.y[open_circles])
-            nearest = open_circles[np.argmin(away, axis=1)]
+            away = np.square(alone.x[:, None] - circles.x.take(open_circles))
+            away += np.square(alone.y[:, None] - circles.y.take(open_circles))
+            nearest = open_circles.take(away.argmin(axis=1))
             fits, inside = self._fits(alone, nearest, circles)
             joins = fits & inside
             owner[loose[joins]] = nearest[joins]
@@ -119,20 +121,23 @@ class NormalCircles:
     def _fits(self, flowing: Flowing, owner: Rows, circles: CircleTable) -> tuple[Mask, Mask]:
         """Whether each edge agrees with its circle in direction, speed and place (EdgeEncompare); and lies inside."""
         settings = self._settings
-        away = np.hypot(flowing.x - circles.x[owner], flowing.y - circles.y[owner])
-        inside = away < circles.radius[owner] * np.float32(1.5) + 4
-        along = flowing.cos * np.cos(circles.beta[owner]) + flowing.sin * np.sin(circles.beta[owner])
-        centre = circles.expansion[owner]
+        dx, dy = flowing.x - circles.x.take(owner), flowing.y - circles.y.take(owner)
+        away2 = dx * dx + dy * dy
+        inside = np.sqrt(away2) < (circles.radius * np.float32(1.5) + 4).take(owner)
+        beta = circles.beta
+        along = flowing.cos * np.cos(beta).take(owner) + flowing.sin * np.sin(beta).take(owner)
+        centre = circles.expansion.take(owner)
         slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PX / self._dt_s) / flowing.r
-        fits = circles.active[owner] & (away < settings.bs_px) & (along > math.cos(settings.eps_beta_rad))
+        fits = (away2 < np.float32(settings.bs_px**2)) & (along > np.float32(math.cos(settings.eps_beta_rad)))
+        fits &= circles.active.take(owner)
         return fits & (np.abs(flowing.expansion - centre) < slack), inside
 
     def _compare(self, flowing: Flowing, owner: Rows, involved: Mask, circles: CircleTable, ignored: Mask) -> None:
         """Groups against circles: aligned Tr +1; deviated but well included, updated and Tr -1; unmatched Tr -1."""
         settings = self._settings
-        member = np.flatnonzero(owner >= 0)
+        member = (owner >= 0).nonzero()[0]
         edges = flowing.take(member)
-        members = Members(owner[member], circles.capacity, edges.x, edges.y)
+        members = Members(owner.take(member), circles.capacity, edges.x, edges.y)
         mean_cos, mean_sin = members.mean(edges.cos), members.mean(edges.sin)
         live = circles.active & ~ignored
         updated = live & involved & (members.size >= settings.circle_support)
@@ -140,7 +145,7 @@ class NormalCircles:
         mean_expansion = members.mean(edges.expansion)
         like = np.abs(mean_expansion) <= 10 * settings.eps_v * np.abs(circles.expansion)
         aligned = updated & like & (turn < settings.eps_beta_rad / 5)
-        rows = np.flatnonzero(updated)
+        rows = updated.nonzero()[0]
         circles.expansion[rows] = update_position(
             circles.trust[rows], settings.tr_cr, circles.expansion[rows], mean_expansion[rows]
         )
@@ -153,7 +158,7 @@ class NormalCircles:
         """β and V of normal circles follow from their place and expansion."""
         dx, dy = circles.x - np.float32(focus[0]), circles.y - np.float32(focus[1])
         circles.beta[:] = np.arctan2(dy, dx)
-        circles.speed[:] = circles.expansion * np.hypot(dx, dy)
+        circles.speed[:] = circles.expansion * np.sqrt(dx * dx + dy * dy)
 
     def _found(self, edges: EdgeTable, circles: CircleTable, left: Flowing, focus: tuple[float, float]) -> int:
         """New circles from the edges that are left: those of one cell of the picture and one octave of expansion."""
@@ -163,9 +168,9 @@ class NormalCircles:
         v = np.floor((left.y - np.float32(focus[1])) / size).astype(np.int64)
         octave = np.rint(np.log2(np.maximum(np.abs(left.expansion), np.float32(2.0**SLOWEST_OCTAVE))))
         key = ((v + CELLS // 2) % CELLS * CELLS + (u + CELLS // 2) % CELLS) * OCTAVES
-        key += np.minimum(octave.astype(np.int64) - SLOWEST_OCTAVE, OCTAVES - 1)
+        key += np.minimum(octave.astype(np.int32) - SLOWEST_OCTAVE, OCTAVES - 1)
         count = np.bincount(key, minlength=CELLS * CELLS * OCTAVES)
-        big = np.flatnonzero(count >= settings.circle_support)
+        big = (count >= settings.circle_support).nonzero()[0]
         if not len(big):
             return 0
         big = big[np.argsort(-count[big], kind="stable")]
@@ -173,8 +178,8 @@ class NormalCircles:
         number = np.full(len(count), NO_CIRCLE)
         number[big[: len(places)]] = np.arange(len(places))
         group = number[key]
-        chosen = np.flatnonzero(group >= 0)
-        born, group = left.take(chosen), group[chosen]
+        chosen = (group >= 0).nonzero()[0]
+        born, group = left.take(chosen), group.take(chosen)
         members = Members(group, len(places), born.x, born.y)
         give_birth(circles, places, members, np.arange(len(places)), settings, self._ids)
         circles.expansion[places] = members.mean(born.expansion)

@@ -96,14 +96,18 @@ class RebelCircles:
 
     def update(self, edges: EdgeTable, circles: CircleTable, rebels: Rebels | None, around: Situation) -> int:
         """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); answers evictions."""
-        live = np.flatnonzero(circles.active)
+        live = circles.active.nonzero()[0]
+        if rebels is None and not len(live):
+            return 0
         updated: Rows = np.empty(0, np.intp)
         evicted = 0
         if rebels is not None and len(rebels.rows):
             rebels, label, size = self._group(rebels, around)
             if len(size):
                 updated, evicted = self._meet(edges, circles, rebels, label, size, around)
-        missed = np.setdiff1d(live[circles.active[live]], updated)
+        was_updated = np.zeros(circles.capacity, np.bool_)
+        was_updated[updated] = True
+        missed = live[circles.active[live] & ~was_updated[live]]
         waits = self.coasting(circles)[missed] | self._hidden(circles, missed)
         circles.trust[missed[~waits]] -= 1
         circles.active &= (circles.ttc > 0) & (circles.trust >= self._settings.tr_cr)
@@ -122,11 +126,11 @@ class RebelCircles:
     def _group(self, rebels: Rebels, around: Situation) -> tuple[Rebels, Rows, Rows]:
         """The rebels in groups with support, the group of each, and the groups' sizes."""
         label = link(rebels, self._settings, around)
-        _, label, size = np.unique(label, return_inverse=True, return_counts=True)
+        size = np.bincount(label)
         big = size >= self._settings.rebel_support
-        number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE)[label]
-        chosen = np.flatnonzero(number >= 0)
-        return rebels.take(chosen), number[chosen], size[big]
+        number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE).take(label)
+        chosen = (number >= 0).nonzero()[0]
+        return rebels.take(chosen), number.take(chosen), size[big]
 
     def _meet(
         self, edges: EdgeTable, circles: CircleTable, rebels: Rebels, label: Rows, size: Rows, around: Situation

@@ -11,7 +11,6 @@ from dataclasses import dataclass, fields
 from typing import Self
 
 import numpy as np
-import numpy.typing as npt
 
 from lcf_edge.filter.flow import KeyFrames, wrap
 from lcf_edge.filter.situation import Situation
@@ -55,32 +54,31 @@ class Links(Columns):
     sigma_px: Floats
 
 
-def links_since(edges: EdgeTable, rows: Rows, key: npt.NDArray[np.int64], keys: KeyFrames, around: Situation) -> Links:
-    """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
-    pinhole = around.pinhole
-    slot_h = pinhole.homography(keys.rotation).reshape(KEYS, 9).astype(np.float32)
-    displacement = keys.displacement
-    moves = np.abs(displacement[:, 2]) > STILL_M
-    depth = np.where(moves, displacement[:, 2], 1.0)
-    focus_x = np.where(moves, pinhole.cx + pinhole.fx * displacement[:, 0] / depth, around.focus[0])
-    focus_y = np.where(moves, pinhole.cy + pinhole.fy * displacement[:, 1] / depth, around.focus[1])
-    per_slot = np.stack([focus_x, focus_y, displacement[:, 2], keys.elapsed_s, keys.sigma_rad * pinhole.focal]).astype(
-        np.float32
-    )
-    slot = key % KEYS
-    h = slot_h.T[:, slot]
-    kx, ky = edges.key_x[slot, rows], edges.key_y[slot, rows]
-    scale = 1 / (h[6] * kx + h[7] * ky + h[8])
-    fx, fy, dz, elapsed, sigma = per_slot[:, slot]
-    return Links(
-        (h[0] * kx + h[1] * ky + h[2]) * scale,
-        (h[3] * kx + h[4] * ky + h[5]) * scale,
-        fx,
-        fy,
-        dz,
-        elapsed,
-        sigma,
-    )
+class Baselines:
+    """What the displacement since each key frame implies for a picture; one column a slot of ``KeyFrames``."""
+
+    def __init__(self, keys: KeyFrames, around: Situation) -> None:
+        pinhole = around.pinhole
+        ahead = keys.displacement[:, 2]
+        moves = np.abs(ahead) > STILL_M
+        focus = keys.displacement[:, :2] / np.where(moves, ahead, 1.0)[:, None]
+        focus = np.where(moves[:, None], focus * (pinhole.fx, pinhole.fy) + (pinhole.cx, pinhole.cy), around.focus)
+        self._columns = np.empty((14, KEYS), np.float32)
+        self._columns[:9] = pinhole.homography(keys.rotation).reshape(KEYS, 9).T
+        self._columns[9:11] = focus.T
+        self._columns[11] = ahead
+        self._columns[12] = keys.elapsed_s
+        self._columns[13] = keys.sigma_rad * pinhole.focal
+
+    def links(self, edges: EdgeTable, rows: Rows, key: Rows) -> Links:
+        """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
+        slot = key % KEYS
+        h0, h1, h2, h3, h4, h5, h6, h7, h8, focus_x, focus_y, ahead, elapsed, sigma = self._columns.take(slot, axis=1)
+        place = slot * edges.capacity + rows
+        x, y = edges.key_x.take(place), edges.key_y.take(place)
+        scale = 1 / (h6 * x + h7 * y + h8)
+        then_x, then_y = (h0 * x + h1 * y + h2) * scale, (h3 * x + h4 * y + h5) * scale
+        return Links(then_x, then_y, focus_x, focus_y, ahead, elapsed, sigma)
 
 
 @dataclass(frozen=True, slots=True)
@@ -88,18 +86,16 @@ class Verdict(Columns):
     """What the links say; (n,) each.
 
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
-    it should be. ``over``: px beyond. ``expansion``: μ per second, 1/s. ``range_m``, ``lateral_m``, ``ttc_s``: if it
-    stands still. ``mover``, ``incoming``: bool.
+    it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
+    per second, 1/s. ``mover``, ``incoming``: bool, the latter as ``find_incoming`` finds.
     """
 
     r: Floats
     drift: Floats
     short: Floats
     over: Floats
+    outward: Floats
     expansion: Floats
-    range_m: Floats
-    lateral_m: Floats
-    ttc_s: Floats
     mover: Mask
     incoming: Mask
 
@@ -120,96 +116,91 @@ class Rebels(Columns):
 def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
     """Hold edges at ``x``, ``y`` (float32 (n,), px) against the flow of what stands still.
 
-    From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r. The lateral miss is measured from the arc that speed and
-    yaw rate give.
+    From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r.
     """
-    pinhole, focal = around.pinhole, np.float32(around.pinhole.focal)
     ax, ay = links.x - links.focus_x, links.y - links.focus_y
-    r = np.maximum(np.hypot(ax, ay), np.float32(1))
+    r = np.maximum(np.sqrt(ax * ax + ay * ay), np.float32(1))
+    inverse = 1 / r
     mx, my = x - links.x, y - links.y
-    outward = (mx * ax + my * ay) / r
-    drift = (my * ax - mx * ay) / r
-    sign = np.where(links.depth_m < 0, np.float32(-1), np.float32(1))
-    travelled = np.abs(links.depth_m)
-    outward = outward * sign
-    mu = outward / r
+    outward = (mx * ax + my * ay) * inverse
+    drift = (my * ax - mx * ay) * inverse
+    expansion = outward * inverse / links.elapsed_s
+    backwards = links.depth_m < 0
+    if backwards.any():
+        outward = np.where(backwards, -outward, outward)
+    way_out = np.abs(outward)
 
-    below = y - np.float32(around.horizon_y)
-    slack = np.float32(focal * around.pitch_sigma_rad)
-    reach = np.float32(around.camera_height_m) * focal
-    ground_far = below - slack  # px below the horizon if the camera looks as far down as it may
-    if around.camera_height_m > 0:
-        least_mu = travelled * np.maximum(ground_far, 0) / (reach * np.float32(1 + GROUND_DIPS))
-    else:
-        least_mu = np.zeros_like(mu)
-    short = r * least_mu - outward
-    over = outward - r * travelled / np.float32(NEAREST_M)
-    if not np.isfinite(around.speed_mps):  # then ΔZ has a direction and no size: only what leaves its line moves
-        short, over = np.zeros_like(short), np.zeros_like(over)
-    astray = np.float32(around.focus_sigma_px) * np.minimum(np.abs(mu), np.float32(MOST_ASTRAY))
-    tolerance = around.delta_px + astray + links.sigma_px
-    askew = np.float32(ASKEW) * np.abs(outward)
-    mover = (np.abs(drift) > tolerance + askew) | (short > tolerance) | (over > tolerance)
+    if math.isfinite(around.speed_mps):
+        lever = r * np.abs(links.depth_m)
+        over = outward - lever * np.float32(1 / NEAREST_M)
+        short = -outward
+        if around.camera_height_m > 0:
+            deepest_m = np.float32(around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
+            # px below the horizon if the camera looks as far down as it may
+            below = y - np.float32(around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad)
+            short += lever * np.maximum(below, 0) / deepest_m
+    else:  # then ΔZ has a direction and no size: only what leaves its line moves
+        short, over = np.zeros_like(r), np.zeros_like(r)
+    astray = np.float32(around.focus_sigma_px) * np.minimum(way_out * inverse, np.float32(MOST_ASTRAY))
+    tolerance = links.sigma_px + astray + np.float32(around.delta_px)
+    mover = np.abs(drift) > tolerance + np.float32(ASKEW) * way_out
+    mover |= np.maximum(short, over) > tolerance
+    return Verdict(r, drift, short, over, outward, expansion, mover, np.zeros(len(x), np.bool_))
 
-    closing = np.maximum(mu, np.float32(1e-6))
-    range_m = travelled / closing
-    speed = np.float32(around.speed_mps)
-    lateral_m = miss((x - np.float32(around.focus[0])) / np.float32(pinhole.fx) * range_m, range_m, around)
-    ttc = range_m / np.maximum(speed, np.float32(1e-3))
-    incoming = np.zeros(len(x), np.bool_)
-    return Verdict(r, drift, short, over, mu * sign / links.elapsed_s, range_m, lateral_m, ttc, mover, incoming)
+
+def near_path(verdict: Verdict, links: Links, x: Floats, around: Situation) -> Rows:
+    """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MOST_CANDIDATES``."""
+    reach_m = np.float32(around.speed_mps * around.horizon_s)
+    sigma = sigma_px(links, around)
+    lever = verdict.r * links.depth_m  # px m, negative: backwards
+    rows = (((verdict.outward + 2 * sigma) * reach_m > lever) & (lever > 0) & ~verdict.mover).nonzero()[0]
+    range_m = np.minimum(lever.take(rows) / np.maximum(verdict.outward.take(rows), np.float32(1e-3)), reach_m)
+    right_m = (x.take(rows) - np.float32(around.focus[0])) * np.float32(1 / around.pinhole.fx) * range_m
+    near = (np.abs(miss(right_m, range_m, around)) < np.float32(NEAR_PATH * around.half_width_m)).nonzero()[0]
+    return rows.take(near[:: 1 + len(near) // MOST_CANDIDATES])
+
+
+def sigma_px(links: Links, around: Situation) -> Floats:
+    """1 sigma of how far an edge went, px: of its two places, and of the rotation between."""
+    return links.sigma_px + np.float32(math.sqrt(2) * around.noise_px)
 
 
 def find_incoming(verdict: Verdict, links: Links, x: Floats, y: Floats, known: Mask, around: Situation) -> None:
-    """Mark the edges of what stands in the way, and give them the range that they have together.
+    """Mark the edges of what stands in the way.
 
     Near the focus a single edge hardly moves; its neighbours at a like depth lend it their evidence. 1/Z = V_e/(r V),
-    by least squares over the neighbours, with its standard deviation.
+    by least squares over the neighbours, with its standard deviation. ``known``: bool (n,), rebels already.
     """
-    if not around.speed_mps > 0:
-        return
-    pinhole, focal, speed = around.pinhole, np.float32(around.pinhole.focal), np.float32(around.speed_mps)
-    lever = verdict.r * links.depth_m  # px m
-    reach_m = speed * np.float32(around.horizon_s)
-    sigma = np.float32(math.sqrt(2) * around.noise_px) + links.sigma_px
-    outward = verdict.expansion * links.elapsed_s * verdict.r
-    rows = np.flatnonzero((links.depth_m > 0) & ~verdict.mover & ((outward + 2 * sigma) * reach_m > lever))
-    nearest = np.minimum(reach_m / np.maximum(verdict.range_m[rows], np.float32(1e-3)), 1)
-    rows = rows[np.abs(verdict.lateral_m[rows]) * nearest < np.float32(NEAR_PATH * around.half_width_m)]
-    rows = rows[:: 1 + len(rows) // MOST_CANDIDATES]
+    rows = near_path(verdict, links, x, around) if around.speed_mps > 0 else np.empty(0, np.intp)
     if not len(rows):
         return
-    x, y, lever, sigma, outward = x[rows], y[rows], lever[rows], sigma[rows], outward[rows]
-    inverse = outward / lever  # 1/Z
-    doubt = sigma / lever
+    focal = np.float32(around.pinhole.focal)
+    reach_m = np.float32(around.speed_mps * around.horizon_s)
+    x, y = x.take(rows), y.take(rows)
+    lever = verdict.r.take(rows) * links.depth_m.take(rows)
+    inverse = verdict.outward.take(rows) / lever  # 1/Z
+    doubt = sigma_px(links, around).take(rows) / lever
     below = y - np.float32(around.horizon_y)
-    if around.camera_height_m > 0:
-        lowest = np.maximum(below + focal * np.float32(around.pitch_sigma_rad), 0)
-        ground = lowest * np.float32((1 + around.ground_margin) / (around.camera_height_m * focal))
-    else:
-        ground = np.zeros_like(below)
-    away2 = np.square(x[:, None] - x) + np.square(y[:, None] - y)
-    weight = np.where(away2 < np.float32(NEIGHBOUR_PX**2), np.float32(1), np.float32(0))
-    weight *= np.abs(inverse[:, None] - inverse) < 2 * (doubt[:, None] + doubt)
-    weight *= np.square(1 / doubt)
+    away2 = np.square(x[:, None] - x)
+    away2 += np.square(y[:, None] - y)
+    alike = np.abs(inverse[:, None] - inverse) < 2 * (doubt[:, None] + doubt)
+    weight = ((away2 < np.float32(NEIGHBOUR_PX**2)) & alike) / (doubt * doubt)
     total = weight.sum(axis=1)
-    inverse = (weight @ inverse) / total
-    excess = inverse - (weight @ ground) / total
-    doubt = 1 / np.sqrt(total) + links.sigma_px[rows] / lever
-    range_m = 1 / np.maximum(inverse, np.float32(1e-6))
-    right_m = (x - np.float32(around.focus[0])) / np.float32(pinhole.fx) * range_m
-    lateral = miss(right_m, range_m, around)
-    height_m = np.float32(around.camera_height_m) - below / focal * range_m  # above the ground
-    soon = reach_m * np.where(known[rows], np.float32(1), np.float32(NEWCOMER))
-    meets = (
-        (way_to(right_m, range_m, around) < soon)
-        & (np.abs(lateral) < around.half_width_m)
-        & (height_m < around.height_m)
-    )
-    meets &= (inverse - doubt) * np.float32(DOUBT) * reach_m > 1
-    meets &= (inverse > 2 * doubt) & (excess > np.float32(CERTAIN) * doubt)
+    shared = (weight @ inverse) / total
+    excess = shared
+    if around.camera_height_m > 0:
+        lowest = np.maximum(below + np.float32(around.pinhole.focal * around.pitch_sigma_rad), 0)
+        ground = lowest * np.float32((1 + around.ground_margin) / (around.camera_height_m * around.pinhole.focal))
+        excess = shared - (weight @ ground) / total
+    doubt = 1 / np.sqrt(total) + links.sigma_px.take(rows) / lever
+    range_m = 1 / np.maximum(shared, np.float32(1e-6))
+    right_m = (x - np.float32(around.focus[0])) * np.float32(1 / around.pinhole.fx) * range_m
+    soon = reach_m * np.where(known.take(rows), np.float32(1), np.float32(NEWCOMER))
+    meets = (way_to(right_m, range_m, around) < soon) & (np.abs(miss(right_m, range_m, around)) < around.half_width_m)
+    meets &= np.float32(around.camera_height_m) - below / focal * range_m < around.height_m
+    meets &= (shared - doubt) * np.float32(DOUBT) * reach_m > 1
+    meets &= (shared > 2 * doubt) & (excess > np.float32(CERTAIN) * doubt)
     verdict.incoming[rows] = meets
-    verdict.range_m[rows], verdict.lateral_m[rows], verdict.ttc_s[rows] = range_m, lateral, range_m / speed
 
 
 def miss(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:

@@ -27,7 +27,7 @@ class EdgeTable:
     One table, because an edge changes sides and one matching must serve both. ``rebel`` tells E_r from E_n, ``links``
     > 0 marks an edge in α (ℓ, key frames for which it has broken the flow).
 
-    float32 columns: ``x``, ``y`` (L, px), ``beta`` (β, rad: the flow line of a normal edge, the motion of a rebel),
+    float32 columns: ``x``, ``y`` (L, px), ``beta`` (β, rad, of rebels and chains; others have their flow line),
     ``speed`` (V, px/s along β), ``bl`` (BL, px), ``trust`` (Tr), ``deviation`` (DL, rad), ``origin_x``, ``origin_y``
     (O of a rebel, px), and ``key_x``, ``key_y`` (KEYS, capacity): L at the last key frames, in their own axes.
     """
@@ -64,14 +64,18 @@ class EdgeTable:
         """Bytes that the table occupies, for good."""
         return self._floats.nbytes + self._shorts.nbytes + self._flags.nbytes + self.appearance.nbytes
 
+    def own_way(self) -> Mask:
+        """Edges that follow no flow line: rebels and chains; bool (count,)."""
+        return self.rebel[: self.count] | (self.links[: self.count] > 0)
+
     def remove(self, dead: Mask) -> None:
         """Delete rows; ``dead``: bool (count,). The last rows move into the gaps."""
         count = self.count
         alive = count - int(np.count_nonzero(dead))
         if alive == count:
             return
-        gaps = np.flatnonzero(dead[:alive])
-        movers = alive + np.flatnonzero(~dead[alive:])
+        gaps = dead[:alive].nonzero()[0]
+        movers = alive + (~dead[alive:]).nonzero()[0]
         self._copy(movers, gaps)
         self.count = alive
 

@@ -48,10 +48,10 @@ def relation(
     cos, sin = math.cos(beta), math.sin(beta)
     x, y = f32(WHERE[0]), f32(WHERE[1])
     speed = f32(step_px / DT_S)
-    estimate = predict(x, y, f32(beta), speed, speed, DT_S)
+    estimate = predict(x, y, f32(cos), f32(sin), speed, speed, DT_S)
     corner_x = estimate.x + np.float32(along_px * cos - across_px * sin)
     corner_y = estimate.y + np.float32(along_px * sin + across_px * cos)
-    (answer,) = classify(x, y, estimate, corner_x, corner_y, f32(bl_px), f32(delta_px), EPS_BETA_RAD)
+    (answer,) = classify(x, y, estimate, corner_x, corner_y, f32(bl_px), delta_px, EPS_BETA_RAD)
     return Relation(int(answer))
 
 
@@ -180,7 +180,7 @@ def test_trust_is_never_more_than_the_most() -> None:
 
 @pytest.mark.parametrize("beta", DIRECTIONS)
 def test_prediction_goes_half_its_own_speed_and_half_the_expected_one(beta: float) -> None:
-    estimate = predict(f32(100), f32(50), f32(beta), f32(60), f32(40), 0.5)
+    estimate = predict(f32(100), f32(50), f32(math.cos(beta)), f32(math.sin(beta)), f32(60), f32(40), 0.5)
     assert estimate.speed == 50.0
     assert estimate.x == pytest.approx(100 + 25 * math.cos(beta), abs=1e-4)
     assert estimate.y == pytest.approx(50 + 25 * math.sin(beta), abs=1e-4)
@@ -200,7 +200,7 @@ def test_location_weighs_the_prediction_by_trust_above_the_critical(trust: float
 )
 def test_speed_takes_the_residual_along_the_line(beta: float, trust: float, beyond_px: float, expected: float) -> None:
     """50 px/s and 6 px in half a second, at weight 1/((Tr - Tr_cr) + 1); what is across the line does not count."""
-    at = Estimate(f32(100), f32(50), f32(50), f32(beta))
+    at = Estimate(f32(100), f32(50), f32(50), f32(math.cos(beta)), f32(math.sin(beta)))
     x = f32(100 + beyond_px * math.cos(beta) - 3 * math.sin(beta))
     y = f32(50 + beyond_px * math.sin(beta) + 3 * math.cos(beta))
     assert update_speed(f32(trust), 2.0, at, x, y, 0.5) == pytest.approx(expected, abs=1e-3)
@@ -244,5 +244,5 @@ def test_deviation_halves_its_error(deviation: float, turn: float, expected: flo
 
 def test_equations_take_nothing_and_answer_nothing() -> None:
     none = f32()
-    estimate = predict(none, none, none, none, none, DT_S)
-    assert len(classify(none, none, estimate, none, none, none, none, EPS_BETA_RAD)) == 0
+    estimate = predict(none, none, none, none, none, none, DT_S)
+    assert len(classify(none, none, estimate, none, none, none, DELTA_PX, EPS_BETA_RAD)) == 0

@@ -54,7 +54,7 @@ def test_distance_from_the_line_is_what_is_across_it_to_the_right(beta: float, a
     """y points down: to the right of a flow that goes right is down."""
     dx = along * math.cos(beta) - across * math.sin(beta)
     dy = along * math.sin(beta) + across * math.cos(beta)
-    distance = line_distance(np.array([dx]), np.array([dy]), np.array([beta]))
+    distance = line_distance(np.array([dx]), np.array([dy]), np.cos([beta]), np.sin([beta]))
     assert distance == pytest.approx(across, abs=1e-4)
 
 
@@ -63,7 +63,9 @@ def test_distance_from_the_line_is_the_papers(beta: float, dx: float, dy: float)
     """|-Δx + m·Δy| / √(1 + m²), m the slope against the vertical."""
     slope = 1 / math.tan(beta)
     expected = abs(-dx + slope * dy) / math.sqrt(1 + slope**2)
-    assert abs(line_distance(np.array([dx]), np.array([dy]), np.array([beta]))[0]) == pytest.approx(expected, abs=1e-6)
+    assert abs(line_distance(np.array([dx]), np.array([dy]), np.cos([beta]), np.sin([beta]))[0]) == pytest.approx(
+        expected, abs=1e-6
+    )
 
 
 # Rotation

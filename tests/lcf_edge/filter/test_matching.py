@@ -71,7 +71,8 @@ def test_places_and_corners_coincide_as_brute_force_says(
     x, y, _ = np.array(wanted, np.float32).reshape(-1, 3).T
     pixel = pixel_array(at)
     near = (np.abs(np.stack([x, y], axis=1)[:, None] - pixel) <= reach).all(axis=2)
-    places_met, corners_met = matcher.coincide(x, y, pixel, reach)
+    matcher.fill(pixel)
+    places_met, corners_met = matcher.coincide(x, y, np.arange(len(pixel)), reach)
     assert places_met.tolist() == near.any(axis=1).tolist()
     assert corners_met.tolist() == near.any(axis=0).tolist()
 
@@ -142,7 +143,9 @@ def test_a_faint_corner_must_look_more_alike_than_a_strong_one() -> None:
 
 def pair(matcher: Matcher, x: Any, y: Any, looks: Any, corners: Corners, among: Any = None, **other: Any) -> Found:
     number = len(x)
-    rows = np.arange(len(corners)) if among is None else np.asarray(among, np.intp)
+    free = np.zeros(len(corners), np.bool_)
+    free[np.arange(len(corners)) if among is None else np.asarray(among, np.intp)] = True
+    matcher.fill(corners.pixel)
     return matcher.pair(
         np.asarray(x, np.float32),
         np.asarray(y, np.float32),
@@ -151,7 +154,7 @@ def pair(matcher: Matcher, x: Any, y: Any, looks: Any, corners: Corners, among: 
         np.full(number, 14.0, np.float32),
         np.asarray(other.get("wanted", np.ones(number)), np.bool_),
         corners,
-        rows,
+        free,
     )
 
 

@@ -196,10 +196,11 @@ def test_what_a_nearer_circle_hides_waits_behind_it(situation: Situation) -> Non
     hidden, nearer = np.flatnonzero(scene.circles.active)[np.argsort(scene.circles.y[scene.circles.active])]
     scene.circles.ttc[hidden], scene.circles.ttc[nearer] = 0.9 * HORIZON_S, 0.5 * HORIZON_S
     scene.circles.trust[hidden] = trust = TR_MAX
-    scene.update(two[1])
+    scene.circles.trust[nearer] = TR_MAX
+    scene.update()
     assert scene.circles.trust[hidden] == trust - 1
     scene.circles.y[nearer] = 210.0  # before it
-    scene.update((300, 210, math.pi, 60.0))
+    scene.update()
     assert scene.circles.trust[hidden] == trust - 1
 
 
@@ -348,7 +349,7 @@ def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(asi
     x = np.full(9, 400, np.float32)
     ones = np.ones(9, np.float32)
     links = Links(x, y, 320 * ones, 240 * ones, ones, 0.5 * ones, 0 * ones)
-    verdict = Verdict(*[ones] * 8, ones > 0, ones < 0)
+    verdict = Verdict(*[ones] * 6, ones > 0, ones < 0)
     vx, vy = aside_pxps * ones, np.float32(0.5) * (y - 240)
     rebels = Rebels(np.arange(9), x, y, vx, vy, links, verdict)
     members = Members(np.zeros(9, np.intp), 1, x, y)

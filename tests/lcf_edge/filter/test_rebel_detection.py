@@ -13,13 +13,13 @@ from hypothesis import strategies as st
 
 from lcf_edge.filter.flow import KeyFrames
 from lcf_edge.filter.rebel_detection import (
+    Baselines,
     Links,
     Verdict,
     agree,
     find_incoming,
     give_birth,
     judge,
-    links_since,
     miss,
     way_to,
 )
@@ -53,7 +53,7 @@ class Watched:
             if seq in {0, STEPS // 2}:
                 slot = keys.mark()
                 edges.key_x[slot, :number], edges.key_y[slot, :number] = self.place(seq)
-        return links_since(edges, np.arange(number), np.full(number, key), keys, self.around)
+        return Baselines(keys, self.around).links(edges, np.arange(number), np.full(number, key))
 
     def place(self, seq: int) -> npt.NDArray[np.float32]:
         """(2, n) px."""
@@ -139,13 +139,12 @@ def test_the_ground_ahead_is_no_threat(watch: Watch, z: float, x: float) -> None
     assert not verdict.incoming
 
 
-def test_range_miss_and_time_to_contact_of_what_stands_still(watch: Watch) -> None:
+def test_the_expansion_of_what_stands_still_is_that_of_its_range(watch: Watch) -> None:
     watched = watch([(0.2, -0.3, 4.0), (-1.5, -0.5, 6.0), (2.0, 0.1, 9.0)])
     verdict = watched.verdict()
-    x, _, z = watched.drive.in_camera(STEPS).T
-    assert verdict.range_m == pytest.approx(z, rel=1e-3)
-    assert verdict.lateral_m == pytest.approx(x, rel=1e-3)
-    assert verdict.ttc_s == pytest.approx(z / 2.0, rel=1e-3)
+    _, _, z = watched.drive.in_camera(STEPS).T
+    assert verdict.expansion == pytest.approx(2.0 / z, rel=1e-3)
+    assert verdict.outward / verdict.r == pytest.approx(2.0 * STEPS * 0.05 / z, rel=1e-3)
     assert verdict.drift == pytest.approx(np.zeros(3), abs=1e-2)
 
 
@@ -184,8 +183,6 @@ def test_on_an_arc_what_stands_on_it_is_incoming_and_what_lies_straight_ahead_is
     verdict = watch([on_it, straight], yaw_rate_radps=yaw_rate_radps).verdict()
     assert verdict.incoming.tolist() == [True, False]
     assert not verdict.mover.any()
-    x, _, z = watch(straight, yaw_rate_radps=yaw_rate_radps).drive.in_camera(STEPS)[0]
-    assert verdict.lateral_m[1] == pytest.approx(math.hypot(x + arc_m, z) - arc_m, abs=0.05)
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5])
@@ -270,8 +267,7 @@ def test_what_comes_towards_us_on_the_path_is_incoming_as_a_nearer_wall_would_be
     oncoming = [(x, y, 6.0) for x in (-0.15, 0.15) for y in (-0.9, -0.6)]
     verdict = watch(oncoming, (0, 0, -1.5)).verdict()
     assert verdict.incoming.all()
-    left_m = 6.0 - 3.5 * 0.4
-    assert verdict.ttc_s == pytest.approx(left_m / 3.5, rel=1e-3)
+    assert verdict.expansion == pytest.approx(3.5 / (6.0 - 3.5 * 0.4), rel=1e-3)
 
 
 def test_faster_than_anything_that_stands_still_can_go_out_is_a_mover(watch: Watch) -> None:
@@ -303,7 +299,7 @@ def test_a_wall_ahead_agrees_with_itself(watch: Watch) -> None:
 
 def told(mover: bool, drift: float = 0.0, expansion: float = 0.0) -> Verdict:
     """A verdict of one edge 100 px from the focus."""
-    column = [np.array([value], np.float32) for value in (100.0, drift, -50.0, -50.0, expansion, 5.0, 0.0, 2.5)]
+    column = [np.array([value], np.float32) for value in (100.0, drift, -50.0, -50.0, 0.0, expansion)]
     return Verdict(*column, np.array([mover]), np.array([not mover]))
 
 
