@@ -36,15 +36,15 @@ class FilterMethod:
     """The filter, through the pipeline."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
-        self._pipeline = Pipeline(config, lens)
+        self.pipeline = Pipeline(config, lens)
 
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take a sample, in stamp order."""
-        self._pipeline.add(sample)
+        self.pipeline.add(sample)
 
     def process(self, frame: Frame) -> Scene:
         """Circles and ψ of one frame."""
-        return self._pipeline.process(frame).scene
+        return self.pipeline.process(frame).scene
 
 
 class PeerMethod:

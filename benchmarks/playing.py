@@ -1,6 +1,6 @@
 """Drives and recordings, as a stream that every method is fed with."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -46,7 +46,11 @@ def config_of(drive: Drive, settings: Filter | None = None, memory: Memory | Non
 def play_drive(drive: Drive, config: Config, names: Sequence[str]) -> Iterator[Moment]:
     """Render a drive and feed the methods, frame by frame in turn."""
     lens = Lens.from_config(config.camera, drive.lens.width, drive.lens.height)
-    methods = {name: make(name, config, lens) for name in names}
+    yield from feed(drive, {name: make(name, config, lens) for name in names})
+
+
+def feed(drive: Drive, methods: Mapping[str, Method]) -> Iterator[Moment]:
+    """Render a drive and feed these methods, frame by frame in turn."""
     samples: list[Sample] = [*scenes.imu(drive), *scenes.odometry(drive)]
     samples.sort(key=lambda sample: sample.stamp_ns)
     late_ns = round(1e9 / min(scenes.IMU_HZ, scenes.ODOMETRY_HZ))  # the first sample after the frame too
@@ -80,6 +84,6 @@ def play_recording(path: Path, config: Config, names: Sequence[str]) -> Iterator
         yield Moment(item, {name: method.process(item) for name, method in methods.items()}, None)
 
 
-def _add(methods: dict[str, Method], sample: Sample) -> None:
+def _add(methods: Mapping[str, Method], sample: Sample) -> None:
     for method in methods.values():
         method.add(sample)

@@ -12,7 +12,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks import memory
+from benchmarks import memory, stages
 from benchmarks.methods import FILTER, NAMES, NOTHING
 from benchmarks.peers.peer import Floats, Grey
 from benchmarks.playing import config_of, play_drive
@@ -54,6 +54,7 @@ class Speed:
     """What was measured."""
 
     rows: list[Row] = field(default_factory=list)
+    filter_steps: list[stages.Stage] = field(default_factory=list)
     processes: list[memory.Memory] = field(default_factory=list)
 
 
@@ -65,6 +66,8 @@ def measure(into: Speed, *, quick: bool = False) -> Iterable[str]:
         into.rows.append(_row(drive, corners))
         yield f"{corners} corners"
     config = config_for(scenes.make("crossing", 0), TYPICAL)
+    into.filter_steps += stages.measure(_busy(scenes.make("crossing", 0, seconds=seconds)), config)
+    yield "stages"
     frames = memory.WARM_UP + memory.STEPS
     with tempfile.TemporaryDirectory() as folder:
         path = scenes.write(scenes.make("crossing", 0, seconds=frames / 20), Path(folder))
@@ -130,7 +133,7 @@ def _times(each: "np.ndarray", total: "np.ndarray") -> Times:
 
 
 def tables(speed: Speed) -> list[Table]:
-    """Times of the filter, of the others, memory."""
+    """Times of the filter, of the others, of the filter's steps; memory."""
     parts = ("detect", "filter", "total")
     own = [
         [str(row.wanted), number(row.corners, 0), *(_milliseconds(row.steps[part]) for part in parts)]
@@ -141,6 +144,10 @@ def tables(speed: Speed) -> list[Table]:
         [name, *(f"{_milliseconds(row.methods[name])}, {row.methods[name].over_filter:.1f}×" for row in speed.rows)]
         for name in names
     ]
+    steps = [
+        [each.name, number(each.median / 1000, 2), f"{each.share:.0%}"]
+        for each in sorted(speed.filter_steps, key=lambda each: -each.median)
+    ]
     memories = [[each.method, number(each.peak_mib, 1), number(each.kept_bytes_a_step, 0)] for each in speed.processes]
     return [
         Table("The filter, ms: median (p99)", ["corners wanted", "found", *parts], own),
@@ -149,6 +156,7 @@ def tables(speed: Speed) -> list[Table]:
             ["method", *(f"{row.wanted} corners" for row in speed.rows)],
             others,
         ),
+        Table(f"Where the filter's time goes at {TYPICAL} corners, ms: medians", ["step", "ms", "share"], steps),
         Table("Memory of a process", ["method", "peak MiB", "bytes a step that stay"], memories),
     ]
 

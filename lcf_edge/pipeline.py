@@ -34,7 +34,7 @@ class Outcome:
 
 
 class Pipeline:
-    """Corners, ego-motion and filter for one camera. Positions that leave it are px of the input frame.
+    """Corners, ego-motion and ``filter`` for one camera. Positions that leave it are px of the input frame.
 
     Raises ``ConfigError`` when the tables alone need more than ``memory.budget_mib``.
     """
@@ -44,7 +44,7 @@ class Pipeline:
         self._lens = lens
         self._detector = CornerDetector(config.filter, lens, config.memory.corners)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
-        self._filter = LineCircleFilter(config, lens)
+        self.filter = LineCircleFilter(config, lens)
         self._refuse_excess(config.memory.budget_mib)
 
     def _refuse_excess(self, budget_mib: float) -> None:
@@ -61,7 +61,7 @@ class Pipeline:
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each table that is allocated once and kept."""
         lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.bends else {}
-        return {**self._filter.table_bytes(), **lens}
+        return {**self.filter.table_bytes(), **lens}
 
     @property
     def refused(self) -> Counter[str]:
@@ -89,7 +89,7 @@ class Pipeline:
             ego.path_yaw_rate_radps,
         )
         before = time.perf_counter_ns()
-        step = self._filter.step(corners, motion)
+        step = self.filter.step(corners, motion)
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
         notes = ego.notes if len(corners) else (*ego.notes, "no corners")
@@ -115,7 +115,7 @@ class Pipeline:
 
     def _circles(self) -> Records:
         parts: list[Records] = []
-        for kind, table in ((Kind.REBEL, self._filter.rebel), (Kind.NORMAL, self._filter.normal)):
+        for kind, table in ((Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)):
             rows, place = self._placed(table, table.active & (table.trust >= self._config.filter.tr_s))
             part = np.zeros(len(rows), CIRCLE)
             part["id"], part["kind"], part["cause"] = table.id[rows], kind, table.cause[rows]
@@ -132,7 +132,7 @@ class Pipeline:
         return np.concatenate(parts)
 
     def _psi(self) -> Records:
-        table = self._filter.psi
+        table = self.filter.psi
         rows, place = self._placed(table, table.active)
         part = np.zeros(len(rows), PSI_REGION)
         part["x"], part["y"] = place[:, 0], place[:, 1]
@@ -149,11 +149,11 @@ class Pipeline:
         return rows[seen], np.clip(place[seen], 0, (self._lens.width - 1, self._lens.height - 1))
 
     def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
-        edges, n, groups = self._filter.edges, self._filter.edges.count, self._filter.groups
+        edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
         place = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
         centres = self._lens.distort(np.stack([groups.x, groups.y], axis=1))
-        focus = self._lens.distort(np.array([self._filter.focus], np.float32))[0]
+        focus = self._lens.distort(np.array([self.filter.focus], np.float32))[0]
         return View(
             corners=pixel,
             omitted=omitted,

@@ -99,8 +99,8 @@ class AslRecording(Recording):
             self._warn(f"{csv}: cannot be read ({error.strerror}), going on without the rest")
 
     def _picture(self, fields: list[str]) -> Picture:
-        if len(fields) < 2 or not fields[1] or Path(fields[1]).name != fields[1]:
-            raise _RowError("malformed")
+        if len(fields) < 2 or not fields[1].isprintable() or Path(fields[1] or "/").name != fields[1]:
+            raise _RowError("malformed")  # a name that leaves the folder, or that no file can have
         path = self._cam.with_name("data") / fields[1]
         return Picture(_stamp_ns(fields[0]), str(path), partial(read_picture, path))
 

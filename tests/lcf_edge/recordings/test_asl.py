@@ -128,8 +128,8 @@ def test_a_bad_row_is_skipped_counted_and_named(asl: Any, read: Read, sensor: st
     assert "\n" not in warning
 
 
-@pytest.mark.parametrize("name", ["../../secret.png", "/etc/hostname", "data/0.png"])
-def test_a_name_outside_the_folder_of_pictures_is_a_bad_row(asl: Any, read: Read, name: str) -> None:
+@pytest.mark.parametrize("name", ["../../secret.png", "/etc/hostname", "data/0.png", "\0.png"])
+def test_a_name_that_no_picture_in_the_folder_can_have_is_a_bad_row(asl: Any, read: Read, name: str) -> None:
     asl.edit("cam0", 3, f"50000000,{name}")
     recording, _ = read(asl.path)
     assert recording.skipped == {"picture row malformed": 1}
