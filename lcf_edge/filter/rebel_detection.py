@@ -199,7 +199,7 @@ def find_incoming(verdict: Verdict, links: Links, x: Floats, y: Floats, known: M
     meets = (way_to(right_m, range_m, around) < soon) & (np.abs(miss(right_m, range_m, around)) < around.half_width_m)
     meets &= np.float32(around.camera_height_m) - below / focal * range_m < around.height_m
     meets &= (shared - doubt) * np.float32(DOUBT) * reach_m > 1
-    meets &= (shared > 2 * doubt) & (excess > np.float32(CERTAIN) * doubt)
+    meets &= (shared > 3 * doubt) & (excess > np.float32(CERTAIN) * doubt)
     verdict.incoming[rows] = meets
 
 
