@@ -8,6 +8,7 @@ from typing import Any
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import DriverError
+from drivers.records import ImuSample
 
 REPORT_NS = 1_000_000_000
 
@@ -35,6 +36,13 @@ def watch(
         sys.stderr.write(f"{error}\n")
         return 1
     return 0
+
+
+def describe_imu(sample: ImuSample) -> str:
+    """The values of an inertial sample."""
+    gyro = " ".join(f"{value:+8.4f}" for value in sample.gyro)
+    accel = " ".join(f"{value:+8.3f}" for value in sample.accel)
+    return f"gyro {gyro} rad/s  accel {accel} m/s²{'  saturated' * sample.saturated}"
 
 
 def _report(device: Device[Any], seconds: float, describe: Callable[[Any], str], clock: Clock) -> None:

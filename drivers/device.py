@@ -8,15 +8,15 @@ from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import DriverError
 
 Record = TypeVar("Record")
-Delivered = TypeVar("Delivered", covariant=True)
+Delivered_co = TypeVar("Delivered_co", covariant=True)
 
 FIRST_PAUSE_S = 0.1
 LONGEST_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
 LONGEST_HOPELESS_PAUSE_S = 10.0  # what only the user can mend
 
 
-class Device(Protocol[Delivered]):
-    """An open camera (``Delivered`` = ``Frame``) or IMU (``ImuSample``).
+class Device(Protocol[Delivered_co]):
+    """An open camera (which delivers ``Frame``) or IMU (``ImuSample``).
 
     ``name``: as the user calls it. ``counts``: what was lost, late or refused, by reason; only grows.
     """
@@ -24,7 +24,7 @@ class Device(Protocol[Delivered]):
     name: str
     counts: Counter[str]
 
-    def read(self) -> Sequence[Delivered]:
+    def read(self) -> Sequence[Delivered_co]:
         """Wait for what comes next and answer with it, oldest first; the wait is bounded by the device's rate.
 
         An empty answer: what came was refused and counted. Raises ``DriverError`` when the device must be opened

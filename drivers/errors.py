@@ -1,4 +1,4 @@
-"""What goes wrong with a device: one line that names it and what to do; ``retry`` says whether trying again can help."""
+"""What goes wrong with a device: one line that names it and what to do; ``retry``: trying again can help."""
 
 from typing import ClassVar
 

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+STANDARD_GRAVITY_MPS2 = 9.80665  # the g of data sheets
+
 
 @dataclass(frozen=True, slots=True)
 class Frame:

@@ -97,7 +97,7 @@ class Vehicle(Table, frozen=True):
     half_width_m: Positive = 0.3
     height_m: Positive = 2.0  # what passes above this is no threat
     horizon_s: Positive = 4.0  # contact later than this is no threat yet
-    speed_source: Literal["auto", "odometry", "imu", "constant", "none"] = "auto"
+    speed_source: Literal["auto", "odometry", "zenoh", "imu", "constant", "none"] = "auto"
     speed_mps: float | None = None  # the constant
 
 
@@ -175,6 +175,7 @@ class Zenoh(Table, frozen=True):
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
     listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
+    gossip: bool = False  # connect to the peers that one is told of, as rmw_zenoh does
     config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above go on top
 
 
@@ -184,6 +185,16 @@ class Publish(Table, frozen=True):
     prefix: str = "lcf"
     frame_id: str = "camera"
     robot: str = "rover"
+    preview_hz: Annotated[float, msgspec.Meta(ge=0, le=100)] = 5.0  # at most, while somebody looks; 0: none
+    ros2: bool = False  # the same samples also as rmw_zenoh names them
+    ros2_domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0  # ROS_DOMAIN_ID
+    ros2_type_hash: Literal["RIHS01", "TypeHashNotSupported"] = "RIHS01"  # the other one: Humble
+
+
+class Log(Table, frozen=True):
+    """What the daemon tells on standard error."""
+
+    level: Literal["error", "warning", "info", "debug"] = "info"
 
 
 class Config(Table, frozen=True):
@@ -196,6 +207,7 @@ class Config(Table, frozen=True):
     memory: Memory = Memory()
     zenoh: Zenoh = Zenoh()
     publish: Publish = Publish()
+    log: Log = Log()
 
 
 def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
@@ -296,6 +308,12 @@ def _check(config: Config, origin: str) -> None:
         for key, value in values.items():
             if not all(map(math.isfinite, _numbers(value))):
                 raise ConfigError(f"{origin}: {table}.{key}: must be finite, not {value}")
+    for table, driver, recording in (
+        ("camera", camera.driver, camera.recording),
+        ("imu", config.imu.driver, config.imu.recording or camera.recording),
+    ):
+        if driver == "recording" and not recording:
+            raise ConfigError(f"{origin}: {table}.recording: needed with {table}.driver=recording; name a recording")
     if camera.intrinsics and len(camera.intrinsics) != 4:
         raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:

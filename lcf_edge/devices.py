@@ -11,19 +11,18 @@ from drivers.device import Device
 from drivers.errors import WrongDeviceError
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
-from lcf_edge.errors import ConfigError
 
 SERIAL = frozenset({"witmotion", "bno08x_rvc", "xsens", "csv"})
 """Values of ``imu.driver`` that mean a serial port; the others, but ``none``, ``iio`` and ``recording``, mean I2C."""
 
 
 def open_camera(config: Config, clock: Clock = SYSTEM_CLOCK) -> Device[Frame]:
-    """The camera, open. Raises ``DriverError``, ``ConfigError``."""
+    """The camera, open. Raises ``DriverError``."""
     camera = config.camera
     if camera.driver == "recording":
         from hil_mocks.playback import RecordedCamera
 
-        return RecordedCamera(_recording(camera.recording, "camera"), config, clock)
+        return RecordedCamera(Path(camera.recording), config, clock)
     from drivers.camera.v4l2 import V4l2Camera
 
     return V4l2Camera(
@@ -40,14 +39,14 @@ def open_camera(config: Config, clock: Clock = SYSTEM_CLOCK) -> Device[Frame]:
 
 
 def open_imu(config: Config, clock: Clock = SYSTEM_CLOCK) -> Device[ImuSample] | None:
-    """The IMU, open; None where there is none. Raises ``DriverError``, ``ConfigError``."""
+    """The IMU, open; None where there is none. Raises ``DriverError``."""
     imu = config.imu
     if imu.driver == "none":
         return None
     if imu.driver == "recording":
         from hil_mocks.playback import RecordedImu
 
-        return RecordedImu(_recording(imu.recording or config.camera.recording, "imu"), config, clock)
+        return RecordedImu(Path(imu.recording or config.camera.recording), config, clock)
     from drivers.imu.settings import ImuSettings
 
     settings = ImuSettings(imu.rate_hz, imu.gyro_range_dps, imu.accel_range_g)
@@ -67,19 +66,13 @@ def open_imu(config: Config, clock: Clock = SYSTEM_CLOCK) -> Device[ImuSample] |
 def open_speed(config: Config, clock: Clock = SYSTEM_CLOCK) -> Device[SpeedSample] | None:
     """The odometry of the recording that stands in for the camera; None with a real one or without odometry.
 
-    A real vehicle's odometry comes over Zenoh. Raises ``DriverError``, ``ConfigError``.
+    A real vehicle's odometry comes over Zenoh. Raises ``DriverError``.
     """
     if config.camera.driver != "recording":
         return None
     from hil_mocks.playback import RecordedSpeed
 
     try:
-        return RecordedSpeed(_recording(config.camera.recording, "camera"), config, clock)
+        return RecordedSpeed(Path(config.camera.recording), config, clock)
     except WrongDeviceError:
         return None
-
-
-def _recording(path: str, table: str) -> Path:
-    if not path:
-        raise ConfigError(f'{table}.recording: needed with {table}.driver = "recording"; name a recording')
-    return Path(path)

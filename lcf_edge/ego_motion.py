@@ -46,12 +46,13 @@ _BIAS_TIME_S = 5.0  # time constant of the average over later rests
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
 _SIGMA_ODOMETRY_RADPS = 0.05  # odometry knows yaw alone
 _SIGMA_UNKNOWN_RADPS = 0.1
+_SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
 
 # Speed from the accelerometer.
 _LEVEL_TIME_S = 30.0  # time constant of the accelerometer's pull on the gravity direction
 _LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # only while next to nothing but gravity acts
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
-_SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes
+_SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes, or saturated ones
 _SIGMA_ODOMETRY_MPS = 0.05
 _SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
@@ -68,7 +69,7 @@ class EgoMotion:
     yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
     path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
     gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: never stood still yet
-    notes: tuple[str, ...]  # first frame, no imu, imu gap, rotation from odometry, no speed, speed drifts
+    notes: tuple[str, ...]  # what degrades it; docs/replay.md lists them
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,8 +87,8 @@ class _Span:
 class EgoMotionEstimator:
     """Takes IMU and odometry samples; answers with the motion from each exposure to the next.
 
-    ``refused`` counts the samples that were not used, by sensor and reason. ``gyro_bias_radps``: (3,), learnt
-    while the vehicle stands still.
+    ``refused`` counts the samples that were not used, or not trusted, by sensor and reason. ``gyro_bias_radps``: (3,),
+    learnt while the vehicle stands still.
     """
 
     def __init__(self, imu: Imu, vehicle: Vehicle) -> None:
@@ -97,7 +98,7 @@ class EgoMotionEstimator:
         self._axes = np.array(imu.axes).T if imu.axes else None
         self._offset_ns = round(imu.time_offset_s * 1e9)
         self._noise_radps = imu.gyro_noise_radps
-        self._imu = _Ring("imu", IMU_CAPACITY, 6, self.refused)  # gyro, specific force
+        self._imu = _Ring("imu", IMU_CAPACITY, 7, self.refused)  # gyro, specific force, whether saturated
         self._odometry = _Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = _InertialSpeed(imu.gyro_noise_radps)
         self._bias_known = False
@@ -112,8 +113,10 @@ class EgoMotionEstimator:
         elif hypot(*sample.gyro) > _LARGEST_GYRO_RADPS or hypot(*sample.accel) > _LARGEST_ACCEL_MPS2:
             self._imu.refuse("out of range")
         else:
+            if sample.saturated:
+                self._imu.refuse("saturated")
             row = values if self._axes is None else (np.reshape(values, (2, 3)) @ self._axes).ravel()
-            self._imu.add(sample.stamp_ns + self._offset_ns, row)
+            self._imu.add(sample.stamp_ns + self._offset_ns, (*row, sample.saturated))
 
     def add_speed(self, sample: SpeedSample) -> None:
         """Take a sample, in time order; one that is not finite, absurd or late is refused and counted."""
@@ -130,7 +133,8 @@ class EgoMotionEstimator:
         The first frame has no interval; neither has one whose stamp goes back, which is counted.
 
         ``rotation_sigma_rad`` is the sum of gyro noise · dt (what is left of the bias), gyro noise ·
-        √(dt · sample interval) (white noise), and stated rates over what was held, missed or never measured.
+        √(dt · sample interval) (white noise), and stated rates over what was held, missed, saturated or never
+        measured.
         """
         notes: list[str] = []
         if self._stamp_ns is None:
@@ -154,14 +158,18 @@ class EgoMotionEstimator:
                 notes.append("imu gap")
             times_s, values = self._imu.between(span)
             mean = _mean(times_s, values)
+            saturated_s = float(mean[6]) * span.dt_s
+            if saturated_s > 0:
+                notes.append("imu saturated")
             values[:, :3] -= self.gyro_bias_radps
             rates, steps_s = values[:, :3], np.diff(times_s)
             rotation = _turned(-0.5 * (rates[1:] + rates[:-1]) * steps_s[:, None])
             yaw_rate_radps = float(self.gyro_bias_radps[1] - mean[1])
             sigma_rad = self._noise_radps * (span.dt_s + sqrt(span.dt_s * period_s))
             sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
+            sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
             if not at_rest:
-                self._inertial.advance(span.dt_s, mean[3:], rotation, gap_s)
+                self._inertial.advance(span.dt_s, mean[3:6], rotation, gap_s + saturated_s)
         else:
             notes.append("no imu")
             yaw_rate_radps, sigma_rad = 0.0, _SIGMA_UNKNOWN_RADPS * span.dt_s
@@ -198,10 +206,10 @@ class EgoMotionEstimator:
         mean = window.mean(axis=0)
         offset = window - mean
         variance = np.einsum("ij,ij->j", offset, offset) / len(window)
-        gyro_radps, accel_mps2 = hypot(*mean[:3]), hypot(*mean[3:])
+        gyro_radps, accel_mps2 = hypot(*mean[:3]), hypot(*mean[3:6])
         if (
             max(variance[:3]) > _REST_GYRO_STD_RADPS**2
-            or max(variance[3:]) > _REST_ACCEL_STD_MPS2**2
+            or max(variance[3:6]) > _REST_ACCEL_STD_MPS2**2
             or gyro_radps > _REST_GYRO_RADPS
             or abs(accel_mps2 - _GRAVITY_MPS2) > _REST_GRAVITY_ERROR_MPS2
         ):
@@ -209,7 +217,7 @@ class EgoMotionEstimator:
         share = min(1.0, span.dt_s / _BIAS_TIME_S) if self._bias_known else 1.0
         self.gyro_bias_radps = self.gyro_bias_radps + share * (mean[:3] - self.gyro_bias_radps)
         self._bias_known = True
-        self._inertial.rest(mean[3:])
+        self._inertial.rest(mean[3:6])
         return True
 
     def _may_stand(self, stamp_ns: int, odometry_mps: float) -> bool:

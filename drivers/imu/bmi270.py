@@ -1,7 +1,8 @@
 """Bosch BMI270: at every start it must be given the vendor's configuration file.
 
 BMI270 data sheet, BST-BMI270-DS000-05 revision 1.3. The file is the one that the Linux driver takes, 8 KiB. The FIFO is
-that of the BMI160. The gyro's x leans towards z by a factor that each chip knows (GYR_CAS) and the host takes out.
+that of the BMI160, but for frames that say that a sensor has no data (the values are those of Bosch's BMI270_SensorAPI,
+bmi2_defs.h). The gyro's x leans towards z by a factor that each chip knows (GYR_CAS) and the host takes out.
 """
 
 import sys
@@ -11,16 +12,14 @@ from pathlib import Path
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import DeviceLostError, DriverError
 from drivers.imu.bmi160 import (
-    CHIP_ID,
+    CMD,
     FILTERED_FIFO,
-    FLUSH_FIFO,
     GYRO_AND_ACCEL,
-    GYRO_RANGES,
     NO_TEMPERATURE,
     ODR_HZ,
     SOFT_RESET,
+    Bmi160,
 )
-from drivers.imu.fifo_imu import FifoImu, closest
 from drivers.imu.i2c_bus import BLOCK_BYTES, I2cBus
 from drivers.imu.i2c_chips import FIRMWARE, run_by_hand
 from drivers.imu.i2c_imu import Counts, Range, Thermometer
@@ -44,13 +43,14 @@ INIT_ADDR = 0x5B  # two registers: bits 3:0 and 11:4 of the place in the file, i
 INIT_DATA = 0x5E
 PWR_CONF = 0x7C
 PWR_CTRL = 0x7D
-CMD = 0x7E
 
 INIT_OK = 1  # INTERNAL_STATUS
 AWAKE = 0x02  # PWR_CONF: no advanced power save, FIFO reads wake the chip
 ALL_SENSORS = 0x0E  # PWR_CTRL: temperature, accelerometer, gyro
 ACCEL_FILTER = 0xA0
 GYRO_FILTER = 0xE0
+NO_GYRO = (0x7F02, -0x8000)  # x and y in the FIFO while the sensor has no data
+NO_ACCEL = (0x7F01, -0x8000)
 
 FIRMWARE_BYTES = 8192
 RESET_S = 0.01
@@ -67,14 +67,14 @@ class FirmwareError(DriverError):
     retry = False
 
 
-class Bmi270(FifoImu):
-    """BMI270; see ``I2cImu``. ``firmware``: the vendor's file. Raises ``FirmwareError``."""
+class Bmi270(Bmi160):
+    """BMI270; see ``I2cImu``. ``firmware``: the vendor's file. Raises ``FirmwareError``.
+
+    ``counts["no_data"]``: frames in which a sensor had none.
+    """
 
     chip = "BMI270"
-    usual_address = 0x68
-    identity_register = CHIP_ID
     identities = IDENTITIES
-    gyro_ranges = GYRO_RANGES
     accel_ranges = ACCEL_RANGES
     thermometer = Thermometer(TEMPERATURE, "little", lsb_per_c=512, zero_c=23.0, invalid=NO_TEMPERATURE)
     fifo_register = FIFO_DATA
@@ -90,9 +90,6 @@ class Bmi270(FifoImu):
     ) -> None:
         self._firmware = firmware
         super().__init__(bus, address, settings, clock)
-
-    def _granted_rate_hz(self, rate_hz: float) -> float:
-        return closest(ODR_HZ, rate_hz)
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
         odr = ODR_HZ[self.rate_hz]
@@ -144,12 +141,12 @@ class Bmi270(FifoImu):
     def _fifo_level(self) -> int:
         return int.from_bytes(self._read(FIFO_LENGTH, 2), "little") & 0x3FFF
 
-    def _empty_fifo(self) -> None:
-        self._write(CMD, FLUSH_FIFO)
-
     def _frames(self, data: bytes) -> Iterator[tuple[Counts, Counts]]:
         for (x, y, z), accel in super()._frames(data):
-            yield (round(x - self._lean * z), y, z), accel
+            if (x, y) == NO_GYRO or accel[:2] == NO_ACCEL:
+                self.counts["no_data"] += 1
+            else:
+                yield (round(x - self._lean * z), y, z), accel
 
 
 def main(argv: Sequence[str] | None = None) -> int:

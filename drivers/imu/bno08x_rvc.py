@@ -20,8 +20,9 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from drivers.imu.serial_frames import STANDARD_GRAVITY_MPS2, Framer, Reading, Vector
+from drivers.imu.serial_frames import Framer, Reading, Vector
 from drivers.imu.serial_imu import SerialProtocol, run_by_hand
+from drivers.records import STANDARD_GRAVITY_MPS2
 
 HEADER = b"\xaa\xaa"
 FRAME_BYTES = 19

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 from pathlib import Path
 
-from drivers.by_hand import watch
+from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import UnsupportedSettingError
@@ -77,10 +77,3 @@ def run_by_hand(driver: str, argv: Sequence[str] | None) -> int:
     return watch(
         lambda: open_chip(driver, asked.bus, asked.address, settings, asked.firmware), asked.seconds, describe_imu
     )
-
-
-def describe_imu(sample: ImuSample) -> str:
-    """The values of a sample."""
-    gyro = " ".join(f"{value:+7.3f}" for value in sample.gyro)
-    accel = " ".join(f"{value:+7.2f}" for value in sample.accel)
-    return f"gyro {gyro} rad/s  accel {accel} m/s²{'  saturated' * sample.saturated}"

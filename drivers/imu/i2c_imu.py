@@ -20,10 +20,9 @@ from drivers.errors import (
 )
 from drivers.imu.i2c_bus import NO_ANSWER, TRIES, I2cBus, TransferError
 from drivers.imu.settings import USUAL, ImuSettings
-from drivers.records import ImuSample
+from drivers.records import STANDARD_GRAVITY_MPS2, ImuSample
 from drivers.sample_clock import SampleClock
 
-G_MPS2 = 9.80665  # the g of the data sheets
 LARGEST_COUNT = 32767
 
 CHECK_S = 0.5  # between looks at the settings and the temperature
@@ -68,7 +67,7 @@ class Scale:
 
     def __init__(self, gyro: Range, gyro_range_dps: int, accel: Range, accel_range_g: int) -> None:
         self._gyro_radps = math.radians(1) / gyro.lsb
-        self._accel_mps2 = G_MPS2 / accel.lsb
+        self._accel_mps2 = STANDARD_GRAVITY_MPS2 / accel.lsb
         self._gyro_end = gyro.end_of(gyro_range_dps)
         self._accel_end = accel.end_of(accel_range_g)
 

@@ -1,7 +1,7 @@
 """TDK InvenSense ICM-20948; its magnetometer is left alone.
 
 ICM-20948 Datasheet, DS-000189 revision 1.3. Registers lie in four banks: here the high byte of a register is what
-REG_BANK_SEL holds.
+REG_BANK_SEL holds. The ranges are those of the MPU-6050.
 """
 
 import struct
@@ -11,7 +11,8 @@ from collections.abc import Mapping, Sequence
 from drivers.imu.fifo_imu import FifoImu
 from drivers.imu.i2c_bus import TRIES
 from drivers.imu.i2c_chips import run_by_hand
-from drivers.imu.i2c_imu import Range, Thermometer
+from drivers.imu.i2c_imu import Thermometer
+from drivers.imu.mpu6050 import ACCEL_RANGES, GYRO_RANGES
 
 WHO_AM_I = 0x00
 USER_CTRL = 0x03
@@ -41,8 +42,6 @@ FILTERS_HZ = {1: 246, 2: 120, 3: 51, 4: 24, 5: 12, 6: 6}  # DLPFCFG: the wider o
 RESET_S = 0.1
 
 IDENTITIES = {0xEA: "ICM-20948"}
-GYRO_RANGES = {250: Range(0, 131.0), 500: Range(1, 65.5), 1000: Range(2, 32.8), 2000: Range(3, 16.4)}
-ACCEL_RANGES = {2: Range(0, 16384), 4: Range(1, 8192), 8: Range(2, 4096), 16: Range(3, 2048)}
 
 
 class Icm20948(FifoImu):

@@ -18,14 +18,13 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.by_hand import watch
+from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import (
     DeviceLostError,
     DeviceStalledError,
     DriverError,
 )
-from drivers.imu.i2c_chips import describe_imu
 from drivers.imu.iio_sysfs import (
     ACCEL,
     GYRO,

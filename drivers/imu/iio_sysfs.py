@@ -19,7 +19,7 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
-from drivers.imu.i2c_imu import G_MPS2
+from drivers.records import STANDARD_GRAVITY_MPS2
 
 GYRO = tuple(f"in_anglvel_{axis}" for axis in "xyz")
 ACCEL = tuple(f"in_accel_{axis}" for axis in "xyz")
@@ -71,7 +71,7 @@ def set_rate(gyro: Path, accel: Path, rate_hz: float) -> float:
 def set_ranges(gyro: Path, accel: Path, gyro_range_dps: float, accel_range_g: float) -> None:
     """Set the ranges closest to these, where there is a choice."""
     _set_range(gyro, "in_anglvel", math.radians(gyro_range_dps))
-    _set_range(accel, "in_accel", accel_range_g * G_MPS2)
+    _set_range(accel, "in_accel", accel_range_g * STANDARD_GRAVITY_MPS2)
 
 
 def _set_range(folder: Path, kind: str, full_scale: float) -> None:

@@ -1,4 +1,4 @@
-"""ST LSM6DSO and LSM6DSOX, which say the same of themselves.
+"""ST LSM6DSO and LSM6DSOX, which say the same of themselves: an LSM6DS3 with another FIFO.
 
 LSM6DSO data sheet DS12140 revision 2; LSM6DSOX data sheet DS12814 revision 3. Each word of the FIFO has a tag that
 says which sensor it is of and, by a count of two bits, of which moment.
@@ -8,23 +8,18 @@ import struct
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 
-from drivers.imu.fifo_imu import FifoImu, closest
 from drivers.imu.i2c_chips import run_by_hand
 from drivers.imu.i2c_imu import Counts, Thermometer
 from drivers.imu.lsm6ds3 import (
-    ACCEL_RANGES,
     CONTINUOUS,
     CTRL1_XL,
     CTRL2_G,
     CTRL3_C,
     FIFO_STATUS1,
-    GYRO_RANGES,
     ODR_HZ,
     OUT_TEMP_L,
-    RESET_S,
     STEADY_WORDS,
-    SW_RESET,
-    WHO_AM_I,
+    Lsm6ds3,
 )
 
 FIFO_CTRL3 = 0x09  # 7:4 BDR_GY, 3:0 BDR_XL
@@ -37,23 +32,16 @@ OVER_RUN_OR_FULL = 0x6800  # FIFO_OVR_IA, FIFO_FULL_IA, FIFO_OVR_LATCHED; of FIF
 IDENTITIES = {0x6C: "LSM6DSO or LSM6DSOX"}
 
 
-class Lsm6dso(FifoImu):
+class Lsm6dso(Lsm6ds3):
     """LSM6DSO or LSM6DSOX; see ``I2cImu``. ``counts["unpaired"]``: words whose other half never came."""
 
     chip = "LSM6DSO"
-    usual_address = 0x6A
-    identity_register = WHO_AM_I
     identities = IDENTITIES
-    gyro_ranges = GYRO_RANGES
-    accel_ranges = ACCEL_RANGES
     thermometer = Thermometer(OUT_TEMP_L, "little", lsb_per_c=256, zero_c=25.0)
     fifo_register = FIFO_DATA_OUT_TAG
     fifo_bytes = 512 * 7
     word_bytes = 7
     frame = struct.Struct("<B3h")
-
-    def _granted_rate_hz(self, rate_hz: float) -> float:
-        return closest(ODR_HZ, rate_hz)
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
         odr = ODR_HZ[self.rate_hz]
@@ -63,10 +51,6 @@ class Lsm6dso(FifoImu):
             CTRL2_G: odr << 4 | gyro_code << 2,
             FIFO_CTRL3: odr << 4 | odr,
         }
-
-    def _reset(self) -> None:
-        self._write(CTRL3_C, SW_RESET)
-        self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:
         status = int.from_bytes(self._read(FIFO_STATUS1, 2), "little")

@@ -7,8 +7,6 @@ from typing import Protocol
 
 Vector = tuple[float, float, float]
 
-STANDARD_GRAVITY_MPS2 = 9.80665
-
 
 @dataclass(frozen=True, slots=True)
 class Reading:

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from drivers.by_hand import watch
+from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import DeviceStalledError, WrongDeviceError
 from drivers.imu.serial_frames import Parser, Reading
@@ -139,12 +139,5 @@ def run_by_hand(protocol: SerialProtocol, argv: Sequence[str] | None) -> int:
     parser.add_argument("--seconds", type=float, default=10.0)
     arguments = parser.parse_args(argv)
     return watch(
-        lambda: SerialImu(protocol, arguments.port, arguments.baud, arguments.rate), arguments.seconds, describe
+        lambda: SerialImu(protocol, arguments.port, arguments.baud, arguments.rate), arguments.seconds, describe_imu
     )
-
-
-def describe(sample: ImuSample) -> str:
-    """A sample in one line."""
-    gyro = " ".join(f"{rate:+8.4f}" for rate in sample.gyro)
-    accel = " ".join(f"{acceleration:+8.3f}" for acceleration in sample.accel)
-    return f"{gyro} rad/s  {accel} m/s²{'  saturated' if sample.saturated else ''}"

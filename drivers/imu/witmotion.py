@@ -13,8 +13,9 @@ import sys
 from collections import Counter
 from collections.abc import Sequence
 
-from drivers.imu.serial_frames import STANDARD_GRAVITY_MPS2, Framer, Reading, Vector
+from drivers.imu.serial_frames import Framer, Reading, Vector
 from drivers.imu.serial_imu import SerialProtocol, run_by_hand
+from drivers.records import STANDARD_GRAVITY_MPS2
 
 HEADER = 0x55
 ACCELERATION = 0x51

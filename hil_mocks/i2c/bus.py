@@ -41,6 +41,9 @@ class SimulatedBus:
         self._clock = clock
         self._faults: deque[Fault] = deque()
 
+    def open(self, bus: str) -> None:
+        """As smbus2; this bus is there under any name."""
+
     def fail(self, number: int, times: int = 1, register: int | None = None) -> None:
         """The next transfers (of a register) fail with this ``errno``; faults befall one after the other."""
         self._faults.append(Fault(times, number, register))

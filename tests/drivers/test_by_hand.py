@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivers.by_hand import watch
+from drivers.by_hand import describe_imu, watch
 from drivers.errors import DeviceLostError, DeviceMissingError
 from drivers.records import ImuSample
 from hil_mocks.virtual_clock import VirtualClock
@@ -77,3 +77,9 @@ def test_an_interrupt_ends_it_well(capsys: pytest.CaptureFixture[str]) -> None:
     assert watch(lambda: device, 9, describe, clock) == 0
     assert capsys.readouterr().err == ""
     assert device.closed
+
+
+def test_values_of_a_sample_with_units_and_saturation() -> None:
+    sample = ImuSample(0, (0.1, 0.2, -0.3), (0.0, 0.0, 9.8), saturated=True)
+    told = "gyro  +0.1000  +0.2000  -0.3000 rad/s  accel   +0.000   +0.000   +9.800 m/s²  saturated"
+    assert describe_imu(sample) == told

@@ -257,6 +257,17 @@ def test_what_goes_together_is_checked_together() -> None:
     assert load(settings=["vehicle.speed_source=constant", "vehicle.speed_mps=1"]).vehicle.speed_mps == 1.0
 
 
+@pytest.mark.parametrize("table", ["camera", "imu"])
+def test_a_stand_in_needs_a_recording(table: str) -> None:
+    driver = f"{table}.driver=recording"
+    assert refused(None, driver).startswith(f"--set: {table}.recording: needed with {driver}")
+    assert load(settings=[driver, f"{table}.recording=drive"])
+
+
+def test_the_imus_stand_in_may_share_the_cameras_recording() -> None:
+    assert load(settings=["imu.driver=recording", "camera.recording=drive"])
+
+
 def floats() -> list[str]:
     """Every key that holds a number which might not be finite, and how to write one."""
     wide = {"camera.intrinsics": "[{}, 1, 1, 1]", "camera.distortion": "[{}, 0, 0, 0]"}
@@ -359,6 +370,7 @@ CAMERAS = LENSES.flatmap(
         distortion_model=st.just(lens[0]),
         distortion=st.just(lens[1]),
         intrinsics=st.just([]) | numbers(4, low=1e-3),
+        recording=st.text(min_size=1),
     )
 )
 AXES = st.sampled_from(([], [[0, 1, 0], [0, 0, 1], [1, 0, 0]], [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]))
@@ -369,7 +381,7 @@ FILTERS = TRUSTS.flatmap(
 CONFIGS = st.builds(
     Config,
     camera=CAMERAS,
-    imu=tables(Imu, axes=AXES),
+    imu=tables(Imu, axes=AXES, recording=st.text(min_size=1)),
     vehicle=tables(Vehicle, speed_mps=st.floats(-70, 70)),
     filter=FILTERS,
     **{name: tables(TABLES[name]) for name in ("memory", "zenoh", "publish")},

@@ -14,7 +14,6 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from hil_mocks.virtual_clock import VirtualClock
 from lcf_edge.config import Config, ImuDriver, load
 from lcf_edge.devices import SERIAL, open_camera, open_imu, open_speed
-from lcf_edge.errors import ConfigError
 
 I2C = ("mpu6050", "mpu6500", "mpu9250", "icm20948", "lsm6ds3", "lsm6dso", "bmi160", "bmi270", "bno055")
 
@@ -68,13 +67,6 @@ def test_the_imu_may_have_a_recording_of_its_own(tmp_path: Path) -> None:
 def test_without_a_stand_in_there_is_no_odometry_here_and_without_a_driver_no_imu() -> None:
     assert open_speed(configured()) is None
     assert open_imu(configured()) is None
-
-
-@pytest.mark.parametrize("table", ["camera", "imu"])
-def test_a_stand_in_needs_a_recording(table: str) -> None:
-    config = configured(f"{table}.driver=recording")
-    with pytest.raises(ConfigError, match=rf"{table}\.recording: needed"):
-        open_camera(config) if table == "camera" else open_imu(config)
 
 
 def test_the_cameras_keys_reach_its_driver() -> None:

@@ -161,6 +161,19 @@ class TestUncertainty:
         assert motion.rotation_sigma_rad > 0.1 * 0.08
         np.testing.assert_allclose(motion.rotation, turned_by(np.array(RATE) * 0.15), atol=1e-9)
 
+    def test_saturated_samples_are_noted_counted_and_widen(self) -> None:
+        clean, clipped = estimator(), estimator()
+        for number, t in enumerate(np.arange(0, 0.3, 0.01)):
+            for ego in (clean, clipped):
+                ego.add_imu(ImuSample(ns(t), RATE, LEVEL, saturated=ego is clipped and number in (14, 15)))
+        trusted, doubted = ([ego.advance(ns(t)) for t in (0.1, 0.2, 0.29)] for ego in (clean, clipped))
+        assert [motion.notes[:1] for motion in doubted[1:]] == [("imu saturated",), ("no speed",)]
+        wider_rad = doubted[1].rotation_sigma_rad - trusted[1].rotation_sigma_rad
+        assert wider_rad == pytest.approx(1.0 * 0.02)
+        assert doubted[2].rotation_sigma_rad == trusted[2].rotation_sigma_rad
+        np.testing.assert_array_equal(doubted[1].rotation, trusted[1].rotation)
+        assert clipped.refused == {"imu saturated": 2}
+
     def test_imu_that_ended_is_no_imu(self) -> None:
         ego = estimator()
         feed(ego, np.arange(0, 0.3, 0.01), gyro=lambda _: RATE)
@@ -454,7 +467,7 @@ class TestRefusal:
 anything = st.floats(allow_nan=True, allow_infinity=True)
 stamps = st.integers(-(10**9), 10**10) | st.integers(-(2**64), 2**64)
 events = st.one_of(
-    st.builds(ImuSample, stamps, st.tuples(*[anything] * 3), st.tuples(*[anything] * 3)),
+    st.builds(ImuSample, stamps, st.tuples(*[anything] * 3), st.tuples(*[anything] * 3), st.booleans()),
     st.builds(ImuSample, stamps, st.tuples(*[st.floats(-20, 20)] * 3), st.tuples(*[st.floats(-100, 100)] * 3)),
     st.builds(SpeedSample, stamps, anything, anything),
     st.builds(SpeedSample, stamps, st.floats(-60, 60), st.floats(-3, 3)),

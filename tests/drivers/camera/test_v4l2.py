@@ -1,14 +1,17 @@
 """The camera driver against mock cameras: what it delivers, what it counts, what it refuses, how it comes back."""
 
 import errno
+import re
 from collections import Counter, deque
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
 import pytest
 
 from drivers.camera import v4l2_ioctl as v4l2
+from drivers.camera.find import cameras
 from drivers.camera.v4l2 import BUFFERS, LONGEST_WAIT_S, V4l2Camera, main
 from drivers.device import KeptOpen
 from drivers.errors import (
@@ -566,6 +569,30 @@ class TestByHand:
         assert output.out == ""
         assert output.err.startswith("/dev/v4l/by-id/none: no such camera; ")
         assert output.err.count("\n") == 1
+
+    def test_it_tells_rate_and_values(
+        self,
+        kernel: MockKernel,
+        clock: VirtualClock,
+        capsys: pytest.CaptureFixture[str],
+        monkeypatch: pytest.MonkeyPatch,
+    ) -> None:
+        monkeypatch.setattr("drivers.by_hand.REPORT_NS", 50_000_000)
+        monkeypatch.setattr("drivers.camera.v4l2.V4l2Camera", partial(V4l2Camera, kernel=kernel, clock=clock))
+        assert main(["Mock Webcam", "--seconds", "0.2"]) == 0
+        assert re.match(r" +30\.00 Hz, every 33\.33 to 33\.33 ms .* 640x480, mean \d+", capsys.readouterr().out)
+        assert kernel.open_files == 0
+
+    def test_cameras_and_what_they_offer(
+        self, kernel: MockKernel, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        kernel.plug("/dev/video2", MockCamera(card="Other", modes={"GREY": {(64, 48): (9.0,)}, "H264": {}}))
+        monkeypatch.setattr("drivers.camera.v4l2.cameras", lambda: cameras(kernel))
+        assert main(["--list"]) == 0
+        first, offered, *_, second, grey, others = capsys.readouterr().out.splitlines()
+        assert (first, second) == ("/dev/video0: Mock Webcam", "/dev/video2: Other")
+        assert offered.startswith("  YUYV: 640x480 (30, 15/s), 320x240 (30, 15/s)")
+        assert (grey, others) == ("  GREY: 64x48 (9/s)", "  not read: H264")
 
     def test_wrong_usage(self, capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit, match="2"):

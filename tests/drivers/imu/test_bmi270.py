@@ -49,3 +49,19 @@ def test_the_gyros_lean_is_taken_out(rig: RigMaker, lean: int) -> None:
     bench.chip.lean = lean
     samples = bench.read_for(0.2)
     assert samples[-1].gyro == pytest.approx((0.2, 0.1, 1.5), abs=6e-4)
+
+
+@pytest.mark.parametrize(
+    "frame",
+    [bytes.fromhex("027f00800080 010002000300"), bytes.fromhex("010002000300 017f00800080")],
+    ids=["gyro", "accelerometer"],
+)
+def test_a_frame_in_which_a_sensor_has_no_data_is_no_sample(rig: RigMaker, frame: bytes) -> None:
+    bench = rig("bmi270")
+    bench.read_for(0.5)
+    bench.chip._fifo.append(frame)
+    samples = bench.read_for(0.1)
+    assert bench.device.counts["no_data"] == 1
+    assert not any(sample.saturated for sample in samples)
+    for sample in samples:
+        assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.01)

@@ -1,17 +1,22 @@
 """What every I2C chip's driver delivers, against a model of the chip's registers."""
 
 import math
+import re
 from collections.abc import Callable
+from importlib import import_module
 from itertools import pairwise
 from typing import Any
 
 import pytest
 
+from drivers.clock import SYSTEM_CLOCK
 from drivers.errors import DeviceLostError, UnsupportedSettingError
+from drivers.imu import mpu6050
 from drivers.imu.i2c_bus import I2cBus
-from drivers.imu.i2c_chips import CHIPS, chip_on, describe_imu, open_chip, run_by_hand
+from drivers.imu.i2c_chips import CHIPS, chip_on, open_chip
 from drivers.imu.settings import ImuSettings
 from drivers.records import ImuSample
+from hil_mocks.i2c import CHIPS as CHIP_MODELS
 from hil_mocks.i2c import SimulatedBus, replay
 from hil_mocks.i2c.lsm6 import Lsm6dsTrC
 from hil_mocks.virtual_clock import VirtualClock
@@ -203,16 +208,26 @@ def test_unknown_chip_is_told_with_the_known_ones() -> None:
         chip_on(I2cBus(1, SimulatedBus(VirtualClock(), {})), "nosuch")
 
 
-def test_by_hand_without_a_bus_says_so_in_one_line(capsys: pytest.CaptureFixture[str]) -> None:
-    assert run_by_hand("mpu6050", ["--bus", "217", "--address", "0x69"]) == 1
-    assert capsys.readouterr().err.startswith("/dev/i2c-217: no such bus; ")
+@every_chip
+def test_by_hand_without_a_bus_says_so_in_one_line(driver: str, capsys: pytest.CaptureFixture[str]) -> None:
+    main = import_module(f"drivers.imu.{driver}").main
+    assert main(["--bus", "217", "--address", "0x69"]) == 1
+    told = capsys.readouterr()
+    assert (told.out, told.err.count("\n")) == ("", 1)
+    assert told.err.startswith("/dev/i2c-217: no such bus; ")
+
+
+def test_by_hand_it_tells_rate_and_values(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("drivers.by_hand.REPORT_NS", 200_000_000)
+    chip = CHIP_MODELS["mpu6050"](lambda _: ((0.0, 0.0, 0.5), (0.0, 0.0, 9.8)), SYSTEM_CLOCK)
+    wire = SimulatedBus(SYSTEM_CLOCK, {chip.address: chip})
+    monkeypatch.setattr("drivers.imu.i2c_bus.smbus2.SMBus", lambda: wire)
+    assert mpu6050.main(["--rate", "100", "--seconds", "0.5"]) == 0
+    line = capsys.readouterr().out.splitlines()[0]
+    assert re.search(r"\d Hz, every .* no errors  gyro  \+0.0000  \+0.0000  \+0.\d+ rad/s", line)
+    assert wire.closed
 
 
 def test_open_chip_names_the_bus_that_is_missing() -> None:
     with pytest.raises(Exception, match="/dev/i2c-217: no such bus"):
         open_chip("bmi160", 217)
-
-
-def test_describe_shows_saturation() -> None:
-    sample = ImuSample(0, (0.1, 0.2, -0.3), (0.0, 0.0, 9.8), saturated=True)
-    assert describe_imu(sample) == "gyro  +0.100  +0.200  -0.300 rad/s  accel   +0.00   +0.00   +9.80 m/s²  saturated"

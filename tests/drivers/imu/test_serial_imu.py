@@ -412,11 +412,14 @@ def test_the_usual_baud_rate_is_the_one_the_makers_ship_or_recommend() -> None:
 
 
 @pytest.mark.parametrize("module", [witmotion, bno08x_rvc, xsens, csv_line])
-def test_run_by_hand(plug: Plug, module: ModuleType, capsys: pytest.CaptureFixture[str]) -> None:
+def test_run_by_hand(
+    plug: Plug, module: ModuleType, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("drivers.by_hand.REPORT_NS", 200_000_000)
     stand_in = plug(ENCODERS[module.PROTOCOL.name]())
     stand_in.play()
 
-    assert module.main(["--port", stand_in.port, "--rate", "100", "--seconds", "1.2"]) == 0
+    assert module.main(["--port", stand_in.port, "--rate", "100", "--seconds", "0.5"]) == 0
 
     assert re.search(r"\d Hz.* rad/s", capsys.readouterr().out)
 
