@@ -15,8 +15,8 @@ from lcf_edge.corners import CornerDetector
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
-from lcf_edge.filter.tables import CircleTable, Mask, PsiTable, Rows
-from lcf_edge.lens import Lens, Points
+from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
+from lcf_edge.lens import Lens
 from lcf_edge.recordings import Recording
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
@@ -114,39 +114,49 @@ class Pipeline:
         return Outcome(scene, self._view(corners.pixel.astype(np.float32), step.omitted))
 
     def _circles(self) -> Records:
-        parts: list[Records] = []
-        for kind, table in ((Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)):
-            rows, place = self._placed(table, table.active & (table.trust >= self._config.filter.tr_s))
-            part = np.zeros(len(rows), CIRCLE)
-            part["id"], part["kind"], part["cause"] = table.id[rows], kind, table.cause[rows]
+        """The circles from Tr_s up, rebels first."""
+        least = self._config.filter.tr_s
+        tables = [(Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)]
+        shown = [self._placed(table, table.active & (table.trust >= least)) for _, table in tables]
+        circles = np.zeros(sum(len(rows) for rows, _, _ in shown), CIRCLE)
+        start = 0
+        for (kind, table), (rows, x, y) in zip(tables, shown, strict=True):
+            part = circles[start : start + len(rows)]
+            start += len(rows)
+            part["kind"], part["x"], part["y"] = kind, x, y
             part["support"] = np.minimum(table.support[rows], 65535)
-            part["x"], part["y"] = place[:, 0], place[:, 1]
-            part["radius"], part["direction"] = table.radius[rows], table.beta[rows]
-            part["speed"], part["trust"] = table.speed[rows], table.trust[rows]
+            part["direction"] = table.beta[rows]
+            for field in ("id", "cause", "radius", "speed", "trust"):
+                part[field] = getattr(table, field)[rows]
             part["bearing"], part["elevation"] = self._lens.bearing(table.x[rows], table.y[rows])
-            part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
             if kind is Kind.REBEL:
                 for field in ("ttc", "range", "lateral"):
                     part[field] = getattr(table, field)[rows]
-            parts.append(part)
-        return np.concatenate(parts)
+            else:
+                part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
+        return circles
 
     def _psi(self) -> Records:
         table = self.filter.psi
-        rows, place = self._placed(table, table.active)
+        rows, x, y = self._placed(table, table.active)
         part = np.zeros(len(rows), PSI_REGION)
-        part["x"], part["y"] = place[:, 0], place[:, 1]
+        part["x"], part["y"] = x, y
         for field in ("id", "shape", "width", "height", "trust"):
             part[field] = getattr(table, field)[rows]
         return part
 
-    def _placed(self, table: CircleTable | PsiTable, wanted: Mask) -> tuple[Rows, Points]:
-        """The wanted rows that the lens can place, and where in the input frame, px."""
-        rows = np.flatnonzero(wanted)
-        place = self._lens.distort(np.stack([table.x[rows], table.y[rows]], axis=1))
-        seen = np.isfinite(place[:, 0])
-        # What is nearly met may have its middle beside the picture.
-        return rows[seen], np.clip(place[seen], 0, (self._lens.width - 1, self._lens.height - 1))
+    def _placed(self, table: CircleTable | PsiTable, wanted: Mask) -> tuple[Rows, Floats, Floats]:
+        """The wanted rows that the lens can place, and where in the input frame, px.
+
+        What is nearly met may have its middle beside the picture: it is shown at the border.
+        """
+        rows = wanted.nonzero()[0]
+        x, y = self._lens.distort_xy(table.x[rows], table.y[rows])
+        if self._lens.bends:
+            seen = np.isfinite(x)
+            rows, x, y = rows[seen], x[seen], y[seen]
+        across, down = self._lens.width - 1, self._lens.height - 1
+        return rows, np.minimum(np.maximum(x, 0), across), np.minimum(np.maximum(y, 0), down)
 
     def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
