@@ -6,18 +6,22 @@ Every length is compared with the bytes that are left before anything of that le
 """
 
 import struct
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.diagnostics import DeviceStatus
 from lcf_edge.errors import LcfError
 from lcf_edge.records import CIRCLE, PSI_REGION, Scene
 
 Vector = tuple[float, float, float]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+
+_TWIST_BYTES = 7 + 48  # with what may align it
 
 _BYTE_ORDERS: dict[int, Literal["<", ">"]] = {0x0000: ">", 0x0001: "<"}
 
@@ -143,23 +147,60 @@ def decode_camera_info(payload: bytes | memoryview) -> CameraInfo:
     return CameraInfo(header, height, width, model, tuple(d.tolist()), reader.scalars("9d"))
 
 
+def decode_velocity(payload: bytes | memoryview) -> tuple[str, Twist]:
+    """``geometry_msgs/msg/TwistStamped`` or ``nav_msgs/msg/Odometry``: which, and its twist.
+
+    Told apart by their lengths, which must be exact. Raises ``CdrError``.
+    """
+    reader = _Reader(payload)
+    header = reader.header()
+    if reader.left <= _TWIST_BYTES:
+        kind = "geometry_msgs/msg/TwistStamped"
+        twist = Twist(header, reader.vector(), reader.vector())
+    else:
+        kind = "nav_msgs/msg/Odometry"
+        reader.string()  # child_frame_id
+        reader.scalars("43d")  # pose and its covariance
+        twist = Twist(header, reader.vector(), reader.vector())
+        reader.scalars("36d")  # covariance of the twist
+    if reader.left:
+        raise CdrError(f"CDR: {reader.left} bytes behind a {kind}")
+    return kind, twist
+
+
 def encode_scene(scene: Scene, frame_id: str) -> bytes:
     """``lcf_msgs/msg/Scene``; sizes, timing and notes stay behind. Raises ``CdrError``."""
-    sec, nanosec = divmod(scene.stamp_ns, 1_000_000_000)
-    try:
-        name = frame_id.encode() + b"\0"
-        parts = (
-            LITTLE_ENDIAN,
-            struct.pack("<iII", sec, nanosec, len(name)),
-            name,
-            b"\0" * (-(12 + len(name)) % 8),
-            struct.pack("<QIIf", scene.seq, scene.image_width, scene.image_height, scene.vehicle_speed),
-            _records(scene.circles, CIRCLE),
-            _records(scene.psi, PSI_REGION),
-        )
-    except (struct.error, OverflowError, UnicodeEncodeError) as error:
-        raise CdrError(f"scene {scene.seq}: a value does not fit its field ({error})") from error
-    return b"".join(parts)
+    writer = _Writer()
+    writer.header(scene.stamp_ns, frame_id)
+    writer.scalars("QIIf", scene.seq, scene.image_width, scene.image_height, scene.vehicle_speed)
+    writer.records(scene.circles, CIRCLE)
+    writer.records(scene.psi, PSI_REGION)
+    return writer.payload()
+
+
+def encode_compressed_image(stamp_ns: int, frame_id: str, image_format: str, data: bytes) -> bytes:
+    """``sensor_msgs/msg/CompressedImage``; ``image_format``: ``jpeg`` or ``png``. Raises ``CdrError``."""
+    writer = _Writer()
+    writer.header(stamp_ns, frame_id)
+    writer.string(image_format)
+    writer.octets(data)
+    return writer.payload()
+
+
+def encode_diagnostics(stamp_ns: int, hardware_id: str, status: Sequence[DeviceStatus]) -> bytes:
+    """``diagnostic_msgs/msg/DiagnosticArray``: one status a device. Raises ``CdrError``."""
+    writer = _Writer()
+    writer.header(stamp_ns, "")
+    writer.scalars("I", len(status))
+    for device in status:
+        writer.scalars("B", device.level)
+        for text in (device.name, device.message, hardware_id):
+            writer.string(text)
+        writer.scalars("I", len(device.values))
+        for key, value in device.values.items():
+            writer.string(key)
+            writer.string(value)
+    return writer.payload()
 
 
 def decode_scene(payload: bytes | memoryview) -> Scene:
@@ -174,12 +215,42 @@ def decode_scene(payload: bytes | memoryview) -> Scene:
     return Scene(header.stamp_ns, seq, width, height, speed, circles, psi)
 
 
-def _records(rows: npt.NDArray[np.void], dtype: np.dtype[np.void]) -> bytes:
-    """A sequence of fixed-size records; what lies between their fields is zero, not what memory held."""
-    block = np.zeros(len(rows), dtype)
-    for name in dtype.names or ():
-        block[name] = rows[name]
-    return struct.pack("<I", len(block)) + block.tobytes()
+class _Writer:
+    """A payload that grows. Raises ``CdrError`` for a value that does not fit its field."""
+
+    def __init__(self) -> None:
+        self._body = bytearray()
+
+    def payload(self) -> bytes:
+        return LITTLE_ENDIAN + self._body
+
+    def header(self, stamp_ns: int, frame_id: str) -> None:
+        self.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
+        self.string(frame_id)
+
+    def scalars(self, fields: str, *values: float) -> None:
+        """Fields in the notation of ``struct``, none of which is wider than the one before it."""
+        self._body.extend(bytes(-len(self._body) % struct.calcsize(f"<{fields[0]}")))
+        try:
+            self._body.extend(struct.pack(f"<{fields}", *values))
+        except (struct.error, OverflowError) as error:
+            raise CdrError(f"CDR: a value does not fit its field ({error})") from error
+
+    def string(self, text: str) -> None:
+        """A NUL would end it; what UTF-8 cannot say is a question mark."""
+        self.octets(text.replace("\0", "").encode(errors="replace") + b"\0")
+
+    def octets(self, data: bytes) -> None:
+        self.scalars("I", len(data))
+        self._body.extend(data)
+
+    def records(self, rows: npt.NDArray[np.void], dtype: np.dtype[np.void]) -> None:
+        """A sequence of fixed-size records; what lies between their fields is zero, not what memory held."""
+        block = np.zeros(len(rows), dtype)
+        for name in dtype.names or ():
+            block[name] = rows[name]
+        self.scalars("I", len(block))
+        self._body.extend(block.tobytes())
 
 
 class _Reader:
@@ -194,6 +265,11 @@ class _Reader:
         self._order = _BYTE_ORDERS[kind]
         self._data = memoryview(payload).toreadonly()[4:]
         self._at = 0
+
+    @property
+    def left(self) -> int:
+        """Bytes that were not read."""
+        return len(self._data) - self._at
 
     def header(self) -> Header:
         sec, nanosec = self.scalars("iI")

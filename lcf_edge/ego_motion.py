@@ -232,7 +232,7 @@ class EgoMotionEstimator:
     def _choose_speed(self, span: _Span, odometry_mps: float, notes: list[str]) -> float:
         """Mean speed over the interval by ``vehicle.speed_source``, m/s; NaN: unknown."""
         source, constant_mps = self._vehicle.speed_source, self._vehicle.speed_mps
-        if source in ("auto", "odometry") and isfinite(odometry_mps):
+        if source in ("auto", "odometry", "zenoh") and isfinite(odometry_mps):
             if self._odometry.age_s(span.end_ns) <= span.dt_s:  # not one that is only held
                 self._inertial.correct(odometry_mps)
             return odometry_mps

@@ -39,7 +39,7 @@ from lcf_edge.sinks import cannot_write, check_output
 from lcf_edge.sinks.overlay import draw
 from lcf_edge.sinks.results import ResultsSink
 from lcf_edge.sinks.size_plot import SizePlot
-from lcf_edge.zenoh_link import ScenePublisher, open_session
+from lcf_edge.zenoh_link import ScenePublisher, close_session, open_session
 
 SEED = 1
 PICTURES = 4
@@ -69,7 +69,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
 
     with ExitStack() as stack:
         session, endpoint = _open_link()
-        stack.enter_context(session)
+        stack.callback(close_session, session)
         config = msgspec.structs.replace(config, zenoh=Zenoh(listen=[endpoint]))
         publisher = ScenePublisher(session, config.publish)
         subscriber = stack.enter_context(_subscriber(endpoint, publisher.key))

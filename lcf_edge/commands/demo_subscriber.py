@@ -12,7 +12,7 @@ import zenoh
 
 from lcf_edge.cdr import CdrError, decode_scene
 from lcf_edge.config import Zenoh
-from lcf_edge.zenoh_link import SCENE_ENCODING, open_session
+from lcf_edge.zenoh_link import SCENE_ENCODING, opened_session
 
 _LAST_ON_THE_WAY_S = 3.0
 
@@ -45,7 +45,7 @@ def receive(endpoint: str, key: str) -> Received:
             received.circles += circles
             arrived.notify()
 
-    with open_session(Zenoh(connect=[endpoint], listen=[])) as session:
+    with opened_session(Zenoh(connect=[endpoint], listen=[])) as session:
         session.declare_subscriber(key, take)
         sent = int(sys.stdin.readline() or 0)
         with arrived:

@@ -113,9 +113,9 @@ def video_sink(recording: Recording, config: Config, video: Path) -> VideoSink:
 
 def _publisher(stack: ExitStack, config: Config) -> Sink:
     # Here, so that a replay that publishes nothing starts no network.
-    from lcf_edge.zenoh_link import ScenePublisher, open_session  # noqa: PLC0415
+    from lcf_edge.zenoh_link import ScenePublisher, opened_session  # noqa: PLC0415
 
-    session = stack.enter_context(open_session(config.zenoh))
+    session = stack.enter_context(opened_session(config.zenoh))
     publisher = ScenePublisher(session, config.publish)
     return lambda _, outcome: publisher.put(outcome.scene)
 

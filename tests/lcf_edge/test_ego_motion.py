@@ -357,7 +357,7 @@ class TestSpeedByOdometry:
             ego.add_speed(SpeedSample(ns(t), 1.0 + 2 * t, 0.0))
         return ego
 
-    @pytest.mark.parametrize("source", ["auto", "odometry"])
+    @pytest.mark.parametrize("source", ["auto", "odometry", "zenoh"])
     def test_is_interpolated_and_averaged(self, source: str) -> None:
         ego = self.fed(speed_source=source, speed_mps=9.0)
         ego.advance(ns(0.33))

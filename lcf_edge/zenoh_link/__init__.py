@@ -1,0 +1,24 @@
+"""The link to the outside: what goes over Zenoh, and the session that carries it.
+
+``session`` opens and closes it; ``publisher`` puts messages, ``scene``, ``preview`` and ``diagnostics`` those of one
+key each; ``ros2`` shows them to nodes under rmw_zenoh; ``speed_input`` and ``queryables`` listen; ``subscription``
+is the other end; ``link`` is all of it for the daemon. A process never forks while a session is open.
+"""
+
+from lcf_edge.zenoh_link.publisher import ATTACHMENT
+from lcf_edge.zenoh_link.scene import SCENE_ENCODING, ScenePublisher, scene_key
+from lcf_edge.zenoh_link.session import LARGEST_MESSAGE_BYTES, close_session, open_session, opened_session
+from lcf_edge.zenoh_link.subscription import Scenes, scenes
+
+__all__ = [
+    "ATTACHMENT",
+    "LARGEST_MESSAGE_BYTES",
+    "SCENE_ENCODING",
+    "ScenePublisher",
+    "Scenes",
+    "close_session",
+    "open_session",
+    "opened_session",
+    "scene_key",
+    "scenes",
+]

@@ -1,0 +1,36 @@
+"""Previews: pictures with the overlay drawn, only while somebody looks, after everything else."""
+
+import time
+
+import zenoh
+
+from lcf_edge import config
+from lcf_edge.cdr import encode_compressed_image
+from lcf_edge.zenoh_link.publisher import MessagePublisher, Topic
+from lcf_edge.zenoh_link.ros2 import Ros2Node
+
+PREVIEW = Topic("preview/compressed", "sensor_msgs/msg/CompressedImage", zenoh.Priority.BACKGROUND)
+
+
+class PreviewPublisher:
+    """Puts JPEG pictures on ``<prefix>/preview/compressed``, at most ``publish.preview_hz`` of them a second."""
+
+    def __init__(self, session: zenoh.Session, publish: config.Publish, ros2: Ros2Node | None = None) -> None:
+        self._frame_id = publish.frame_id
+        self._pause_ns = round(1e9 / publish.preview_hz) if publish.preview_hz else None
+        self._last_ns: int | None = None  # monotonic
+        self._publisher = MessagePublisher(session, publish, PREVIEW, ros2)
+        self.counts = self._publisher.counts
+
+    @property
+    def wanted(self) -> bool:
+        """Somebody subscribes, and the last preview was long enough ago."""
+        if self._pause_ns is None:
+            return False
+        due = self._last_ns is None or time.monotonic_ns() - self._last_ns >= self._pause_ns
+        return due and self._publisher.matched
+
+    def put(self, jpeg: bytes, stamp_ns: int) -> None:
+        """Send one picture, taken at ``stamp_ns`` of the system clock."""
+        self._last_ns = time.monotonic_ns()
+        self._publisher.put(encode_compressed_image(stamp_ns, self._frame_id, "jpeg", jpeg))

@@ -1,0 +1,102 @@
+"""Puts the messages of one topic, and with ROS 2 on, the same samples where rmw_zenoh looks for them."""
+
+import hashlib
+import struct
+import threading
+import time
+from collections import Counter
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
+
+import zenoh
+
+from lcf_edge import config
+from lcf_edge.errors import PublishError
+from lcf_edge.zenoh_link.ros2 import Ros2Node
+from lcf_edge.zenoh_link.session import reason
+
+ATTACHMENT = struct.Struct("<qqB16s")
+"""Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What is published under a prefix, and how."""
+
+    name: str  # "scene"
+    message: str  # "lcf_msgs/msg/Scene"
+    priority: zenoh.Priority
+    express: bool = False
+
+    def key(self, prefix: str) -> str:
+        """The key of its samples."""
+        return f"{prefix}/{self.name}"
+
+    @property
+    def encoding(self) -> str:
+        """The encoding of its samples."""
+        return f"application/cdr;{self.message}"
+
+
+class MessagePublisher:
+    """Puts payloads of one topic; on congestion Zenoh drops them, a put never waits.
+
+    ``counts``: ``sent``, and ``failed`` when the session is closed. Raises ``PublishError`` when ``publish.prefix``
+    is no valid key.
+    """
+
+    def __init__(
+        self, session: zenoh.Session, publish: config.Publish, topic: Topic, ros2: Ros2Node | None = None
+    ) -> None:
+        self.key = topic.key(publish.prefix)
+        self.counts: Counter[str] = Counter(sent=0, failed=0)  # all keys at once: read while it counts
+        # A gid names one publisher: the same for its whole life, different for every other.
+        self._gid = hashlib.blake2b(f"{session.zid()}/{self.key}".encode(), digest_size=16).digest()
+        if set("*$#?") & set(publish.prefix) or not publish.prefix:
+            raise PublishError(f"publish.prefix: {publish.prefix!r}: a key to publish on has no wildcards")
+        keys = [self.key] if ros2 is None else [self.key, ros2.declare("MP", self.key, topic.message)]
+        try:
+            self._publishers = [
+                session.declare_publisher(
+                    key,
+                    encoding=zenoh.Encoding(topic.encoding),
+                    congestion_control=zenoh.CongestionControl.DROP,
+                    priority=topic.priority,
+                    express=topic.express,
+                )
+                for key in keys
+            ]
+        except zenoh.ZError as error:
+            raise PublishError(f"publish.prefix: {publish.prefix}: {reason(error)}") from error
+
+    @property
+    def matched(self) -> bool:
+        """Somebody subscribes."""
+        status: list[Any] = [publisher.matching_status for publisher in self._publishers]
+        return any(one.matching for one in status)
+
+    def wait_until_matched(self, timeout_s: float) -> bool:
+        """Wait until somebody subscribes; False when nobody did in time."""
+        matched = threading.Event()
+
+        def tell(status: zenoh.MatchingStatus) -> None:
+            if status.matching:
+                matched.set()
+
+        with ExitStack() as listeners:
+            for publisher in self._publishers:
+                listeners.enter_context(publisher.declare_matching_listener(tell))
+            return self.matched or matched.wait(timeout_s)
+
+    def put(self, payload: bytes) -> None:
+        """Send one message; never raises, never waits."""
+        number = self.counts["sent"] + 1
+        attachment = ATTACHMENT.pack(number, time.time_ns(), len(self._gid), self._gid)
+        try:
+            for publisher in self._publishers:
+                publisher.put(payload, attachment=attachment)
+        except zenoh.ZError:
+            self.counts["failed"] += 1
+        else:
+            self.counts["sent"] = number

@@ -1,0 +1,64 @@
+"""Questions that are answered when asked: ``<prefix>/query/<name>``."""
+
+import threading
+from collections import Counter
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from typing import Any
+
+import zenoh
+
+CAPACITY = 16  # queries that wait; of more, the newest
+ENDING_S = 0.2  # of the thread, unless who asked does not listen
+
+Answer = Callable[[], tuple[bytes, str] | str]
+"""A payload and its encoding, or why there is none."""
+
+
+class Queryables:
+    """Answers queries for each name, in a thread of its own: who asks and does not listen holds up nobody else.
+
+    ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``.
+    """
+
+    def __init__(self, session: zenoh.Session, prefix: str, answers: Mapping[str, Answer]) -> None:
+        self.counts: Counter[str] = Counter(answered=0, refused=0, failed=0)
+        self._answers = {zenoh.KeyExpr(f"{prefix}/query/{name}"): answer for name, answer in answers.items()}
+        handler: Any = zenoh.handlers.RingChannel(CAPACITY)
+        self._queryable: Any = session.declare_queryable(f"{prefix}/query/*", handler)
+        self._thread = threading.Thread(
+            target=self._run, args=(self._queryable.handler,), name="zenoh queries", daemon=True
+        )
+        self._thread.start()
+
+    def close(self) -> None:
+        """Answer no more; may be called twice."""
+        with suppress(zenoh.ZError):  # it was closed before
+            self._queryable.undeclare()
+        self._thread.join(ENDING_S)
+
+    def _run(self, queries: Any) -> None:
+        while True:
+            try:
+                self._answer(queries.recv())
+            except zenoh.ZError:  # closed
+                return
+
+    def _answer(self, query: zenoh.Query) -> None:
+        """Its end, with that of the last name for it, tells who asked that no more answers come."""
+        for key, answer in self._answers.items():
+            if query.key_expr.intersects(key):
+                self.counts[_reply(query, key, answer())] += 1
+
+
+def _reply(query: zenoh.Query, key: zenoh.KeyExpr, answer: tuple[bytes, str] | str) -> str:
+    """What became of it, as it is counted."""
+    try:
+        if isinstance(answer, str):
+            query.reply_err(answer)
+            return "refused"
+        payload, encoding = answer
+        query.reply(key, payload, encoding=zenoh.Encoding(encoding))
+    except zenoh.ZError:  # who asked has gone
+        return "failed"
+    return "answered"

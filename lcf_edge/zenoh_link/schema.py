@@ -1,0 +1,22 @@
+"""The definition of the scene, with all that it is made of, as ``ros2msg`` (the notation of MCAP and rosbag2)."""
+
+from importlib.resources import files
+
+SCHEMA_ENCODING = "text/plain;ros2msg"
+
+_STANDARD = {
+    "std_msgs/Header": "builtin_interfaces/Time stamp\nstring frame_id\n",
+    "builtin_interfaces/Time": "int32 sec\nuint32 nanosec\n",
+}
+
+
+def scene_schema() -> str:
+    """``Scene.msg``, and behind it each message that it names."""
+    ours = {f"lcf_msgs/{name}": _definition(name) for name in ("Circle", "PsiRegion")}
+    parts = [_definition("Scene")]
+    parts += [f"MSG: {name}\n{text}" for name, text in {**ours, **_STANDARD}.items()]
+    return ("=" * 80 + "\n").join(parts)
+
+
+def _definition(name: str) -> str:
+    return (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8")

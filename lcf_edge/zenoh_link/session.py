@@ -1,0 +1,104 @@
+"""A Zenoh session: opened so that nothing leaves the machine unasked, closed in bounded time.
+
+By default a session is a peer that listens on loopback only: nobody is scouted, nobody is told of others, no shared
+memory (which would cost 27 MB), few sessions, small messages.
+"""
+
+import json
+import re
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+import zenoh
+
+from lcf_edge import config
+from lcf_edge.errors import PublishError
+
+CLOSING_S = 1.0  # a frozen peer would hold up the closing for 10 s
+
+LARGEST_MESSAGE_BYTES = 2**20
+"""What comes in larger is dropped before it is put together; nothing that is published is this large."""
+
+_UNLESS_THE_FILE_SAYS = {
+    "scouting/multicast/enabled": "false",
+    "scouting/delay": "0",  # ms; nobody is scouted, so nobody is waited for
+    "transport/shared_memory/enabled": "false",
+    "transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES),
+    "transport/unicast/max_sessions": "32",  # each takes some 160 kB
+}
+
+
+def open_session(options: config.Zenoh) -> zenoh.Session:
+    """Open a session; close it with ``close_session``, or use ``opened_session``.
+
+    ``options.config_file`` is read first; the keys go on top of it, where an empty list leaves the file's. Raises
+    ``PublishError`` that names the endpoint or the file.
+    """
+    settings = _settings(options)
+    try:
+        return zenoh.open(settings)
+    except zenoh.ZError as error:
+        raise PublishError(_remedy(error, options)) from error
+
+
+def close_session(session: zenoh.Session, timeout_s: float = CLOSING_S) -> bool:
+    """Close a session; False when a frozen peer held it up, then it is closed when the process ends."""
+
+    def close() -> None:
+        with suppress(zenoh.ZError):  # it took too long
+            session.close()  # type: ignore[no-untyped-call]
+
+    thread = threading.Thread(target=close, name="zenoh close", daemon=True)
+    thread.start()
+    thread.join(timeout_s)
+    return not thread.is_alive()
+
+
+@contextmanager
+def opened_session(options: config.Zenoh) -> Iterator[zenoh.Session]:
+    """An open session that is closed at the end, in bounded time. Raises ``PublishError``."""
+    session = open_session(options)
+    try:
+        yield session
+    finally:
+        close_session(session)
+
+
+def reason(error: zenoh.ZError) -> str:
+    """The innermost reason, without the places in Zenoh's own source."""
+    text = re.sub(r"\s+at /\S+", "", str(error)).replace("\n", " ")
+    inner = re.search(r"\[([^\]]+ \(os error \d+\))", text)
+    return (inner[1] if inner else text).strip(" .!]")
+
+
+def _settings(options: config.Zenoh) -> zenoh.Config:
+    try:
+        settings = zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
+    except zenoh.ZError as error:
+        raise PublishError(
+            f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); mend zenoh.config_file"
+        ) from error
+    untouched = zenoh.Config()
+    for key, value in _UNLESS_THE_FILE_SAYS.items():
+        if settings.get_json(key) == untouched.get_json(key):
+            settings.insert_json5(key, value)
+    settings.insert_json5("scouting/gossip/enabled", json.dumps(options.gossip))
+    settings.insert_json5("mode", json.dumps(options.mode))
+    for name, endpoints in (("connect", options.connect), ("listen", options.listen)):
+        if endpoints or not options.config_file:
+            try:
+                settings.insert_json5(f"{name}/endpoints", json.dumps(endpoints))
+            except zenoh.ZError as error:
+                wrong = f"zenoh.{name}: {', '.join(endpoints)}: {reason(error)}"
+                raise PublishError(f"{wrong}; write for example tcp/127.0.0.1:7447") from error
+    return settings
+
+
+def _remedy(error: zenoh.ZError, options: config.Zenoh) -> str:
+    """Zenoh's message as one line that says what to do."""
+    bound = re.search(r"bound to ([^\s,\]]+):", str(error))
+    endpoint = bound[1] if bound else ", ".join(options.listen + options.connect) or options.config_file
+    if "Address already in use" in str(error):
+        return f"{endpoint}: already in use; stop the other program or set zenoh.listen to another port"
+    return f"{endpoint}: {reason(error)}; check zenoh.listen and zenoh.connect"

@@ -1,0 +1,39 @@
+"""The ROS 2 package has the messages that go out, and says what it needs to be built."""
+
+import re
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+from lcf_edge import __version__
+from lcf_edge.zenoh_link.schema import scene_schema
+
+ROOT = Path(__file__).parents[2]
+OURS, PACKAGE = ROOT / "lcf_edge" / "msg", ROOT / "ros2" / "lcf_msgs"
+MESSAGES = {path.name: path.read_bytes() for path in OURS.glob("*.msg")}
+
+
+def test_the_messages_are_the_same() -> None:
+    assert MESSAGES
+    assert {path.name: path.read_bytes() for path in (PACKAGE / "msg").iterdir()} == MESSAGES
+
+
+def test_every_message_is_generated() -> None:
+    cmake = (PACKAGE / "CMakeLists.txt").read_text(encoding="utf-8")
+    assert set(re.findall(r'"msg/(\w+\.msg)"', cmake)) == set(MESSAGES)
+    found = set(re.findall(r"find_package\((\w+) REQUIRED\)", cmake))
+    assert found == {"ament_cmake", "rosidl_default_generators", "std_msgs"}
+
+
+def test_the_package_names_what_it_depends_on() -> None:
+    package = ET.parse(PACKAGE / "package.xml").getroot()
+    assert package.findtext("name") == "lcf_msgs"
+    assert package.findtext("version") == __version__
+    assert package.findtext("license") == "Apache-2.0"
+    used = {name for text in MESSAGES.values() for name in re.findall(r"^(\w+)/\w+ ", text.decode(), re.MULTILINE)}
+    assert {element.text for element in package.iter("depend")} == used
+    assert package.findtext("member_of_group") == "rosidl_interface_packages"
+
+
+def test_the_schema_that_is_told_is_made_of_the_same_messages() -> None:
+    schema = scene_schema()
+    assert all(text.decode() in schema for text in MESSAGES.values())

@@ -1,0 +1,98 @@
+"""Another process on the network, which knows nothing of this project: does what it reads on standard input.
+
+``python peer.py CONFIG``, a Zenoh configuration as JSON; each line in is a request, each line out its result.
+"""
+
+import base64
+import json
+import queue
+import sys
+import threading
+from typing import Any
+
+import zenoh
+
+PATIENCE_S = 20.0
+
+
+class Peer:
+    def __init__(self, settings: dict[str, Any]) -> None:
+        config = zenoh.Config()
+        for key, value in settings.items():
+            config.insert_json5(key, json.dumps(value))
+        self.session = zenoh.open(config)
+        self.samples: dict[str, queue.Queue[zenoh.Sample]] = {}
+        self.kept: list[Any] = []
+
+    def subscribe(self, key: str) -> None:
+        self.samples[key] = queue.Queue()
+        self.kept.append(self.session.declare_subscriber(key, self.samples[key].put))
+
+    def receive(self, key: str, count: int, timeout_s: float) -> list[dict[str, Any]]:
+        """The next samples; fewer when no more came."""
+        received: list[dict[str, Any]] = []
+        try:
+            while len(received) < count:
+                received.append(described(self.samples[key].get(timeout=timeout_s)))
+        except queue.Empty:
+            pass
+        return received
+
+    def put(self, key: str, payload: str, encoding: str, count: int) -> bool:
+        """Whether somebody subscribed in time."""
+        publisher = self.session.declare_publisher(
+            key, encoding=encoding, congestion_control=zenoh.CongestionControl.BLOCK
+        )
+        matched = threading.Event()
+        with publisher.declare_matching_listener(lambda status: matched.set() if status.matching else None):
+            somebody = publisher.matching_status.matching or matched.wait(PATIENCE_S)
+        for _ in range(count):
+            publisher.put(base64.b64decode(payload))
+        publisher.undeclare()
+        return somebody
+
+    def put_blindly(self, key: str, payload: str) -> None:
+        """Whether or not somebody subscribed."""
+        self.session.put(key, bytes.fromhex(payload), congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def get(self, key: str) -> list[dict[str, Any]]:
+        replies = self.session.get(key, timeout=PATIENCE_S, target=zenoh.QueryTarget.ALL)
+        return [
+            described(reply.ok) if reply.ok else {"error": reply.err.payload.to_string()} for reply in list(replies)
+        ]
+
+    def flood(self, key: str, count: int) -> None:
+        """Ask, and ask, and at last listen to the answers."""
+        asked = [self.session.get(key, timeout=PATIENCE_S) for _ in range(count)]
+        for replies in asked:
+            list(replies)
+
+    def tokens(self, key: str) -> list[str]:
+        return sorted(str(reply.ok.key_expr) for reply in self.session.liveliness().get(key, timeout=PATIENCE_S))
+
+
+def described(sample: zenoh.Sample) -> dict[str, Any]:
+    attachment = sample.attachment.to_bytes() if sample.attachment else b""
+    return {
+        "key": str(sample.key_expr),
+        "payload": base64.b64encode(sample.payload.to_bytes()).decode(),
+        "encoding": str(sample.encoding),
+        "attachment": base64.b64encode(attachment).decode(),
+        "congestion_control": str(sample.congestion_control).rpartition(".")[2],
+        "priority": str(sample.priority).rpartition(".")[2],
+        "express": sample.express,
+    }
+
+
+def main() -> None:
+    peer = Peer(json.loads(sys.argv[1]))
+    for line in sys.stdin:
+        request = json.loads(line)
+        result = getattr(peer, request.pop("do"))(**request)
+        sys.stdout.write(json.dumps(result) + "\n")
+        sys.stdout.flush()
+    peer.session.close()
+
+
+if __name__ == "__main__":
+    main()

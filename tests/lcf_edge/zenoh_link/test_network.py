@@ -1,0 +1,143 @@
+"""The network is reached as docs/network.md says: with certificates, and by those alone whom a rule names."""
+
+import re
+import shlex
+import subprocess
+import sys
+import tomllib
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import pytest
+import zenoh
+
+from lcf_edge.config import Config, Zenoh
+from lcf_edge.records import Scene
+from lcf_edge.zenoh_link import opened_session
+from lcf_edge.zenoh_link.link import Link
+
+DOCUMENT = (Path(__file__).parents[3] / "docs/network.md").read_text(encoding="utf-8")
+SILENCE_S = 0.3
+
+NewScene = Callable[..., Scene]
+Velocity = Callable[..., bytes]
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"^```{language}\n(.*?)^```$", DOCUMENT, re.MULTILINE | re.DOTALL)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The documented files, and the certificates that the documented commands make."""
+    folder = tmp_path_factory.mktemp("tls")
+    (commands,) = blocks("bash")
+    authority, _, planner, _ = commands.splitlines()
+    guest = planner.replace("planner", "guest")
+    stranger = planner.replace("planner", "stranger").replace("ca.", "other-ca.")
+    for command in (*commands.splitlines(), guest, authority.replace("ca.", "other-ca."), stranger):
+        subprocess.run(shlex.split(command), cwd=folder, check=True, capture_output=True)
+    rover, reader = blocks("json5")
+    (folder / "zenoh.json5").write_text(rover.replace("/etc/lcf-edge/tls", str(folder)))
+    (folder / "planner.json5").write_text(re.sub(r'"(\w+\.(pem|key))"', rf'"{folder}/\1"', reader))
+    return folder
+
+
+@pytest.fixture
+def rover(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
+    """A session with the documented configuration."""
+    (written,) = blocks("toml")
+    options = msgspec.convert(tomllib.loads(written)["zenoh"], Zenoh)
+    assert options == Zenoh(listen=["tls/0.0.0.0:7447"], config_file="/etc/lcf-edge/zenoh.json5")
+    file = str(folder / "zenoh.json5")
+    with opened_session(Zenoh(listen=[endpoint.replace("tcp/", "tls/")], config_file=file)) as opened:
+        yield opened
+
+
+@pytest.fixture
+def link(rover: zenoh.Session) -> Iterator[Link]:
+    link = Link(rover, Config())
+    yield link
+    link.close()
+
+
+@pytest.fixture
+def party(start: Any, folder: Path, endpoint: str) -> Callable[[str], Any]:
+    """Somebody with a certificate."""
+
+    def connect(name: str, **settings: Any) -> Any:
+        where = endpoint.replace("tcp/127.0.0.1", "tls/localhost")
+        tls = {
+            "transport__link__tls__root_ca_certificate": str(folder / "ca.pem"),
+            "transport__link__tls__connect_certificate": str(folder / f"{name}.pem"),
+            "transport__link__tls__connect_private_key": str(folder / f"{name}.key"),
+            "transport__link__tls__enable_mtls": True,
+        }
+        return start(mode="peer", listen__endpoints=[], connect__endpoints=[where], **(tls | settings))
+
+    return connect
+
+
+def test_a_planner_reads_as_documented(
+    link: Link, rover: zenoh.Session, until_matched: Any, folder: Path, endpoint: str, scene: Callable[..., Scene]
+) -> None:
+    (code,) = blocks("python")
+    code = code.replace("tls/rover:7447", endpoint.replace("tcp/127.0.0.1", "tls/localhost"))
+    code = code.replace("planner.json5", str(folder / "planner.json5"))
+    with subprocess.Popen((sys.executable, "-u", "-c", code), stdout=subprocess.PIPE, text=True) as planner:
+        try:
+            until_matched(rover, "lcf/scene")
+            link.put_scene(scene(7))
+            assert planner.stdout
+            assert planner.stdout.readline() == "7 3\n"
+        finally:
+            planner.kill()
+
+
+def test_a_planner_reads_and_asks_but_does_not_tell_the_speed(
+    link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity
+) -> None:
+    planner = party("planner")
+    planner.subscribe("lcf/scene")
+    until_matched(rover, "lcf/scene")
+    link.put_scene(scene())
+    assert len(planner.receive("lcf/scene")) == 1
+    assert planner.tokens("lcf/@alive/*") == ["lcf/@alive/rover"]
+    assert len(planner.get("lcf/query/config")) == 1
+    planner.ask("put_blindly", key="lcf/speed", payload=velocity().hex())
+    assert len(planner.get("lcf/query/config")) == 1
+    assert not any(name.startswith("speed") for name in link.counts)
+
+
+def test_wheels_tell_the_speed_but_do_not_read(
+    link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity
+) -> None:
+    wheels, planner = party("wheels"), party("planner")
+    wheels.subscribe("lcf/scene")
+    wheels.put("lcf/speed", velocity())
+    planner.subscribe("lcf/scene")
+    until_matched(rover, "lcf/scene")
+    link.put_scene(scene())
+    assert len(planner.receive("lcf/scene")) == 1
+    assert wheels.receive("lcf/scene", timeout_s=SILENCE_S) == []
+    assert link.counts["speed taken"] == 1
+
+
+@pytest.mark.parametrize("who", ["guest", "stranger", "nobody"])
+def test_whom_no_rule_names_does_nothing(
+    link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity, who: str
+) -> None:
+    """One with a certificate but without a rule, one of another authority, one without a certificate."""
+    nothing = {f"transport__link__tls__{key}": None for key in ("connect_certificate", "connect_private_key")}
+    other = party(who) if who != "nobody" else party("guest", **nothing, transport__link__tls__enable_mtls=False)
+    planner = party("planner")
+    other.subscribe("lcf/scene")
+    planner.subscribe("lcf/scene")
+    until_matched(rover, "lcf/scene")
+    other.ask("put_blindly", key="lcf/speed", payload=velocity().hex())
+    link.put_scene(scene())
+    assert len(planner.receive("lcf/scene")) == 1
+    assert other.receive("lcf/scene", timeout_s=SILENCE_S) == []
+    assert not any(name.startswith("speed") for name in link.counts)
