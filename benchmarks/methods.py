@@ -44,7 +44,7 @@ class FilterMethod:
 
     def process(self, frame: Frame) -> Scene:
         """Circles and ψ of one frame."""
-        return self.pipeline.process(frame).scene
+        return self.pipeline.process(frame)
 
 
 class PeerMethod:

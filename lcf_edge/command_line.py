@@ -88,6 +88,11 @@ def _parser() -> argparse.ArgumentParser:
     replay.add_argument("--realtime", action="store_true", help="as slow as the recording was made")
     replay.set_defaults(run=_replay)
 
+    run = commands.add_parser(
+        "run", allow_abbrev=False, parents=[settings], help="the daemon: camera and IMU in, scenes out over Zenoh"
+    )
+    run.set_defaults(run=_run)
+
     config = commands.add_parser(
         "config", allow_abbrev=False, parents=[settings], help="check and print the effective configuration"
     )
@@ -116,6 +121,12 @@ def _config(arguments: argparse.Namespace) -> None:
     from lcf_edge.commands.config import report  # noqa: PLC0415
 
     _tell(report(config))
+
+
+def _run(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.run import run  # noqa: PLC0415
+
+    run(arguments.config, arguments.set)
 
 
 def _replay(arguments: argparse.Namespace) -> None:

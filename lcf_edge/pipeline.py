@@ -4,10 +4,9 @@ import time
 from collections import Counter, deque
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
@@ -15,10 +14,13 @@ from lcf_edge.corners import CornerDetector
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
+from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.lens import Lens
-from lcf_edge.recordings import Recording
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
+
+if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
+    from lcf_edge.recordings import Recording
 
 LEAST_DT_S = 5e-3  # of a first frame, or of two with one stamp
 
@@ -27,7 +29,7 @@ Records = np.ndarray[Any, np.dtype[np.void]]
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one frame gave."""
+    """What one frame gave, and what it was made of."""
 
     scene: Scene
     view: View
@@ -45,6 +47,7 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self.filter = LineCircleFilter(config, lens)
+        self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
 
     def _refuse_excess(self, budget_mib: float) -> None:
@@ -75,7 +78,7 @@ class Pipeline:
         else:
             self._motion.add_speed(sample)
 
-    def process(self, frame: Frame) -> Outcome:
+    def process(self, frame: Frame) -> Scene:
         """Run the filter on one frame."""
         started = time.perf_counter_ns()
         corners, cut = self._detector.detect(frame.image)
@@ -95,7 +98,8 @@ class Pipeline:
         notes = ego.notes if len(corners) else (*ego.notes, "no corners")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
         done = time.perf_counter_ns()
-        scene = Scene(
+        self._seen = corners, step.omitted
+        return Scene(
             stamp_ns=frame.stamp_ns,
             seq=frame.seq,
             image_width=self._lens.width,
@@ -111,7 +115,6 @@ class Pipeline:
             ),
             notes=notes,
         )
-        return Outcome(scene, self._view(corners.pixel.astype(np.float32), step.omitted))
 
     def _circles(self) -> Records:
         """The circles from Tr_s up, rebels first."""
@@ -158,14 +161,16 @@ class Pipeline:
         across, down = self._lens.width - 1, self._lens.height - 1
         return rows, np.minimum(np.maximum(x, 0), across), np.minimum(np.maximum(y, 0), down)
 
-    def _view(self, pixel: npt.NDArray[np.float32], omitted: npt.NDArray[np.bool_]) -> View:
+    def view(self) -> View:
+        """What the last scene was made of, for those who draw it."""
+        corners, omitted = self._seen
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
         place = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
         centres = self._lens.distort(np.stack([groups.x, groups.y], axis=1))
         focus = self._lens.distort(np.array([self.filter.focus], np.float32))[0]
         return View(
-            corners=pixel,
+            corners=corners.pixel.astype(np.float32),
             omitted=omitted,
             edges=place[~rebel],
             rebels=place[rebel],
@@ -175,7 +180,7 @@ class Pipeline:
         )
 
 
-def run(recording: Recording, config: Config) -> Iterator[tuple[Frame, Outcome]]:
+def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome]]:
     """Feed a recording through the pipeline; answers each frame with its outcome.
 
     At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises
@@ -195,7 +200,7 @@ def run(recording: Recording, config: Config) -> Iterator[tuple[Frame, Outcome]]
                 for sample in waiting:
                     pipeline.add(sample)
                 waiting.clear()
-            yield event, pipeline.process(event)
+            yield event, Outcome(pipeline.process(event), pipeline.view())
         elif pipeline is None:
             waiting.append(event)
         else:

@@ -24,6 +24,11 @@ class Corners:
         return len(self.pixel)
 
 
+NO_CORNERS = Corners(
+    np.empty((0, 2), np.int32), np.empty((0, 2), np.float32), np.empty((0, APPEARANCE_SAMPLES), np.uint8)
+)
+
+
 @dataclass(frozen=True, slots=True)
 class Motion:
     """How the vehicle moved since the last frame.

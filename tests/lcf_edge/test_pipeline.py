@@ -55,7 +55,7 @@ def outcomes(items: Iterable[Item], config: Config = DEFAULTS, lens: Lens = PINH
 def processed(pipeline: Pipeline, items: Iterable[Item]) -> Iterator[Outcome]:
     for item in items:
         if isinstance(item, Frame):
-            yield pipeline.process(item)
+            yield Outcome(pipeline.process(item), pipeline.view())
         else:
             pipeline.add(item)
 
@@ -401,4 +401,5 @@ def test_whatever_comes_in_the_outcome_is_in_order(
         stamp_ns += step_ns
         pipeline.add(ImuSample(stamp_ns, (rates[0], rates[1], rates[2]), (0.0, -9.81, 0.0)))
         pipeline.add(SpeedSample(stamp_ns, rates[0], rates[1]))
-        check(pipeline.process(Frame(stamp_ns, seq, image)), config, LENSES[lens])
+        scene = pipeline.process(Frame(stamp_ns, seq, image))
+        check(Outcome(scene, pipeline.view()), config, LENSES[lens])

@@ -186,7 +186,7 @@ def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) ->
     rebels, rotations, notes = {}, [], set()
     for event in events:
         if isinstance(event, Frame):
-            scene = pipeline.process(event).scene
+            scene = pipeline.process(event)
             rebels[scene.seq] = trusted_rebels(scene, config.filter.tr_s)
             rotations.append(motion.advance(event.stamp_ns).rotation)
             notes |= set(scene.notes) if scene.seq else set()

@@ -1,0 +1,34 @@
+"""``lcf-edge run``: the daemon."""
+# ruff: noqa: PLC0415
+
+import os
+from collections.abc import Sequence
+from contextlib import ExitStack
+from pathlib import Path
+
+from lcf_edge.config import load
+
+
+def run(path: Path | None, settings: Sequence[str]) -> None:
+    """Run until a signal ends it. Raises ``ConfigError``, ``PublishError`` at the start, ``LcfError`` later."""
+    config = load(path, settings)
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads would only cost memory
+    import cv2
+
+    from lcf_edge.daemon import log
+    from lcf_edge.daemon.memory import check_budget
+    from lcf_edge.daemon.service import Service
+    from lcf_edge.zenoh_link.link import Link
+    from lcf_edge.zenoh_link.session import close_session, open_session
+
+    cv2.setNumThreads(1)
+    log.start(config.log.level)
+    check_budget(config)
+    with ExitStack() as stack:
+        session = open_session(config.zenoh)
+        stack.callback(close_session, session)
+        link = Link(session, config)
+        stack.pop_all()  # from here on the service closes it
+    service = Service(config, link, path, settings)
+    with service.signals_minded():
+        service.run()

@@ -1,0 +1,57 @@
+"""What makes the scenes worse than they could be, in words."""
+
+from collections.abc import Iterator
+
+from drivers.records import Frame
+from lcf_edge.config import Config
+from lcf_edge.records import Scene
+
+DARK = 25  # mean grey level of a dark picture
+_BLIND_S = 0.5  # without corners
+
+_WORDS = {
+    "no imu": "no inertial samples: rotation is unknown and the flow lines are widened; check imu",
+    "imu gap": "inertial samples are missing between two pictures; check the IMU's cable and rate",
+    "rotation from odometry": "rotation is taken from odometry",
+    "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
+    "speed drifts": "speed comes from the accelerometer alone and drifts",
+}
+
+
+class Degradation:
+    """Follows the scenes; ``notes``: what is wrong at present, the worst first."""
+
+    def __init__(self, config: Config) -> None:
+        self.notes: tuple[str, ...] = ()
+        self._leap_px = config.filter.leap_px
+        self._depth_m = config.filter.scene_depth_m
+        self._last_ns: int | None = None
+        self._corners_ns: int | None = None  # when there were some
+
+    def add(self, frame: Frame, scene: Scene) -> None:
+        """Take a frame and what it gave."""
+        self.notes = tuple(self._found(frame, scene))
+        self._last_ns = frame.stamp_ns
+
+    def _found(self, frame: Frame, scene: Scene) -> Iterator[str]:
+        if scene.sizes.corners or self._corners_ns is None:
+            self._corners_ns = frame.stamp_ns
+        if frame.stamp_ns - self._corners_ns >= _BLIND_S * 1e9:
+            grey = float(frame.image[::8, ::8].mean())
+            yield (
+                f"dark: no corners, the mean grey level is {grey:.0f} of 255; uncover the lens or give light"
+                if grey < DARK
+                else "blind: no corners; the lens is covered or out of focus, or all that it sees is plain"
+            )
+        if self._last_ns is not None:
+            yield from self._too_slow(scene, (frame.stamp_ns - self._last_ns) / 1e9)
+        yield from (_WORDS[note] for note in scene.notes if note in _WORDS)
+
+    def _too_slow(self, scene: Scene, interval_s: float) -> Iterator[str]:
+        """What stands at ``filter.scene_depth_m`` and the edge of the picture moves x V dt / Z in a frame."""
+        moved_px = scene.image_width / 2 * abs(scene.vehicle_speed) * interval_s / self._depth_m
+        if moved_px > self._leap_px:  # NaN is not
+            yield (
+                f"frame rate too low for the motion: the scenery moves {moved_px:.0f} px from frame to frame, "
+                f"{self._leap_px:.0f} can be followed; drive slower or raise camera.fps"
+            )

@@ -1,0 +1,85 @@
+"""Logs: one line an event on standard error, as journald or a terminal likes it, never a flood."""
+
+import logging
+import os
+import sys
+import time
+from collections.abc import Callable, Mapping
+from typing import TextIO
+
+LOGGER = logging.getLogger("lcf_edge")
+
+AT_ONCE = 5  # lines of one kind, then
+EACH_S = 10.0  # one more in this time
+KINDS = 256  # that are remembered
+
+_PRIORITIES = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3}
+_LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
+
+
+def start(level: str, stream: TextIO | None = None, environment: Mapping[str, str] = os.environ) -> None:
+    """Log to ``stream`` (standard error) what is of ``level`` (error, warning, info, debug) or worse."""
+    stream = stream or sys.stderr
+    handler = logging.StreamHandler(stream)
+    handler.setFormatter(_Line(journal=_is_journal(stream, environment)))
+    handler.addFilter(_NoFlood())
+    logging.raiseExceptions = False  # a log that cannot be written is nobody's error
+    LOGGER.handlers[:] = [handler]
+    LOGGER.propagate = False
+    set_level(level)
+
+
+def set_level(level: str) -> None:
+    """Log what is of ``level`` or worse."""
+    LOGGER.setLevel(_LEVELS[level])
+
+
+def _is_journal(stream: TextIO, environment: Mapping[str, str]) -> bool:
+    """Whether journald reads the stream: systemd names its device and inode (systemd.exec(5), JOURNAL_STREAM)."""
+    try:
+        status = os.fstat(stream.fileno())
+    except (OSError, ValueError):
+        return False
+    return environment.get("JOURNAL_STREAM") == f"{status.st_dev}:{status.st_ino}"
+
+
+class _Line(logging.Formatter):
+    """``<4>text`` for journald (sd-daemon(3)), else ``lcf-edge: warning: text``."""
+
+    def __init__(self, *, journal: bool) -> None:
+        super().__init__()
+        self._journal = journal
+
+    def format(self, record: logging.LogRecord) -> str:
+        text = " ".join(record.getMessage().split())
+        if self._journal:
+            return f"<{_PRIORITIES.get(record.levelno, 6)}>{text}"
+        return (
+            f"lcf-edge: {text}" if record.levelno == logging.INFO else f"lcf-edge: {record.levelname.lower()}: {text}"
+        )
+
+
+class _NoFlood(logging.Filter):
+    """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that tells how many were not written.
+
+    Lines are of one kind when they have one message before its arguments are put in.
+    """
+
+    def __init__(self, monotonic_s: Callable[[], float] = time.monotonic) -> None:
+        super().__init__()
+        self._monotonic_s = monotonic_s
+        self._kinds: dict[str, tuple[float, float, int]] = {}  # lines that may come, since when, not written
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        now_s = self._monotonic_s()
+        allowed, since_s, unwritten = self._kinds.pop(record.msg, (float(AT_ONCE), now_s, 0))
+        allowed = min(allowed + (now_s - since_s) / EACH_S, AT_ONCE)
+        if allowed < 1:
+            self._kinds[record.msg] = (allowed, now_s, unwritten + 1)
+            return False
+        if len(self._kinds) >= KINDS:
+            del self._kinds[next(iter(self._kinds))]
+        self._kinds[record.msg] = (allowed - 1, now_s, 0)
+        if unwritten:
+            record.msg, record.args = f"{record.getMessage()} (and {unwritten} more like it)", None
+        return True

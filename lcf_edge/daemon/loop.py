@@ -1,0 +1,157 @@
+"""The pipeline's thread: the newest frame, the inertial samples that belong to it, a scene on its way out."""
+
+import threading
+import time
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Config
+from lcf_edge.daemon.clock import StoppableClock, SystemTime
+from lcf_edge.daemon.degrade import Degradation
+from lcf_edge.daemon.link import Link
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.daemon.mailbox import Newest, SampleRing
+from lcf_edge.daemon.meters import DurationHistogram
+from lcf_edge.daemon.preview import Previewer
+from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
+from lcf_edge.lens import Lens
+from lcf_edge.pipeline import Outcome, Pipeline
+from lcf_edge.records import Scene
+
+FRAME_WAIT_S = 0.25  # then the loop turns without one
+IMU_WAIT_S = 4e-3  # for the sample after a frame; the last one is held beyond
+IMU_SILENT_NS = 50_000_000  # an IMU that is this late is away, and not waited for
+
+
+@dataclass(frozen=True, slots=True)
+class Mail:
+    """From the devices' threads to the pipeline's."""
+
+    frames: Newest[Frame] = field(default_factory=Newest)
+    imu: SampleRing[ImuSample] = field(default_factory=lambda: SampleRing(IMU_CAPACITY))
+    speeds: SampleRing[SpeedSample] = field(default_factory=lambda: SampleRing(SPEED_CAPACITY))
+
+
+def lens_for(config: Config, width: int, height: int) -> Lens:
+    """The lens of pictures of that size: by the configuration, else a stand-in recording's own. Raises ``LcfError``."""
+    camera = config.camera
+    if camera.driver == "recording" and not camera.intrinsics:
+        from lcf_edge.recordings import open_recording  # noqa: PLC0415  # a vehicle has none
+
+        recorded = open_recording(Path(camera.recording), config).lens
+        if recorded is not None:
+            return recorded.scaled(width, height)
+    return Lens.from_config(camera, width, height)
+
+
+class Loop(threading.Thread):
+    """Turns whenever a frame comes, and without one each ``FRAME_WAIT_S``, until ``clock`` is stopped.
+
+    For others to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last), ``evicted``,
+    ``latency`` (from the frame's stamp to after the put), ``degradation``. ``first_scene`` is called once. Raises
+    ``ConfigError`` for pictures that the lens of the configuration does not fit.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        mail: Mail,
+        link: Link,
+        previewer: Previewer,
+        clock: StoppableClock,
+        system_time: SystemTime,
+        first_scene: Callable[[], object],
+    ) -> None:
+        super().__init__(name="pipeline", daemon=True)
+        self.turns = 0
+        self.frames = 0
+        self.scene: Scene | None = None
+        self.evicted = 0
+        self.latency = DurationHistogram()
+        self.degradation = Degradation(config)
+        self._config = config
+        self._pipeline: Pipeline | None = None  # the first picture tells its size
+        self._shape: tuple[int, int] | None = None
+        self._next: tuple[Config, Pipeline] | None = None
+        self._refused_before: Counter[str] = Counter()  # by earlier pipelines
+        self._mail = mail
+        self._link = link
+        self._previewer = previewer
+        self._clock = clock
+        self._system_time = system_time
+        self._first_scene = first_scene
+
+    @property
+    def refused(self) -> Counter[str]:
+        """IMU and speed samples that were not used, by reason."""
+        pipeline = self._pipeline
+        return self._refused_before + Counter(dict(pipeline.refused) if pipeline else {})
+
+    def rebuild(self, config: Config) -> None:
+        """From the next frame on, a new pipeline with empty tables. Raises ``LcfError``, then the old one goes on."""
+        height, width = self._shape or (config.camera.height, config.camera.width)
+        self._next = config, Pipeline(config, lens_for(config, width, height))
+
+    def run(self) -> None:
+        """Turn until stopped."""
+        while not self._clock.stopped:
+            self._turn(self._mail.frames.take(FRAME_WAIT_S))
+            self.turns += 1
+
+    def wake(self) -> None:
+        """Notice a stop at once."""
+        self._mail.frames.close()
+
+    def _turn(self, frame: Frame | None) -> None:
+        step_ns = self._system_time.notice()
+        if step_ns:
+            LOGGER.warning("clock: the system clock was set by %+.3f s; stamps follow", step_ns / 1e9)
+        if frame is None:
+            if self._pipeline is not None:
+                self._feed(self._pipeline)
+            return
+        pipeline = self._pipeline_for(frame)
+        self._await_imu(frame)
+        self._feed(pipeline)
+        scene = pipeline.process(frame)
+        scene = replace(scene, stamp_ns=self._system_time.system_ns(frame.stamp_ns))
+        self._link.put_scene(scene)
+        self.latency.add((time.monotonic_ns() - frame.stamp_ns) / 1e9)
+        self.scene = scene
+        self.frames += 1
+        self.evicted += scene.sizes.evicted
+        if self.frames == 1:
+            self._first_scene()
+        self.degradation.add(frame, scene)
+        if self._previewer.wants():
+            self._previewer.offer(frame, Outcome(scene, pipeline.view()))
+
+    def _pipeline_for(self, frame: Frame) -> Pipeline:
+        """The one in use, or a new one: asked for by ``rebuild``, or because the pictures have another size."""
+        height, width = frame.image.shape
+        pipeline = self._pipeline
+        if self._next is not None:
+            (self._config, pipeline), self._next = self._next, None
+        if pipeline is None or (height, width) != self._shape:
+            pipeline = Pipeline(self._config, lens_for(self._config, width, height))
+            self._shape = height, width
+        if pipeline is not self._pipeline:
+            self._refused_before = self.refused
+            self._pipeline = pipeline
+            self.degradation = Degradation(self._config)
+        return pipeline
+
+    def _await_imu(self, frame: Frame) -> None:
+        offset_ns = round(self._config.imu.time_offset_s * 1e9)
+        self._mail.imu.wait_until(frame.stamp_ns - offset_ns, IMU_WAIT_S, IMU_SILENT_NS)
+
+    def _feed(self, pipeline: Pipeline) -> None:
+        for sample in self._mail.imu.take():
+            pipeline.add(sample)
+        for speed in self._mail.speeds.take():
+            pipeline.add(speed)
+        for _, received in self._link.take_speeds():
+            pipeline.add(replace(received, stamp_ns=self._system_time.monotonic_ns(received.stamp_ns)))

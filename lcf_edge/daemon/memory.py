@@ -1,0 +1,98 @@
+"""The memory budget of the whole process: checked at the start, watched, and kept by shedding."""
+
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lcf_edge.config import Config
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.errors import ConfigError
+from lcf_edge.lens import Lens
+from lcf_edge.pipeline import Pipeline
+
+PROGRAM_MIB = 71.0
+"""Python, NumPy, OpenCV, an open Zenoh session and the program, without tables and pictures."""
+
+SHED_AT = 0.9  # of the budget
+_STATM = Path("/proc/self/statm")
+_MIB = 2**20
+
+_PICTURES = 12  # bytes a pixel: buffers of the driver (2 bytes, 4 of them), one waiting, one in work, scratch
+_CORNER_BYTES = 1500  # of one corner's way through detection and matching
+
+
+def resident_mib(statm: Path = _STATM) -> float:
+    """Resident memory of this process, MiB."""
+    return int(statm.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE") / _MIB
+
+
+def needs_mib(config: Config) -> dict[str, float]:
+    """What each part of the program needs, MiB, without the preview, which goes first. Raises ``ConfigError``."""
+    camera = config.camera
+    pixels = camera.width * camera.height
+    table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
+    return {
+        "the program": PROGRAM_MIB,
+        "pictures": pixels * _PICTURES / _MIB,
+        "tables": (table_bytes + config.memory.corners * _CORNER_BYTES) / _MIB,
+    }
+
+
+_REMEDIES = {
+    "pictures": "lower camera.width and camera.height",
+    "tables": "lower the other keys of memory",
+}
+
+
+def check_budget(config: Config) -> None:
+    """Refuse a configuration that cannot keep to its budget. Raises ``ConfigError`` that says what to lower."""
+    needs = needs_mib(config)
+    needed_mib = sum(needs.values())
+    limit_mib = SHED_AT * config.memory.budget_mib
+    if needed_mib <= limit_mib:
+        return
+    most = max(_REMEDIES, key=lambda part: needs[part])
+    remedy = f"{_REMEDIES[most]}, or raise it" if limit_mib > PROGRAM_MIB else "raise it"
+    parts = ", ".join(f"{part} {size_mib:.0f}" for part, size_mib in needs.items())
+    raise ConfigError(
+        f"memory.budget_mib: about {needed_mib:.0f} MiB are needed ({parts}), {SHED_AT:.0%} of the budget of "
+        f"{config.memory.budget_mib:g} is less; {remedy} to {needed_mib / SHED_AT + 1:.0f}"
+    )
+
+
+@dataclass(frozen=True, slots=True)
+class Shedding:
+    """Something that can be given up."""
+
+    name: str
+    give_up: Callable[[], object]
+
+
+class MemoryWatch:
+    """Gives up one thing after the other while more than ``SHED_AT`` of the budget is resident.
+
+    ``resident_mib``: at the last ``check``. ``shed``: what was given up; it stays so until a restart.
+    """
+
+    def __init__(self, budget_mib: float, order: Sequence[Shedding], measure_mib: Callable[[], float]) -> None:
+        self.budget_mib = budget_mib
+        self.resident_mib = measure_mib()
+        self._order = list(order)
+        self._measure_mib = measure_mib
+        self.shed: list[str] = []
+
+    def check(self) -> None:
+        """Measure, and give up the next thing if it is too much; one a call, so that it can take effect."""
+        self.resident_mib = self._measure_mib()
+        if self.resident_mib <= SHED_AT * self.budget_mib or not self._order:
+            return
+        thing = self._order.pop(0)
+        thing.give_up()
+        self.shed.append(thing.name)
+        LOGGER.warning(
+            "memory: %.0f MiB of a budget of %g are resident, gave up %s; raise memory.budget_mib or lower memory.*",
+            self.resident_mib,
+            self.budget_mib,
+            thing.name,
+        )

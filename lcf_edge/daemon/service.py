@@ -1,0 +1,251 @@
+"""The main thread: starts the others, keeps house once a second, minds signals, and ends it all in order."""
+
+import gc
+import queue
+import signal
+import threading
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from functools import partial
+from pathlib import Path
+from traceback import extract_tb
+from typing import Any
+
+import msgspec
+
+from lcf_edge.config import DEFAULT_PATH, Config, load
+from lcf_edge.daemon import log
+from lcf_edge.daemon.clock import StoppableClock, SystemTime
+from lcf_edge.daemon.devices import readers
+from lcf_edge.daemon.health import Health
+from lcf_edge.daemon.link import Link
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.daemon.loop import Loop, Mail
+from lcf_edge.daemon.memory import MemoryWatch, Shedding, check_budget, resident_mib
+from lcf_edge.daemon.notify import Notifier
+from lcf_edge.daemon.preview import Previewer
+from lcf_edge.daemon.reload import changed, merged, signature, wants_pipeline, wants_restart
+from lcf_edge.errors import LcfError
+
+TICK_S = 1.0
+ENDS_WITHIN_S = 0.7  # all threads together; the link has its own limit
+
+
+class InternalError(LcfError):
+    """A mistake in the program."""
+
+
+class Service:
+    """One run of the daemon. ``path`` and ``settings`` are read again at a reload.
+
+    ``config`` is one that ``check_budget`` let pass; ``notifier`` is told how it goes.
+    """
+
+    def __init__(
+        self,
+        config: Config,
+        link: Link,
+        path: Path | None = None,
+        settings: Sequence[str] = (),
+        notifier: Notifier | None = None,
+        tick_s: float = TICK_S,
+    ) -> None:
+        self._config = config
+        self._path, self._settings = path, settings
+        self._signature = signature(path or DEFAULT_PATH)
+        self._link = link
+        self._notifier = notifier or Notifier()
+        self._to_do: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
+        self._clock = StoppableClock()
+        self._system_time = SystemTime()
+        self._mail = Mail()
+        self._readers = readers(config, self._mail, self._clock)
+        self._previewer = Previewer(link, self._clock)
+        self._loop = Loop(
+            config,
+            self._mail,
+            link,
+            self._previewer,
+            self._clock,
+            self._system_time,
+            lambda: self._to_do.put(self._check_ready),
+        )
+        self._memory = self._watched()
+        self._health = Health(self._readers, self._mail, self._loop, link, self._system_time)
+        self._ready = False
+        self._ending = False
+        self._failure: LcfError | None = None
+        self._turns = 0
+        self._tick_s = tick_s
+        self._tick_at_s = time.monotonic() + tick_s
+        self._notes: set[str] = set()
+
+    def run(self) -> None:
+        """Run until ``stop`` or a failure. Raises ``LcfError`` when a thread failed."""
+        with self._failures_noticed():
+            try:
+                for thread in (self._loop, self._previewer, *self._readers):
+                    thread.start()
+                gc.collect()
+                gc.freeze()  # what is here now stays: later collections need not look at it
+                while not self._ending:
+                    self._do_next()
+            finally:
+                self._close()
+        if self._failure is not None:
+            raise self._failure
+
+    def stop(self, why: str) -> None:
+        """End soon; may be called from a signal handler."""
+        self._to_do.put(partial(self._end, why))
+
+    def reload(self) -> None:
+        """Read the configuration again soon; may be called from a signal handler."""
+        self._to_do.put(self._reload)
+
+    @contextmanager
+    def signals_minded(self) -> Iterator[None]:
+        """SIGTERM and SIGINT end, SIGHUP reloads; in the main thread only."""
+        handlers = {
+            signal.SIGTERM: lambda *_: self.stop("SIGTERM"),
+            signal.SIGINT: lambda *_: self.stop("SIGINT"),
+            signal.SIGHUP: lambda *_: self.reload(),
+        }
+        before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    @contextmanager
+    def _failures_noticed(self) -> Iterator[None]:
+        """What a thread raises ends the daemon, in one line."""
+
+        def notice(failed: threading.ExceptHookArgs) -> None:
+            self._to_do.put(partial(self._fail, _told(failed)))
+
+        before, threading.excepthook = threading.excepthook, notice
+        try:
+            yield
+        finally:
+            threading.excepthook = before
+
+    def _do_next(self) -> None:
+        try:
+            self._to_do.get(timeout=max(self._tick_at_s - time.monotonic(), 0))()
+        except queue.Empty:
+            self._tick_at_s = max(self._tick_at_s + self._tick_s, time.monotonic())
+            self._tick()
+
+    def _tick(self) -> None:
+        self._memory.check()
+        self._check_ready()
+        if self._loop.turns != self._turns:  # the watchdog lives on the pipeline's progress
+            self._turns = self._loop.turns
+            self._notifier.alive()
+        statuses = self._health.statuses(self._config, self._memory)
+        self._link.put_diagnostics(statuses, time.time_ns())
+        self._notifier.status(self._health.line(self._memory))
+        self._log_notes(self._loop.degradation.notes)
+        now = signature(self._path or DEFAULT_PATH)
+        if now != self._signature:
+            self._reload()
+
+    def _check_ready(self) -> None:
+        """Frames flow, or it has been told why not."""
+        if not self._ready and (self._loop.frames or self._readers[0].error):
+            self._ready = True
+            self._notifier.status(self._health.line(self._memory))
+            self._notifier.ready()
+            LOGGER.info("ready: %s", "without a camera" if self._readers[0].error else "frames come")
+
+    def _log_notes(self, notes: Sequence[str]) -> None:
+        kinds = {note.partition(":")[0]: note for note in notes}
+        for kind in kinds.keys() - self._notes:
+            LOGGER.warning("degraded: %s", kinds[kind])
+        for kind in self._notes - kinds.keys():
+            LOGGER.info("no longer degraded: %s", kind)
+        self._notes = set(kinds)
+
+    def _reload(self) -> None:
+        self._notifier.reloading()
+        self._signature = signature(self._path or DEFAULT_PATH)
+        try:
+            self._take(load(self._path, self._settings))
+        except LcfError as error:
+            LOGGER.error("reload: %s; the old configuration stays", error)
+        if self._ready:
+            self._notifier.ready()
+
+    def _take(self, wanted: Config) -> None:
+        """Go on with ``wanted``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
+        config = merged(self._config, wanted)
+        keys, refused = changed(self._config, config), wants_restart(changed(self._config, wanted))
+        check_budget(config)
+        if wants_pipeline(keys):
+            self._loop.rebuild(config)
+        self._config = config
+        self._link.show_config(config)
+        log.set_level(config.log.level)
+        self._previewer.off = False
+        self._memory = self._watched()
+        LOGGER.info("reload: changed %s", ", ".join(sorted(keys)) or "nothing")
+        if refused:
+            LOGGER.warning("reload: %s cannot change while running; restart to change it", ", ".join(sorted(refused)))
+
+    def _watched(self) -> MemoryWatch:
+        order = (
+            Shedding("the preview", self._shed_preview),
+            Shedding("half of the corners", self._shed_corners),
+        )
+        return MemoryWatch(self._config.memory.budget_mib, order, resident_mib)
+
+    def _shed_preview(self) -> None:
+        self._previewer.off = True
+
+    def _shed_corners(self) -> None:
+        replace = msgspec.structs.replace
+        memory, filters = self._config.memory, self._config.filter
+        self._config = replace(
+            self._config,
+            memory=replace(memory, corners=max(memory.corners // 2, 1), edges_normal=max(memory.edges_normal // 2, 1)),
+            filter=replace(filters, corners_target=max(filters.corners_target // 2, 1)),
+        )
+        self._loop.rebuild(self._config)
+
+    def _end(self, why: str) -> None:
+        if not self._ending:
+            LOGGER.info("stopping: %s", why)
+        self._ending = True
+
+    def _fail(self, failure: LcfError) -> None:
+        self._failure = self._failure or failure
+        self._ending = True
+
+    def _close(self) -> None:
+        """Devices first, then what lives on them, then the link."""
+        self._notifier.stopping()
+        self._clock.stop()
+        self._loop.wake()
+        self._previewer.wake()
+        deadline_s = time.monotonic() + ENDS_WITHIN_S
+        threads: tuple[Any, ...] = (*self._readers, self._loop, self._previewer)
+        for thread in threads:
+            if thread.ident is not None:
+                thread.join(max(deadline_s - time.monotonic(), 0))
+                if thread.is_alive():
+                    LOGGER.warning("%s: does not end; left behind", thread.name)
+        self._link.close()
+        self._notifier.close()
+
+
+def _told(failed: threading.ExceptHookArgs) -> LcfError:
+    """A failure as one line."""
+    if isinstance(failed.exc_value, LcfError):
+        return failed.exc_value
+    name = failed.thread.name if failed.thread else "a thread"
+    where = [f"{Path(place.filename).name}:{place.lineno}" for place in extract_tb(failed.exc_traceback)[-1:]]
+    what = f"{failed.exc_type.__name__} ({failed.exc_value}) at {', '.join(where)}"
+    return InternalError(f"{name}: internal error: {what}; please report it")

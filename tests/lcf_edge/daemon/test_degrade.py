@@ -1,0 +1,68 @@
+"""What makes the scenes worse is told in words."""
+
+import numpy as np
+import pytest
+
+from drivers.records import Frame
+from lcf_edge.config import Config, Filter
+from lcf_edge.daemon.degrade import Degradation
+from lcf_edge.records import CIRCLE, PSI_REGION, Scene, Sizes
+
+MS = 1_000_000
+
+
+def scene(seq: int, *, corners: int = 500, speed_mps: float = 1.0, notes: tuple[str, ...] = ()) -> Scene:
+    none = np.zeros(0, CIRCLE), np.zeros(0, PSI_REGION)
+    return Scene(0, seq, 640, 480, speed_mps, *none, sizes=Sizes(corners=corners), notes=notes)
+
+
+def frame(stamp_ms: int, grey: int = 120) -> Frame:
+    return Frame(stamp_ms * MS, 0, np.full((480, 640), grey, np.uint8))
+
+
+def test_all_is_well() -> None:
+    degradation = Degradation(Config())
+    for seq in range(30):
+        degradation.add(frame(33 * seq), scene(seq))
+        assert not degradation.notes
+
+
+@pytest.mark.parametrize(("grey", "word"), [(5, "dark: "), (180, "blind: ")])
+def test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees(grey: int, word: str) -> None:
+    degradation = Degradation(Config())
+    degradation.add(frame(0), scene(0))
+    degradation.add(frame(400, grey), scene(1, corners=0, speed_mps=0))
+    assert not degradation.notes
+    degradation.add(frame(500, grey), scene(2, corners=0, speed_mps=0))
+    assert degradation.notes[0].startswith(word)
+    degradation.add(frame(533), scene(3, corners=1))
+    assert not degradation.notes
+
+
+def test_a_camera_that_is_dark_from_the_start_is_told_too() -> None:
+    degradation = Degradation(Config())
+    for stamp_ms in (0, 300, 600):
+        degradation.add(frame(stamp_ms, 0), scene(0, corners=0))
+    assert degradation.notes[0].startswith("dark: ")
+
+
+@pytest.mark.parametrize(("interval_ms", "speed_mps", "told"), [(33, 1.5, False), (500, 1.5, True), (500, -1.5, True)])
+def test_a_frame_rate_too_low_for_the_motion(interval_ms: int, speed_mps: float, told: bool) -> None:
+    degradation = Degradation(Config(filter=Filter(leap_px=40.0, scene_depth_m=4.0)))
+    degradation.add(frame(0), scene(0, speed_mps=speed_mps))
+    degradation.add(frame(interval_ms), scene(1, speed_mps=speed_mps))
+    assert [note.partition(":")[0] for note in degradation.notes] == ["frame rate too low for the motion"] * told
+
+
+def test_without_a_speed_nothing_is_said_of_the_rate() -> None:
+    degradation = Degradation(Config())
+    degradation.add(frame(0), scene(0))
+    degradation.add(frame(5000), scene(1, speed_mps=float("nan")))
+    assert not degradation.notes
+
+
+@pytest.mark.parametrize("note", ["no imu", "imu gap", "rotation from odometry", "no speed", "speed drifts"])
+def test_what_ego_motion_lacks_is_told(note: str) -> None:
+    degradation = Degradation(Config())
+    degradation.add(frame(0), scene(0, notes=("first frame", note)))
+    assert len(degradation.notes) == 1

@@ -1,0 +1,58 @@
+"""docs/operation.md tells what the daemon does; each row of its table of what may be missing has a test."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from lcf_edge.daemon.reload import OTHER_KEYS, PIPELINE_KEYS
+
+HERE = Path(__file__).parent
+DOCUMENT = (HERE.parents[2] / "docs/operation.md").read_text(encoding="utf-8")
+
+TESTS = {
+    "no camera": "test_without_a_camera_it_lives_and_says_since_when",
+    "camera silent": "test_a_camera_that_falls_silent_is_stale",
+    "dark lens": "test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees",
+    "covered lens": "test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees",
+    "frame rate too low for the motion": "test_a_frame_rate_too_low_for_the_motion",
+    "no IMU": "test_an_imu_that_is_away_widens_and_is_told",
+    "no speed": "test_without_speed_ranges_are_unknown",
+    "pipeline too slow": "test_every_frame_is_a_scene_or_counted",
+    "pipeline stuck": "test_the_watchdog_is_fed_by_the_progress_of_the_pipeline",
+    "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_told",
+    "memory short": "test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so",
+    "board hot": "test_a_board_that_is_hot_is_told",
+}
+
+
+def section(heading: str) -> str:
+    return DOCUMENT.split(f"\n## {heading}\n", 1)[1].split("\n## ", 1)[0]
+
+
+def cells(heading: str) -> list[list[str]]:
+    lines = [line for line in section(heading).splitlines() if line.startswith("|")][2:]
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in lines]
+
+
+def test_each_row_has_a_test() -> None:
+    assert [row[0] for row in cells("When something is missing")] == list(TESTS)
+    sources = "\n".join(path.read_text(encoding="utf-8") for path in HERE.glob("test_*.py"))
+    assert {name for name in TESTS.values() if f"def {name}(" not in sources} == set()
+
+
+def test_what_is_given_up_has_its_order() -> None:
+    source = (HERE.parents[2] / "lcf_edge/daemon/service.py").read_text(encoding="utf-8")
+    assert re.findall(r"^\d\. (.+)$", section("Memory"), re.M) == re.findall(r'Shedding\("([^"]+)"', source)
+
+
+@pytest.mark.parametrize(("row", "tables"), [(0, PIPELINE_KEYS), (1, OTHER_KEYS)])
+def test_the_keys_of_a_reload_are_those(row: int, tables: dict[str, frozenset[str]]) -> None:
+    told: dict[str, set[str]] = {}
+    for part in cells("Reload")[row][0].split("; "):
+        for clause in re.findall(r"((?:all|`\w+`(?:, `\w+`)*)) of `(\w+)`(?: but `(\w+)`)?", part):
+            names, table, but = clause
+            told[table] = {"all", *([f"-{but}"] if but else [])} if names == "all" else set(re.findall(r"\w+", names))
+    for table, keys in tables.items():
+        assert told.pop(table) in ({"all"}, {"all", "-budget_mib"}, keys), table
+    assert not told

@@ -1,0 +1,157 @@
+"""``lcf-edge run`` as systemd starts it: a process of its own, real Zenoh, real signals."""
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+import zenoh
+
+from lcf_edge.config import Zenoh
+from lcf_edge.zenoh_link import opened_session, scenes
+
+PATIENCE_S = 30.0
+
+Daemon = subprocess.Popen[str]
+Start = Callable[..., Daemon]
+
+
+@pytest.fixture
+def endpoint() -> str:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+
+
+@pytest.fixture
+def start(drive: Path, endpoint: str, manager: Any, tmp_path: Path) -> Iterator[Start]:
+    """Start the daemon on the drive, with more settings."""
+    daemons: list[Daemon] = []
+
+    def begin(*settings: str, drives: bool = True) -> Daemon:
+        (tmp_path / "config.toml").touch()
+        mine = [f'zenoh.listen=["{endpoint}"]']
+        if drives:
+            mine += ["camera.driver=recording", f"camera.recording={drive}", "imu.driver=recording"]
+        arguments = [argument for setting in (*mine, *settings) for argument in ("--set", setting)]
+        daemon = subprocess.Popen(
+            [sys.executable, "-m", "lcf_edge", "run", "-c", str(tmp_path / "config.toml"), *arguments],
+            stderr=subprocess.PIPE,
+            text=True,
+            env={**os.environ, **manager.environment},
+        )
+        daemons.append(daemon)
+        return daemon
+
+    yield begin
+    for daemon in daemons:
+        if daemon.poll() is None:
+            daemon.kill()
+        daemon.communicate()
+
+
+def ended(daemon: Daemon) -> tuple[int, list[str]]:
+    """Exit status and what it said."""
+    _, errors = daemon.communicate(timeout=PATIENCE_S)
+    assert "Traceback" not in errors
+    return daemon.returncode, errors.splitlines()
+
+
+def test_a_subscriber_receives_scenes_of_now_until_sigterm(start: Start, manager: Any, endpoint: str) -> None:
+    daemon = start()
+    seen = []
+    for scene in scenes(endpoint):
+        seen.append((time.time_ns(), scene))
+        if len(seen) == 10:
+            break
+    assert all(abs(now_ns - scene.stamp_ns) < PATIENCE_S * 1e9 for now_ns, scene in seen)
+    assert (seen[0][1].image_width, seen[0][1].image_height) == (320, 240)
+    numbers = [scene.seq for _, scene in seen]
+    assert numbers == sorted(set(numbers))
+    told = manager.until("READY=1")
+    assert told[-1] == "READY=1"
+    daemon.send_signal(signal.SIGTERM)
+    manager.until("STOPPING=1")
+    status, said = ended(daemon)
+    assert status == 0
+    assert said[-1] == "lcf-edge: stopping: SIGTERM"
+    assert not [line for line in said if "error" in line or "left behind" in line]
+
+
+def test_sigint_ends_it_too_and_sighup_reads_again(start: Start, manager: Any, tmp_path: Path) -> None:
+    daemon = start()
+    manager.until("READY=1")
+    daemon.send_signal(signal.SIGHUP)
+    manager.until("RELOADING=1")
+    manager.until("READY=1")
+    (tmp_path / "config.toml").write_text("[filter]\ntr_s = 3.5\n")
+    manager.until("RELOADING=1")  # nobody had to send a signal
+    manager.until("READY=1")
+    daemon.send_signal(signal.SIGINT)
+    status, said = ended(daemon)
+    assert status == 0
+    assert "lcf-edge: reload: changed nothing" in said
+    assert "lcf-edge: reload: changed filter.tr_s" in said
+    assert said[-1] == "lcf-edge: stopping: SIGINT"
+
+
+def test_after_sigkill_the_next_one_starts(start: Start, manager: Any, endpoint: str) -> None:
+    first = start()
+    next(iter(scenes(endpoint)))
+    first.kill()
+    first.wait(PATIENCE_S)
+    manager.until("READY=1")
+    second = start()
+    next(iter(scenes(endpoint)))
+    manager.until("READY=1")
+    second.terminate()
+    assert ended(second)[0] == 0
+
+
+def test_without_a_camera_it_lives_and_says_since_when(start: Start, manager: Any, endpoint: str) -> None:
+    daemon = start("camera.device=/dev/no-such-camera", drives=False)
+    manager.until("READY=1")
+    with opened_session(Zenoh(connect=[endpoint], listen=[])) as session:
+        handler: Any = zenoh.handlers.RingChannel(4)
+        alive: Any = session.liveliness().declare_subscriber("lcf/@alive/*", handler, history=True)
+        assert str(alive.recv().key_expr) == "lcf/@alive/rover"
+        alive.undeclare()
+        subscriber: Any = session.declare_subscriber("lcf/diagnostics", handler)
+        told = subscriber.recv().payload.to_bytes()
+        subscriber.undeclare()
+    assert b"away since 2" in told
+    assert b"/dev/no-such-camera" in told
+    daemon.terminate()
+    status, said = ended(daemon)
+    assert status == 0
+    assert [line for line in said if line.startswith("lcf-edge: error: camera: /dev/no-such-camera")]
+
+
+@pytest.mark.parametrize(
+    ("settings", "status", "part"),
+    [
+        (("memory.budget_mib=20",), 2, "memory.budget_mib: about"),
+        (("camera.intrinsics=[500, 500, 320, 320]", "camera.width=640", "camera.height=640"), 2, "camera.intrinsics"),
+        (('zenoh.listen=["tcp/192.0.2.1:7447"]',), 1, "192.0.2.1"),
+        (("publish.prefix=a*",), 1, "publish.prefix"),
+    ],
+)
+def test_what_cannot_work_ends_in_one_line(start: Start, settings: tuple[str, ...], status: int, part: str) -> None:
+    code, said = ended(start(*settings))
+    assert code == status
+    assert part in said[-1]
+    assert said[-1].startswith("lcf-edge: ")
+
+
+def test_two_at_one_port(start: Start, endpoint: str) -> None:
+    start()
+    next(iter(scenes(endpoint)))
+    status, said = ended(start())
+    assert status == 1
+    assert "already in use" in said[-1]
