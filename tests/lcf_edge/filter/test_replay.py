@@ -28,7 +28,7 @@ def replayed(kind: str, seed: int, seconds: float = 3.0) -> Score:
     for frame, truth in scenes.frames(drive):
         while samples and samples[-1].stamp_ns <= frame.stamp_ns + 20_000_000:
             pipeline.add(samples.pop())
-        results.append(pipeline.process(frame).scene)
+        results.append(pipeline.process(frame))
         truths.append(truth)
     return score(results, truths)
 
