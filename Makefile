@@ -3,13 +3,14 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench lint types clean help
+.PHONY: demo test bench lint types clean help install install-program install-files uninstall
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
 	@echo "make test   run the tests"
 	@echo "make bench  measure detection quality and speed against other methods (tables in benchmarks/results/)"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
+	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
 # One stamp per set of dependencies, so that the demo does not install the test tools.
 $(VENV)/.run: pyproject.toml
@@ -40,3 +41,50 @@ types: $(VENV)/.dev
 
 clean:
 	rm -rf $(VENV) demo-out dist .pytest_cache .mypy_cache .ruff_cache
+
+# The daemon, as a service of the system (docs/install.md). DESTDIR=FOLDER: into an image; FILES_ONLY=1: all but the
+# program; PURGE=1: uninstall also removes configuration and recordings.
+IMAGE := $(patsubst %/,%,$(abspath $(DESTDIR)))
+PROGRAM := $(IMAGE)/opt/lcf-edge
+COMMAND := $(IMAGE)/usr/local/bin/lcf-edge
+CONFIGURATION := $(IMAGE)/etc/lcf-edge
+STATE := $(IMAGE)/var/lib
+UNIT := $(IMAGE)/etc/systemd/system/lcf-edge.service
+UDEV_RULES := $(IMAGE)/etc/udev/rules.d/70-lcf-edge.rules
+GROUPS := $(IMAGE)/etc/sysusers.d/lcf-edge.conf
+MODULES := $(IMAGE)/etc/modules-load.d/lcf-edge.conf
+RUNNING := test -z "$(IMAGE)" -a -d /run/systemd/system
+
+install: $(if $(FILES_ONLY),,install-program) install-files
+	$(if $(IMAGE),,systemd-sysusers lcf-edge.conf)
+	if $(RUNNING); then \
+		systemctl daemon-reload; \
+		systemctl restart systemd-modules-load; \
+		udevadm control --reload; \
+		udevadm trigger --action=add -s video4linux -s i2c-dev -s iio -s usb-serial -s tty; \
+		systemctl try-restart lcf-edge; \
+	fi
+
+install-program:
+	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
+	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check .
+	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
+	install -d "$(dir $(COMMAND))"
+	ln -sfn /opt/lcf-edge/bin/lcf-edge "$(COMMAND)"
+
+install-files:
+	install -D -m 644 systemd/lcf-edge.service "$(UNIT)"
+	install -D -m 644 systemd/70-lcf-edge.rules "$(UDEV_RULES)"
+	install -D -m 644 systemd/lcf-edge.sysusers "$(GROUPS)"
+	install -D -m 644 systemd/lcf-edge.modules "$(MODULES)"
+	test -e "$(CONFIGURATION)/config.toml" || install -D -m 644 systemd/config.toml "$(CONFIGURATION)/config.toml"
+	install -d -m 700 "$(STATE)/private"
+	install -d -m 750 "$(STATE)/private/lcf-edge"
+	test -e "$(STATE)/lcf-edge" || ln -s private/lcf-edge "$(STATE)/lcf-edge"
+
+uninstall:
+	if $(RUNNING) && test -e "$(UNIT)"; then systemctl disable --now lcf-edge; fi
+	rm -rf "$(PROGRAM)"
+	rm -f "$(COMMAND)" "$(UNIT)" "$(UDEV_RULES)" "$(GROUPS)" "$(MODULES)"
+	if $(RUNNING); then systemctl daemon-reload; udevadm control --reload; fi
+	$(if $(PURGE),rm -rf "$(CONFIGURATION)" "$(UNIT).d" "$(STATE)/private/lcf-edge" "$(STATE)/lcf-edge")

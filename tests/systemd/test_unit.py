@@ -1,0 +1,134 @@
+"""The unit: what systemd itself says of it, and what it must agree with in the program."""
+
+import re
+import shutil
+import subprocess
+from collections import defaultdict
+from pathlib import Path
+
+import pytest
+
+from lcf_edge.config import Config
+from lcf_edge.daemon.loop import FRAME_WAIT_S
+from lcf_edge.daemon.service import ENDS_WITHIN_S, TICK_S
+from lcf_edge.zenoh_link.session import CLOSING_S
+
+SHIPPED = Path(__file__).parents[2] / "systemd"
+UNIT = SHIPPED / "lcf-edge.service"
+LARGEST_EXPOSURE = 2.0
+KERNEL_NAMES = {
+    "videodev": "video4linux",
+    "i2c-dev": "i2c",
+    "industrialio": "iio",
+    "usbserial": "ttyUSB",
+    "cdc-acm": "ttyACM",
+}
+BUILT_IN = {"ttyAMA", "ttyS"}  # of the processor's own ports: the kernel always has their driver
+
+needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
+
+
+def settings() -> dict[str, list[str]]:
+    """Of [Service], the values of each key in their order."""
+    told: dict[str, list[str]] = defaultdict(list)
+    for name, value in re.findall(r"^(\w+)=(.*)$", UNIT.read_text(encoding="utf-8").split("[Service]")[1], re.M):
+        told[name].append(value)
+    return told
+
+
+def words(name: str) -> set[str]:
+    return {word for value in settings()[name] for word in value.split()}
+
+
+@needs_systemd
+def test_systemd_finds_no_fault_but_the_program_that_is_not_here(tmp_path: Path) -> None:
+    unit = tmp_path / UNIT.name
+    unit.write_text(
+        UNIT.read_text(encoding="utf-8").replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8"
+    )
+    done = subprocess.run(("systemd-analyze", "verify", unit), check=False, capture_output=True, text=True)
+    told = [line for line in done.stderr.splitlines() if UNIT.name in line]
+    assert told == []
+
+
+@needs_systemd
+def test_little_is_exposed() -> None:
+    done = subprocess.run(
+        (
+            "systemd-analyze",
+            "security",
+            "--offline=true",
+            f"--threshold={LARGEST_EXPOSURE * 10:.0f}",
+            "--no-pager",
+            UNIT,
+        ),
+        check=False,
+        capture_output=True,
+        text=True,
+    )
+    if "unrecognized option" in done.stderr:
+        pytest.skip("this systemd-analyze has no --offline")
+    assert done.returncode == 0, done.stdout.splitlines()[-1:]
+    exposure = re.search(r"exposure level for lcf-edge.service: ([\d.]+)", done.stdout)
+    assert exposure
+    assert float(exposure[1]) <= LARGEST_EXPOSURE
+
+
+def test_no_setting_is_given_twice_by_mistake() -> None:
+    several = {name for name, values in settings().items() if len(values) > 1}
+    assert several == {"DeviceAllow", "SystemCallFilter"}
+
+
+def test_the_process_may_take_its_budget_and_some_more() -> None:
+    (most,) = settings()["MemoryMax"]
+    budget_mib = Config().memory.budget_mib
+    assert budget_mib * 1.25 <= float(most.removesuffix("M")) <= budget_mib * 1.5
+
+
+def test_the_watchdog_waits_for_a_few_feedings_and_a_stop_for_the_program() -> None:
+    (watchdog_s,), (stop_s,) = settings()["WatchdogSec"], settings()["TimeoutStopSec"]
+    assert float(watchdog_s) >= 3 * max(TICK_S, FRAME_WAIT_S)
+    assert float(stop_s) > ENDS_WITHIN_S + 2 * CLOSING_S
+
+
+def test_the_document_tells_the_limits_of_the_unit() -> None:
+    told = (SHIPPED.parent / "docs/install.md").read_text(encoding="utf-8").split("\n## The unit\n")[1]
+    unit = dict(re.findall(r"^(\w+)=(.*)$", UNIT.read_text(encoding="utf-8"), re.M))
+    minutes, wait_s = int(unit["StartLimitIntervalSec"]) // 60, unit["RestartSec"]
+    assert f"after {unit['TimeoutStartSec']} s without either it has failed" in told
+    assert f"{unit['WatchdogSec']} s without a turn of the pipeline" in told
+    assert f"after {wait_s} s, at most {unit['StartLimitBurst']} times in {minutes} minutes" in told
+    assert f"killed after {unit['TimeoutStopSec']} s" in told
+    assert f"{unit['MemoryMax'].removesuffix('M')} MiB (`MemoryMax`)" in told
+
+
+def test_a_wrong_configuration_is_not_tried_again() -> None:
+    assert settings()["RestartPreventExitStatus"] == ["2"]
+    assert settings()["Restart"] == ["on-failure"]
+    assert re.search(r"^StartLimitBurst=\d+$", UNIT.read_text(encoding="utf-8"), re.M)
+
+
+def test_every_group_is_made_if_it_is_missing() -> None:
+    rows = [line.split() for line in (SHIPPED / "lcf-edge.sysusers").read_text(encoding="utf-8").splitlines()]
+    assert {row[1] for row in rows if row[0] == "g"} == words("SupplementaryGroups")
+
+
+def test_every_kind_of_device_is_known_to_the_kernel_before_the_start() -> None:
+    lines = (SHIPPED / "lcf-edge.modules").read_text(encoding="utf-8").splitlines()
+    modules = {line for line in lines if not line.startswith("#")}
+    allowed = {word.removeprefix("char-") for word in words("DeviceAllow") if word != "rw"}
+    assert {KERNEL_NAMES[module] for module in modules} == allowed - BUILT_IN
+
+
+def test_the_rules_name_no_group_that_the_unit_has_not() -> None:
+    rules = (SHIPPED / "70-lcf-edge.rules").read_text(encoding="utf-8")
+    assert set(re.findall(r'GROUP="(\w+)"', rules)) <= words("SupplementaryGroups")
+
+
+def test_the_names_that_the_documents_and_the_configuration_use_are_made() -> None:
+    rules = (SHIPPED / "70-lcf-edge.rules").read_text(encoding="utf-8")
+    made = {f"/dev/{name}" for name in re.findall(r'SYMLINK\+="([\w/-]+)"', rules)}
+    texts = (SHIPPED / "config.toml", SHIPPED.parent / "docs/install.md")
+    used = {name for text in texts for name in re.findall(r"/dev/lcf-edge/\w+", text.read_text(encoding="utf-8"))}
+    assert used
+    assert used <= made
