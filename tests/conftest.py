@@ -1,5 +1,6 @@
-"""What several tests drive with: a wall of clutter that comes nearer, something that crosses, any lens."""
+"""What several tests drive with: a wall of clutter that comes nearer, something that crosses, any lens; a free port."""
 
+import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
@@ -84,6 +85,14 @@ class Approach:
         """Patches of 12 px that meet in good corners."""
         patches = np.random.default_rng(1).integers(20, 236, (64, 64), np.uint8)
         return np.asarray(cv2.GaussianBlur(np.kron(patches, np.ones((12, 12), np.uint8)), (3, 3), 0), np.uint8)
+
+
+@pytest.fixture
+def endpoint() -> str:
+    """A free one on loopback, in place of the usual."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture(scope="session")

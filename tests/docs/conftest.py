@@ -1,7 +1,6 @@
 """The documents, and a folder in which the examples that they give can be run."""
 
 import re
-import socket
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -39,14 +38,6 @@ def rows(text: Callable[[str], str]) -> Callable[[str, str], list[list[str]]]:
         return [[cell.strip() for cell in row.strip("|").split("|")] for row in table[1].splitlines()]
 
     return read
-
-
-@pytest.fixture
-def endpoint() -> str:
-    """A free one, in place of the usual."""
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture(scope="session")

@@ -1,7 +1,6 @@
 """What a planner in Python gets: scenes as they come, with little else."""
 
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -25,13 +24,6 @@ def scene(seq: int) -> Scene:
     circles = np.zeros(3, CIRCLE)
     circles["id"], circles["x"] = np.arange(3), seq
     return Scene(1_700_000_000_000_000_000 + seq, seq, 640, 480, 1.5, circles, np.zeros(1, PSI_REGION))
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture

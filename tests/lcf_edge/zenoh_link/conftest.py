@@ -4,7 +4,6 @@ import base64
 import json
 import os
 import signal
-import socket
 import subprocess
 import sys
 import threading
@@ -86,13 +85,6 @@ class Peer:
 def sample(described: dict[str, Any]) -> Sample:
     binary = {name: base64.b64decode(described[name]) for name in ("payload", "attachment")}
     return Sample(**(described | binary))
-
-
-@pytest.fixture
-def endpoint() -> str:
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return f"tcp/127.0.0.1:{probe.getsockname()[1]}"
 
 
 @pytest.fixture
