@@ -1,6 +1,5 @@
 """Puts the messages of one topic, and with ROS 2 on, the same samples where rmw_zenoh looks for them."""
 
-import hashlib
 import struct
 import threading
 import time
@@ -13,7 +12,7 @@ import zenoh
 
 from lcf_edge import config
 from lcf_edge.errors import PublishError
-from lcf_edge.zenoh_link.ros2 import Ros2Node
+from lcf_edge.zenoh_link.ros2 import Endpoint, Ros2Node, gid_of
 from lcf_edge.zenoh_link.session import reason
 
 ATTACHMENT = struct.Struct("<qqB16s")
@@ -51,21 +50,22 @@ class MessagePublisher:
     ) -> None:
         self.key = topic.key(publish.prefix)
         self.counts: Counter[str] = Counter(sent=0, failed=0)  # all keys at once: read while it counts
-        # A gid names one publisher: the same for its whole life, different for every other.
-        self._gid = hashlib.blake2b(f"{session.zid()}/{self.key}".encode(), digest_size=16).digest()
         if set("*$#?") & set(publish.prefix) or not publish.prefix:
             raise PublishError(f"publish.prefix: {publish.prefix!r}: a key to publish on has no wildcards")
-        keys = [self.key] if ros2 is None else [self.key, ros2.declare("MP", self.key, topic.message)]
+        endpoints = [Endpoint(self.key, gid_of(f"{session.zid()}/{self.key}"))]
+        if ros2 is not None:
+            endpoints.append(ros2.declare("MP", self.key, topic.message))
+        self._gid = endpoints[-1].gid
         try:
             self._publishers = [
                 session.declare_publisher(
-                    key,
+                    endpoint.key,
                     encoding=zenoh.Encoding(topic.encoding),
                     congestion_control=zenoh.CongestionControl.DROP,
                     priority=topic.priority,
                     express=topic.express,
                 )
-                for key in keys
+                for endpoint in endpoints
             ]
         except zenoh.ZError as error:
             raise PublishError(f"publish.prefix: {publish.prefix}: {reason(error)}") from error

@@ -5,8 +5,9 @@ and each of its publishers and subscriptions is told of by a token under ``@ros2
 """
 
 import re
-from typing import Literal
+from typing import Literal, NamedTuple
 
+import xxhash
 import zenoh
 
 from lcf_edge import config
@@ -25,6 +26,18 @@ _BEST_EFFORT_DEPTH_1 = "2::,1:,:,:,,"  # what is not written is the default: vol
 
 EndpointKind = Literal["MP", "MS"]
 """A publisher, a subscription."""
+
+
+class Endpoint(NamedTuple):
+    """Where the samples of a publisher go, or those for a subscription come from, and its 16 bytes of identity."""
+
+    key: str
+    gid: bytes
+
+
+def gid_of(name: str) -> bytes:
+    """As rmw_zenoh makes it of an entity's token: XXH3 of 128 bits, little-endian."""
+    return xxhash.xxh3_128_digest(name.encode())[::-1]
 
 
 def dds_type(message: str) -> str:
@@ -50,14 +63,14 @@ class Ros2Node:
         self._session = session
         self._tokens = [session.liveliness().declare_token(self._token(_NODE_ID, "NN"))]
 
-    def declare(self, kind: EndpointKind, topic: str, message: str) -> str:
-        """Tell of a publisher or a subscription; answers with the key of its samples."""
+    def declare(self, kind: EndpointKind, topic: str, message: str) -> Endpoint:
+        """Tell of a publisher or a subscription."""
         type_name, type_hash = dds_type(message), self._hash or TYPE_HASHES[message]
         name = f"/{topic}".replace("/", "%")
         endpoint = f"{name}/{type_name}/{type_hash}/{_BEST_EFFORT_DEPTH_1}"
         token = f"{self._token(len(self._tokens), kind)}/{endpoint}"
         self._tokens.append(self._session.liveliness().declare_token(token))
-        return f"{self.domain}/{topic}/{type_name}/{type_hash}"
+        return Endpoint(f"{self.domain}/{topic}/{type_name}/{type_hash}", gid_of(token))
 
     def _token(self, entity_id: int, kind: str) -> str:
         return f"@ros2_lv/{self.domain}/{self._session.zid()}/{_NODE_ID}/{entity_id}/{kind}/%/%/{self._name}"

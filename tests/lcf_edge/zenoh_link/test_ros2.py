@@ -1,11 +1,13 @@
 """For nodes under rmw_zenoh a session is one of them: its keys, its tokens, its hashes."""
 
 import re
+import struct
 import time
 from collections.abc import Callable, Iterator
 from typing import Any
 
 import pytest
+import xxhash
 import zenoh
 from rosbags.typesys.store import Typestore
 
@@ -82,6 +84,19 @@ def test_a_node_tells_of_itself_its_publishers_and_its_subscription(
         endpoint(3, "MP", "%lcf%diagnostics", "diagnostic_msgs/msg/DiagnosticArray"),
         endpoint(4, "MS", "%lcf%speed", "nav_msgs/msg/Odometry"),
     ]
+
+
+def test_the_gid_of_a_sample_is_that_of_the_token(
+    link: Link, session: zenoh.Session, peer: Any, until_matched: Any, scene: Callable[..., Scene]
+) -> None:
+    """rmw_zenoh takes both halves of the token's XXH3, the low one first, as the processor has them."""
+    peer.subscribe("lcf/scene")
+    until_matched(session, "lcf/scene")
+    link.put_scene(scene())
+    (sample,) = peer.receive("lcf/scene")
+    (token,) = peer.tokens("@ros2_lv/7/*/0/1/MP/**")
+    high, low = divmod(xxhash.xxh3_128(token.encode()).intdigest(), 2**64)
+    assert ATTACHMENT.unpack(sample.attachment)[2:] == (16, struct.pack("<QQ", low, high))
 
 
 def test_without_it_there_are_neither_twins_nor_tokens(
