@@ -219,7 +219,7 @@ def _live_lines(folder: Path, endpoint: str) -> tuple[str, str]:
     """Two lines for a shell."""
     python = min(sys.executable, os.path.relpath(sys.executable), key=len)
     code = (
-        "from lcf_edge.zenoh_link import scenes; "
+        "from lcf_edge.client import scenes; "
         f"[print(s.seq, s.circles[['cause', 'x', 'y', 'ttc']]) for s in scenes('{endpoint}')]"
     )
     command = (python, "-m", "lcf_edge", "replay", str(folder / "recording"))

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from lcf_edge.records import Cause, Kind, Scene, Shape, View
 from lcf_edge.sinks import SinkError, check_output
+from lcf_edge.sinks.lettering import Mask, lettering
 
 if TYPE_CHECKING:
     from lcf_edge.pipeline import Outcome
@@ -34,14 +35,13 @@ BLACK: Colour = (0, 0, 0)
 
 SUFFIXES = (".mp4",)
 
-_FONT = cv2.FONT_HERSHEY_SIMPLEX
 _FRACTION_BITS = 3  # OpenCV draws at an eighth of a pixel
 _FARTHEST_PX = 100_000  # what lies beyond cannot be seen, and would overflow OpenCV's fixed point
 _SQUARE = np.array([(-3, -3), (3, -3), (3, 3), (-3, 3)], np.float32)
 _CROSS = np.array([[(-9, 0), (9, 0)], [(0, -9), (0, 9)]], np.float32)
 _HALO = np.ones((3, 3), np.uint8)
 _STRIP_PX = 20
-_TEXT_SCALE = 0.42
+_HALO_PX = 2
 
 
 def draw(image: npt.NDArray[np.uint8], outcome: "Outcome") -> Picture:
@@ -148,10 +148,11 @@ def _beside(panel: Picture, text: str, circle: np.void, taken: list[_Box]) -> No
     if not np.less(np.abs(place), _FARTHEST_PX).all():
         return
     x, y, radius = map(round, place)
-    (width, height), below = cv2.getTextSize(text, _FONT, _TEXT_SCALE, 1)
-    gap = 4
+    letters = lettering(text)
+    height, width = letters.shape
+    gap = 2
     places = (
-        (x - width // 2, y - radius - gap - below - height),
+        (x - width // 2, y - radius - gap - height),
         (x - width // 2, y + radius + gap),
         (x + radius + gap, y - height // 2),
         (x - radius - gap - width, y - height // 2),
@@ -161,28 +162,24 @@ def _beside(panel: Picture, text: str, circle: np.void, taken: list[_Box]) -> No
     boxes = []
     for left, top in places:
         inner_left = max(min(left, columns - width - 2), 2)
-        inner_top = max(min(top, rows - _STRIP_PX - height - below), 2)
-        boxes.append((inner_left, inner_top, inner_left + width, inner_top + height + below))
+        inner_top = max(min(top, rows - _STRIP_PX - height), 2)
+        boxes.append((inner_left, inner_top, inner_left + width, inner_top + height))
     box = next((box for box in boxes if not any(_overlap(box, other) for other in taken)), boxes[0])
     taken.append(box)
-    _write(panel, text, box[:2], LIGHT_RED, _TEXT_SCALE)
+    _write(panel, letters, box[:2], LIGHT_RED)
 
 
 def _overlap(a: _Box, b: _Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _write(panel: Picture, text: str, left_top: tuple[int, int], colour: Colour, scale: float) -> None:
+def _write(panel: Picture, letters: Mask, left_top: tuple[int, int], colour: Colour) -> None:
     """Text with a dark halo; what would lie outside the picture is cut."""
-    (width, height), below = cv2.getTextSize(text, _FONT, scale, 1)
-    margin = 2
-    letters = np.zeros((height + below + 2 * margin, width + 2 * margin), np.uint8)
-    cv2.putText(letters, text, (margin, margin + height), _FONT, scale, (255,), 1, cv2.LINE_AA)
-    left, top = (max(at - margin, 0) for at in left_top)
+    letters = np.pad(letters, _HALO_PX)
+    left, top = (max(at - _HALO_PX, 0) for at in left_top)
     place = panel[top : top + letters.shape[0], left : left + letters.shape[1]]
     letters = letters[: place.shape[0], : place.shape[1], None]
     if letters.size:
-        # Not a thicker text behind: OpenCV 5 spaces thick letters wider.
         halo = cv2.dilate(letters, _HALO)[..., None]
         dark = place * (1 - halo / np.float32(255))
         place[...] = dark + (letters / np.float32(255)) * (np.array(colour, np.float32) - dark)
@@ -194,13 +191,15 @@ def _caption(panel: Picture, parts: tuple[tuple[str, Colour], ...]) -> None:
     strip //= 3
     rows, columns = panel.shape[:2]
     margin, gap = 5, 10
-    widths = [cv2.getTextSize(text, _FONT, 1.0, 1)[0][0] for text, _ in parts]
-    room = columns - 2 * margin - gap * len(parts)
-    scale = min(_TEXT_SCALE, max(room, 1) / max(sum(widths), 1))
-    x = float(margin)
-    for (text, colour), width in zip(parts, widths, strict=True):
-        _write(panel, text, (round(x), rows - _STRIP_PX + 3), colour, scale)
-        x += width * scale + gap
+    texts = [(lettering(text), colour) for text, colour in parts if text]
+    room = columns - 2 * margin - gap * len(texts)
+    scale = min(1.0, max(room, 1) / max(sum(letters.shape[1] for letters, _ in texts), 1))
+    x = margin
+    for letters, colour in texts:
+        height, width = (max(round(side * scale), 1) for side in letters.shape)
+        fitted = np.asarray(cv2.resize(letters, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+        _write(panel, fitted, (x, rows - (_STRIP_PX + height) // 2), colour)
+        x += width + gap
 
 
 class VideoSink:

@@ -101,4 +101,6 @@ def _remedy(error: zenoh.ZError, options: config.Zenoh) -> str:
     endpoint = bound[1] if bound else ", ".join(options.listen + options.connect) or options.config_file
     if "Address already in use" in str(error):
         return f"{endpoint}: already in use; stop the other program or set zenoh.listen to another port"
+    if "Unable to connect" in str(error):
+        return f"{endpoint}: nobody answers; start the router first, or set zenoh.mode to peer, which waits for it"
     return f"{endpoint}: {reason(error)}; check zenoh.listen and zenoh.connect"

@@ -1,0 +1,42 @@
+"""Text as a mask, in one size, put together from a picture of its letters.
+
+OpenCV 5 would write as well, but its fonts cost the process 8 MiB. ``letters.png`` holds printable ASCII as OpenCV
+draws it: a white dot in the first row begins each letter, which reaches ``_OVERLAP_PX`` into its neighbours.
+"""
+
+from functools import cache
+from importlib.resources import files
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+Mask = npt.NDArray[np.uint8]
+"""(height, width), 255 where ink is."""
+
+LETTERS = [chr(code) for code in range(32, 127)]
+HEIGHT_PX = 15
+
+_OVERLAP_PX = 2
+_UNKNOWN = "?"
+
+
+def lettering(text: str) -> Mask:
+    """The text on one line, ``HEIGHT_PX`` high; what is not printable ASCII becomes a question mark."""
+    cells = [_cells().get(letter, _cells()[_UNKNOWN]) for letter in text]
+    widths = [cell.shape[1] - _OVERLAP_PX for cell in cells]
+    line = np.zeros((HEIGHT_PX, sum(widths) + _OVERLAP_PX), np.uint8)
+    left = 0
+    for cell, width in zip(cells, widths, strict=True):
+        place = line[:, left : left + width + _OVERLAP_PX]
+        np.maximum(place, cell, out=place)
+        left += width
+    return line
+
+
+@cache
+def _cells() -> dict[str, Mask]:
+    packed = np.frombuffer((files("lcf_edge.sinks") / "letters.png").read_bytes(), np.uint8)
+    picture = np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), np.uint8)
+    starts = np.flatnonzero(picture[0])
+    return dict(zip(LETTERS, np.split(picture[1:], starts[1:], axis=1), strict=True))
