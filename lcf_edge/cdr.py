@@ -13,7 +13,7 @@ from typing import Any, Literal
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.diagnostics import DeviceStatus
+from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import LcfError
 from lcf_edge.records import CIRCLE, PSI_REGION, Scene
 
@@ -90,6 +90,15 @@ class CameraInfo:
     k: tuple[float, ...]  # 3x3, row by row
 
 
+@dataclass(frozen=True, slots=True)
+class DiagnosticArray:
+    """``diagnostic_msgs/msg/DiagnosticArray``; ``hardware_id`` is that of the first status."""
+
+    header: Header
+    hardware_id: str
+    status: tuple[DeviceStatus, ...]
+
+
 def decode_header(payload: bytes | memoryview) -> Header:
     """The header with which a message of any stamped type begins. Raises ``CdrError``."""
     return _Reader(payload).header()
@@ -145,6 +154,24 @@ def decode_camera_info(payload: bytes | memoryview) -> CameraInfo:
     model = reader.string()
     d = reader.sequence(np.dtype(np.float64), align=8)
     return CameraInfo(header, height, width, model, tuple(d.tolist()), reader.scalars("9d"))
+
+
+def decode_diagnostics(payload: bytes | memoryview) -> DiagnosticArray:
+    """``diagnostic_msgs/msg/DiagnosticArray``. Raises ``CdrError``, also for a level that the message does not know."""
+    reader = _Reader(payload)
+    header = reader.header()
+    hardware_ids: list[str] = []
+    status: list[DeviceStatus] = []
+    for _ in range(*reader.scalars("I")):
+        (number,) = reader.scalars("B")
+        name, message, hardware_id = (reader.string() for _ in range(3))
+        values = {reader.string(): reader.string() for _ in range(*reader.scalars("I"))}
+        try:
+            status.append(DeviceStatus(name, Level(number), message, values))
+        except ValueError as error:
+            raise CdrError(f"CDR: {number} is no level of a status") from error
+        hardware_ids.append(hardware_id)
+    return DiagnosticArray(header, hardware_ids[0] if hardware_ids else "", tuple(status))
 
 
 def decode_velocity(payload: bytes | memoryview) -> tuple[str, Twist]:
@@ -203,6 +230,45 @@ def encode_diagnostics(stamp_ns: int, hardware_id: str, status: Sequence[DeviceS
     return writer.payload()
 
 
+def encode_imu(stamp_ns: int, frame_id: str, gyro: Vector, accel: Vector) -> bytes:
+    """``sensor_msgs/msg/Imu`` without orientation, covariances unknown; rad/s, m/s². Raises ``CdrError``."""
+    writer = _Writer()
+    writer.header(stamp_ns, frame_id)
+    writer.scalars("13d", 0, 0, 0, 1, -1, *[0] * 8)  # -1: there is no orientation
+    writer.scalars("24d", *gyro, *[0] * 9, *accel, *[0] * 9)
+    return writer.payload()
+
+
+def encode_twist_stamped(stamp_ns: int, frame_id: str, speed_mps: float, yaw_rate_radps: float) -> bytes:
+    """``geometry_msgs/msg/TwistStamped``: x forward, z up; NaN: unknown. Raises ``CdrError``."""
+    writer = _Writer()
+    writer.header(stamp_ns, frame_id)
+    writer.scalars("6d", speed_mps, 0, 0, 0, 0, yaw_rate_radps)
+    return writer.payload()
+
+
+def encode_camera_info(info: CameraInfo) -> bytes:
+    """``sensor_msgs/msg/CameraInfo`` of one camera, not rectified: R is the identity, P has K. Raises ``CdrError``."""
+    writer = _Writer()
+    writer.header(info.header.stamp_ns, info.header.frame_id)
+    writer.scalars("II", info.height, info.width)
+    writer.string(info.distortion_model)
+    writer.scalars("I", len(info.d))
+    writer.scalars(f"{len(info.d) + 9}d", *info.d, *info.k)
+    rows = (info.k[:3], info.k[3:6], info.k[6:])
+    writer.scalars("21d", 1, 0, 0, 0, 1, 0, 0, 0, 1, *(number for row in rows for number in (*row, 0)))
+    writer.scalars("6I?", 0, 0, 0, 0, 0, 0, False)  # binning, region of interest: none
+    return writer.payload()
+
+
+def restamped(payload: bytes, stamp_ns: int) -> bytes:
+    """A little-endian message, whose type begins with a header, with another stamp. Raises ``CdrError``."""
+    stamp = _Writer()
+    stamp.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
+    start = stamp.payload()
+    return b"".join((start, memoryview(payload)[len(start) :]))
+
+
 def decode_scene(payload: bytes | memoryview) -> Scene:
     """``lcf_msgs/msg/Scene``; circles and ψ are read-only views of a little-endian payload.
 
@@ -230,7 +296,8 @@ class _Writer:
 
     def scalars(self, fields: str, *values: float) -> None:
         """Fields in the notation of ``struct``, none of which is wider than the one before it."""
-        self._body.extend(bytes(-len(self._body) % struct.calcsize(f"<{fields[0]}")))
+        first = struct.calcsize(f"<{fields.lstrip('0123456789')[0]}")
+        self._body.extend(bytes(-len(self._body) % first))
         try:
             self._body.extend(struct.pack(f"<{fields}", *values))
         except (struct.error, OverflowError) as error:

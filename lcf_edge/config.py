@@ -17,6 +17,8 @@ from lcf_edge.errors import ConfigError
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 LARGEST_FILE_BYTES = 2**20
+IN_RECORDING = "lcf-edge.toml"
+"""Name of the attachment of a recording that holds the configuration with which it was made."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -191,6 +193,23 @@ class Publish(Table, frozen=True):
     ros2_type_hash: Literal["RIHS01", "TypeHashNotSupported"] = "RIHS01"  # the other one: Humble
 
 
+class Record(Table, frozen=True):
+    """What the daemon writes into recordings, and how much of the disk they may take."""
+
+    when: Literal["never", "always", "threat"] = "never"
+    folder: str = "/var/lib/lcf-edge"
+    format: Literal["jpeg", "png"] = "jpeg"  # png: without loss, some five times as large
+    jpeg_quality: Annotated[int, msgspec.Meta(ge=1, le=100)] = 80
+    ttc_s: Positive = 1.5  # a rebel circle that is met sooner is a threat
+    before_s: NotNegative = 2.0  # that are saved of what came before a threat
+    after_s: NotNegative = 5.0
+    buffer_mib: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # of memory: what waits for the disk, or for a threat
+    file_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = 512.0  # then the next file begins,
+    file_s: Annotated[float, msgspec.Meta(gt=0, le=7200)] = 900.0  # or after this: its index lies in memory
+    total_mib: Positive = 4096.0  # of all files in the folder; the oldest give way
+    free_mib: NotNegative = 512.0  # that are left free on the disk
+
+
 class Log(Table, frozen=True):
     """What the daemon tells on standard error."""
 
@@ -207,14 +226,16 @@ class Config(Table, frozen=True):
     memory: Memory = Memory()
     zenoh: Zenoh = Zenoh()
     publish: Publish = Publish()
+    record: Record = Record()
     log: Log = Log()
 
 
 def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
     """Read a configuration.
 
-    ``path``: a TOML file; None: ``DEFAULT_PATH`` when it exists, else the defaults. ``settings``:
-    ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). Raises ``ConfigError``.
+    ``path``: a TOML file, or a recording of ``lcf-edge record``; None: ``DEFAULT_PATH`` when it exists, else the
+    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). Raises
+    ``ConfigError``.
     """
     file = _read(path or DEFAULT_PATH, needed=path is not None)
     _typed(file, str(path or DEFAULT_PATH))
@@ -229,8 +250,7 @@ def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
 
 def _read(path: Path, *, needed: bool) -> dict[str, Any]:
     try:
-        with path.open("rb") as file:
-            data = file.read(LARGEST_FILE_BYTES + 1)
+        data = _attached(path) if path.suffix.lower() == ".mcap" else _start_of(path)
     except OSError as error:
         if isinstance(error, FileNotFoundError) and not needed:
             return {}
@@ -241,6 +261,17 @@ def _read(path: Path, *, needed: bool) -> dict[str, Any]:
         return tomllib.loads(data.decode())
     except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, endless nesting
         raise ConfigError(f"{path}: not valid TOML: {error}") from error
+
+
+def _start_of(path: Path) -> bytes:
+    with path.open("rb") as file:
+        return file.read(LARGEST_FILE_BYTES + 1)
+
+
+def _attached(path: Path) -> bytes:
+    from lcf_edge.recordings.attachment import attached_configuration  # noqa: PLC0415  # a vehicle reads none
+
+    return attached_configuration(path)
 
 
 def _apply(tree: dict[str, Any], setting: str) -> None:
@@ -314,6 +345,21 @@ def _check(config: Config, origin: str) -> None:
     ):
         if driver == "recording" and not recording:
             raise ConfigError(f"{origin}: {table}.recording: needed with {table}.driver=recording; name a recording")
+    _check_lens(camera, origin)
+    axes = config.imu.axes
+    if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
+        raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
+    if axes and not _is_rotation(axes):
+        raise ConfigError(f"{origin}: imu.axes: not a rotation (rows must be orthonormal, determinant +1)")
+    if config.vehicle.speed_source == "constant" and config.vehicle.speed_mps is None:
+        raise ConfigError(f"{origin}: vehicle.speed_mps: needed with vehicle.speed_source=constant")
+    if config.record.total_mib < config.record.file_mib:
+        raise ConfigError(f"{origin}: record.total_mib: must be record.file_mib at least")
+    if not filters.tr_cr <= filters.tr_s <= filters.tr_max:
+        raise ConfigError(f"{origin}: filter.tr_s: trusts must be ordered tr_cr <= tr_s <= tr_max")
+
+
+def _check_lens(camera: Camera, origin: str) -> None:
     if camera.intrinsics and len(camera.intrinsics) != 4:
         raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
@@ -322,15 +368,6 @@ def _check(config: Config, origin: str) -> None:
     if len(camera.distortion) not in wanted:
         counts = " or ".join(map(str, wanted))
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
-    axes = config.imu.axes
-    if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
-        raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
-    if axes and not _is_rotation(axes):
-        raise ConfigError(f"{origin}: imu.axes: not a rotation (rows must be orthonormal, determinant +1)")
-    if config.vehicle.speed_source == "constant" and config.vehicle.speed_mps is None:
-        raise ConfigError(f"{origin}: vehicle.speed_mps: needed with vehicle.speed_source=constant")
-    if not filters.tr_cr <= filters.tr_s <= filters.tr_max:
-        raise ConfigError(f"{origin}: filter.tr_s: trusts must be ordered tr_cr <= tr_s <= tr_max")
 
 
 def _numbers(value: Any) -> Iterator[float]:

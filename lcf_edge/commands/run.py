@@ -5,12 +5,26 @@ import os
 from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from lcf_edge.config import load
 
+if TYPE_CHECKING:
+    from lcf_edge.daemon.recorder import Recorder
+    from lcf_edge.recorder.destination import Destination
 
-def run(path: Path | None, settings: Sequence[str]) -> None:
-    """Run until a signal ends it. Raises ``ConfigError``, ``PublishError`` at the start, ``LcfError`` later."""
+
+def run(
+    path: Path | None,
+    settings: Sequence[str],
+    destination: "Destination | None" = None,
+    seconds: float | None = None,
+) -> "Recorder | None":
+    """Run until a signal ends it, or for so long; answers with its recorder, whose work is done.
+
+    ``destination``: of a recording; None: as the configuration says. Raises ``ConfigError``, ``PublishError`` at the
+    start, ``LcfError`` later.
+    """
     config = load(path, settings)
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads would only cost memory
     import cv2
@@ -29,6 +43,7 @@ def run(path: Path | None, settings: Sequence[str]) -> None:
         stack.callback(close_session, session)
         link = Link(session, config)
         stack.pop_all()  # from here on the service closes it
-    service = Service(config, link, path, settings)
+    service = Service(config, link, path, settings, destination=destination, seconds=seconds)
     with service.signals_minded():
         service.run()
+    return service.recorder

@@ -3,9 +3,11 @@
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
+from itertools import chain
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
@@ -19,7 +21,11 @@ from lcf_edge.daemon.preview import Previewer
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Outcome, Pipeline
+from lcf_edge.recorder.messages import Seen
 from lcf_edge.records import Scene
+
+if TYPE_CHECKING:  # most daemons record nothing
+    from lcf_edge.daemon.recorder import Recorder
 
 FRAME_WAIT_S = 0.25  # then the loop turns without one
 IMU_WAIT_S = 4e-3  # for the sample after a frame; the last one is held beyond
@@ -36,15 +42,21 @@ class Mail:
 
 
 def lens_for(config: Config, width: int, height: int) -> Lens:
-    """The lens of pictures of that size: by the configuration, else a stand-in recording's own. Raises ``LcfError``."""
+    """The lens of pictures of that size, by the field of view if nothing better is known. Raises ``LcfError``."""
+    return known_lens(config, width, height) or Lens.from_config(config.camera, width, height)
+
+
+def known_lens(config: Config, width: int, height: int) -> Lens | None:
+    """The calibrated lens: by the configuration, else a stand-in recording's own. Raises ``LcfError``."""
     camera = config.camera
-    if camera.driver == "recording" and not camera.intrinsics:
+    if camera.intrinsics:
+        return Lens.from_config(camera, width, height)
+    if camera.driver == "recording":
         from lcf_edge.recordings import open_recording  # noqa: PLC0415  # a vehicle has none
 
         recorded = open_recording(Path(camera.recording), config).lens
-        if recorded is not None:
-            return recorded.scaled(width, height)
-    return Lens.from_config(camera, width, height)
+        return recorded and recorded.scaled(width, height)
+    return None
 
 
 class Loop(threading.Thread):
@@ -64,6 +76,7 @@ class Loop(threading.Thread):
         clock: StoppableClock,
         system_time: SystemTime,
         first_scene: Callable[[], object],
+        recorder: "Recorder | None" = None,
     ) -> None:
         super().__init__(name="pipeline", daemon=True)
         self.turns = 0
@@ -83,6 +96,7 @@ class Loop(threading.Thread):
         self._clock = clock
         self._system_time = system_time
         self._first_scene = first_scene
+        self._recorder = recorder
 
     @property
     def refused(self) -> Counter[str]:
@@ -126,6 +140,8 @@ class Loop(threading.Thread):
         if self.frames == 1:
             self._first_scene()
         self.degradation.add(frame, scene)
+        if self._recorder is not None:
+            self._recorder.put(Seen(frame, scene))
         if self._previewer.wants():
             self._previewer.offer(frame, Outcome(scene, pipeline.view()))
 
@@ -149,9 +165,12 @@ class Loop(threading.Thread):
         self._mail.imu.wait_until(frame.stamp_ns - offset_ns, IMU_WAIT_S, IMU_SILENT_NS)
 
     def _feed(self, pipeline: Pipeline) -> None:
-        for sample in self._mail.imu.take():
+        received = (
+            replace(speed, stamp_ns=self._system_time.monotonic_ns(speed.stamp_ns))
+            for _, speed in self._link.take_speeds()
+        )
+        samples: Iterable[ImuSample | SpeedSample] = chain(self._mail.imu.take(), self._mail.speeds.take(), received)
+        for sample in samples:
             pipeline.add(sample)
-        for speed in self._mail.speeds.take():
-            pipeline.add(speed)
-        for _, received in self._link.take_speeds():
-            pipeline.add(replace(received, stamp_ns=self._system_time.monotonic_ns(received.stamp_ns)))
+            if self._recorder is not None:
+                self._recorder.put(sample)

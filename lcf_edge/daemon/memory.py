@@ -11,7 +11,7 @@ from lcf_edge.errors import ConfigError
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
 
-PROGRAM_MIB = 71.0
+PROGRAM_MIB = 68.0
 """Python, NumPy, OpenCV, an open Zenoh session and the program, without tables and pictures."""
 
 SHED_AT = 0.9  # of the budget
@@ -19,6 +19,9 @@ _STATM = Path("/proc/self/statm")
 _MIB = 2**20
 
 _PICTURES = 12  # bytes a pixel: buffers of the driver (2 bytes, 4 of them), one waiting, one in work, scratch
+RECORDER_MIB = 6.0
+"""The format's library, a chunk on its way to the disk and the index of a file, without ``record.buffer_mib``."""
+
 _CORNER_BYTES = 1500  # of one corner's way through detection and matching
 
 
@@ -32,16 +35,20 @@ def needs_mib(config: Config) -> dict[str, float]:
     camera = config.camera
     pixels = camera.width * camera.height
     table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
-    return {
+    needs = {
         "the program": PROGRAM_MIB,
         "pictures": pixels * _PICTURES / _MIB,
         "tables": (table_bytes + config.memory.corners * _CORNER_BYTES) / _MIB,
     }
+    if config.record.when != "never":
+        needs["recording"] = RECORDER_MIB + config.record.buffer_mib
+    return needs
 
 
 _REMEDIES = {
     "pictures": "lower camera.width and camera.height",
     "tables": "lower the other keys of memory",
+    "recording": "lower record.buffer_mib",
 }
 
 
@@ -52,7 +59,7 @@ def check_budget(config: Config) -> None:
     limit_mib = SHED_AT * config.memory.budget_mib
     if needed_mib <= limit_mib:
         return
-    most = max(_REMEDIES, key=lambda part: needs[part])
+    most = max(_REMEDIES, key=lambda part: needs.get(part, 0))
     remedy = f"{_REMEDIES[most]}, or raise it" if limit_mib > PROGRAM_MIB else "raise it"
     parts = ", ".join(f"{part} {size_mib:.0f}" for part, size_mib in needs.items())
     raise ConfigError(

@@ -1,6 +1,7 @@
 """The main thread: starts the others, keeps house once a second, minds signals, and ends it all in order."""
 
 import gc
+import math
 import queue
 import signal
 import threading
@@ -10,7 +11,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from traceback import extract_tb
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import msgspec
 
@@ -21,15 +22,21 @@ from lcf_edge.daemon.devices import readers
 from lcf_edge.daemon.health import Health
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.log import LOGGER
-from lcf_edge.daemon.loop import Loop, Mail
+from lcf_edge.daemon.loop import Loop, Mail, known_lens
 from lcf_edge.daemon.memory import MemoryWatch, Shedding, check_budget, resident_mib
 from lcf_edge.daemon.notify import Notifier
 from lcf_edge.daemon.preview import Previewer
 from lcf_edge.daemon.reload import changed, merged, signature, wants_pipeline, wants_restart
 from lcf_edge.errors import LcfError
+from lcf_edge.recorder.messages import Statuses
+
+if TYPE_CHECKING:
+    from lcf_edge.daemon.recorder import Recorder
+    from lcf_edge.recorder.destination import Destination
 
 TICK_S = 1.0
 ENDS_WITHIN_S = 0.7  # all threads together; the link has its own limit
+RECORDED_WITHIN_S = 1.9  # all, with the recording, of which the disk writes the last while the link closes
 
 
 class InternalError(LcfError):
@@ -39,7 +46,9 @@ class InternalError(LcfError):
 class Service:
     """One run of the daemon. ``path`` and ``settings`` are read again at a reload.
 
-    ``config`` is one that ``check_budget`` let pass; ``notifier`` is told how it goes.
+    ``config`` is one that ``check_budget`` let pass; ``notifier`` is told how it goes. ``destination``: of what
+    ``config.record`` wants recorded; None: its folder. ``seconds``: end so long after the start is over; None: never.
+    ``recorder``: None where nothing is recorded.
     """
 
     def __init__(
@@ -50,6 +59,8 @@ class Service:
         settings: Sequence[str] = (),
         notifier: Notifier | None = None,
         tick_s: float = TICK_S,
+        destination: "Destination | None" = None,
+        seconds: float | None = None,
     ) -> None:
         self._config = config
         self._path, self._settings = path, settings
@@ -62,6 +73,7 @@ class Service:
         self._mail = Mail()
         self._readers = readers(config, self._mail, self._clock)
         self._previewer = Previewer(link, self._clock)
+        self.recorder = _recorder(config, destination, self._system_time)
         self._loop = Loop(
             config,
             self._mail,
@@ -70,10 +82,13 @@ class Service:
             self._clock,
             self._system_time,
             lambda: self._to_do.put(self._check_ready),
+            self.recorder,
         )
         self._memory = self._watched()
         self._health = Health(self._readers, self._mail, self._loop, link, self._system_time)
         self._ready = False
+        self._seconds = seconds
+        self._ends_at_s = math.inf
         self._ending = False
         self._failure: LcfError | None = None
         self._turns = 0
@@ -85,6 +100,8 @@ class Service:
         """Run until ``stop`` or a failure. Raises ``LcfError`` when a thread failed."""
         with self._failures_noticed():
             try:
+                if self.recorder is not None:
+                    self.recorder.start()
                 for thread in (self._loop, self._previewer, *self._readers):
                     thread.start()
                 gc.collect()
@@ -133,9 +150,13 @@ class Service:
             threading.excepthook = before
 
     def _do_next(self) -> None:
+        next_s = min(self._tick_at_s, self._ends_at_s)
         try:
-            self._to_do.get(timeout=max(self._tick_at_s - time.monotonic(), 0))()
+            self._to_do.get(timeout=max(next_s - time.monotonic(), 0))()
         except queue.Empty:
+            if next_s == self._ends_at_s:
+                self._end(f"{self._seconds:g} s are over")
+                return
             self._tick_at_s = max(self._tick_at_s + self._tick_s, time.monotonic())
             self._tick()
 
@@ -146,6 +167,9 @@ class Service:
             self._turns = self._loop.turns
             self._notifier.alive()
         statuses = self._health.statuses(self._config, self._memory)
+        if self.recorder is not None:
+            statuses.append(self.recorder.status())
+            self.recorder.put(Statuses(time.monotonic_ns(), statuses))
         self._link.put_diagnostics(statuses, time.time_ns())
         self._notifier.status(self._health.line(self._memory))
         self._log_notes(self._loop.degradation.notes)
@@ -157,6 +181,7 @@ class Service:
         """Frames flow, or it has been told why not."""
         if not self._ready and (self._loop.frames or self._readers[0].error):
             self._ready = True
+            self._ends_at_s = math.inf if self._seconds is None else time.monotonic() + self._seconds
             self._notifier.status(self._health.line(self._memory))
             self._notifier.ready()
             LOGGER.info("ready: %s", "without a camera" if self._readers[0].error else "frames come")
@@ -188,6 +213,8 @@ class Service:
             self._loop.rebuild(config)
         self._config = config
         self._link.show_config(config)
+        if self.recorder is not None:
+            self.recorder.show_config(config)
         log.set_level(config.log.level)
         self._previewer.off = False
         self._memory = self._watched()
@@ -196,10 +223,10 @@ class Service:
             LOGGER.warning("reload: %s cannot change while running; restart to change it", ", ".join(sorted(refused)))
 
     def _watched(self) -> MemoryWatch:
-        order = (
-            Shedding("the preview", self._shed_preview),
-            Shedding("half of the corners", self._shed_corners),
-        )
+        order = [Shedding("the preview", self._shed_preview)]
+        if self.recorder is not None:
+            order.append(Shedding("most of the recording buffer", self.recorder.shed))
+        order.append(Shedding("half of the corners", self._shed_corners))
         return MemoryWatch(self._config.memory.budget_mib, order, resident_mib)
 
     def _shed_preview(self) -> None:
@@ -225,20 +252,35 @@ class Service:
         self._ending = True
 
     def _close(self) -> None:
-        """Devices first, then what lives on them, then the link."""
+        """Devices first, then what lives on them, then the link, while the recorder writes the last."""
         self._notifier.stopping()
         self._clock.stop()
         self._loop.wake()
         self._previewer.wake()
-        deadline_s = time.monotonic() + ENDS_WITHIN_S
+        begun_s = time.monotonic()
+        deadline_s = begun_s + ENDS_WITHIN_S
         threads: tuple[Any, ...] = (*self._readers, self._loop, self._previewer)
         for thread in threads:
             if thread.ident is not None:
                 thread.join(max(deadline_s - time.monotonic(), 0))
                 if thread.is_alive():
                     LOGGER.warning("%s: does not end; left behind", thread.name)
+        if self.recorder is not None:
+            self.recorder.close()
         self._link.close()
+        if self.recorder is not None and not self.recorder.join(begun_s + RECORDED_WITHIN_S - time.monotonic()):
+            LOGGER.warning("recorder: the disk does not take the last messages in time; left behind")
         self._notifier.close()
+
+
+def _recorder(config: Config, destination: "Destination | None", system_time: SystemTime) -> "Recorder | None":
+    """Not started; None: nothing is to be recorded."""
+    if config.record.when == "never":
+        return None
+    from lcf_edge.daemon.recorder import Recorder  # noqa: PLC0415  # its formats take megabytes
+    from lcf_edge.recorder.destination import Folder  # noqa: PLC0415
+
+    return Recorder(config, destination or Folder(config.record), system_time, known_lens)
 
 
 def _told(failed: threading.ExceptHookArgs) -> LcfError:

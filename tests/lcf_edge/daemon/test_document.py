@@ -21,6 +21,7 @@ TESTS = {
     "pipeline too slow": "test_every_frame_is_a_scene_or_counted",
     "pipeline stuck": "test_the_watchdog_is_fed_by_the_progress_of_the_pipeline",
     "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_told",
+    "disk full, or gone": "test_a_disk_that_takes_nothing_costs_the_recording_only",
     "memory short": "test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so",
     "board hot": "test_a_board_that_is_hot_is_told",
 }

@@ -2,13 +2,14 @@
 
 import os
 from pathlib import Path
+from typing import Literal
 
 import msgspec
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.config import Camera, Config, Memory
+from lcf_edge.config import Camera, Config, Memory, Record
 from lcf_edge.daemon.memory import SHED_AT, MemoryWatch, Shedding, check_budget, needs_mib, resident_mib
 from lcf_edge.errors import ConfigError
 
@@ -25,8 +26,9 @@ def test_a_table_of_statm_is_read_in_pages(tmp_path: Path) -> None:
     assert resident_mib(tmp_path / "statm") == 512 * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def test_the_default_fits_its_budget() -> None:
-    check_budget(Config())
+@pytest.mark.parametrize("when", ["never", "always", "threat"])
+def test_the_default_fits_its_budget(when: Literal["never", "always", "threat"]) -> None:
+    check_budget(Config(record=Record(when=when)))
 
 
 @pytest.mark.parametrize(
@@ -35,6 +37,7 @@ def test_the_default_fits_its_budget() -> None:
         (Config(camera=Camera(width=1920, height=1080)), "lower camera.width and camera.height"),
         (Config(memory=Memory(corners=32767, edges_normal=32767)), "lower the other keys of memory"),
         (Config(memory=Memory(budget_mib=40)), "raise it to "),
+        (Config(record=Record(when="threat", buffer_mib=20)), "lower record.buffer_mib, or raise it to "),
     ],
 )
 def test_a_budget_that_cannot_be_kept_is_refused_with_what_to_lower(config: Config, remedy: str) -> None:

@@ -8,9 +8,10 @@ from typing import Any
 
 import msgspec
 import pytest
+from mcap.reader import make_reader
 
 from hil_mocks.playback import RecordedCamera
-from lcf_edge.config import Camera, Config, Imu, Memory, to_toml
+from lcf_edge.config import Camera, Config, Imu, Memory, Record, to_toml
 from lcf_edge.daemon import health, service
 from lcf_edge.daemon.board import Board
 from lcf_edge.daemon.loop import Loop
@@ -206,6 +207,48 @@ def test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so(
     previews, scenes = len(link.previews), len(link.scenes)
     link.wait_for(lambda: len(link.scenes) > scenes + 5)
     assert len(link.previews) == previews
+
+
+def test_the_recording_buffer_goes_before_the_corners(
+    config: Config, runs: Runs, link: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(service, "resident_mib", lambda: 950.0)
+    runs.start(msgspec.structs.replace(config, record=Record(when="threat", folder=str(tmp_path))))
+    link.wait_for(lambda: link.statuses and "corners" in link.statuses["memory"].message)
+    told = "gave up the preview, most of the recording buffer, half of the corners"
+    assert link.statuses["memory"].message == told
+
+
+# Recording.
+
+
+def test_what_it_records_is_told_and_closed_at_the_end(config: Config, runs: Runs, link: Any, tmp_path: Path) -> None:
+    record = Record(when="always", folder=str(tmp_path), free_mib=0)
+    begun = runs.start(msgspec.structs.replace(config, record=record))
+    link.wait_for(lambda: link.statuses and int(link.statuses["recorder"].values["pictures"]) > 5)
+    (path,) = tmp_path.glob("*.mcap")
+    assert link.statuses["recorder"].message == f"records into {path}"
+    assert link.statuses["recorder"].level is Level.OK
+    begun.stop("test")
+    assert runs.failure() is None
+    with path.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    counts = {summary.channels[n].topic: count for n, count in summary.statistics.channel_message_counts.items()}
+    assert counts["/lcf/scene"] == counts["/lcf/camera/image_raw/compressed"] == len(link.scenes)
+    assert counts["/lcf/diagnostics"] > 0
+
+
+def test_a_disk_that_takes_nothing_costs_the_recording_only(
+    config: Config, runs: Runs, link: Any, tmp_path: Path
+) -> None:
+    (tmp_path / "file").touch()
+    record = Record(when="always", folder=str(tmp_path / "file"))
+    runs.start(msgspec.structs.replace(config, record=record))
+    link.wait_for(lambda: link.statuses and link.statuses["recorder"].level is Level.WARN)
+    assert str(tmp_path / "file") in link.statuses["recorder"].message
+    scenes = len(link.scenes)
+    link.wait_for(lambda: len(link.scenes) > scenes + 10)
 
 
 # Reload.

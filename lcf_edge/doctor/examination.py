@@ -1,0 +1,85 @@
+"""All checks in a sensible order, each within a limit of time."""
+
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from queue import Empty, SimpleQueue
+
+from lcf_edge.doctor import (
+    board,
+    calibration,
+    camera,
+    clock,
+    configuration,
+    health,
+    imu,
+    memory,
+    network,
+    permissions,
+    service,
+    software,
+)
+from lcf_edge.doctor.finding import Check, Context, Finding, fail, short
+from lcf_edge.errors import LcfError
+
+LIMIT_S = 30.0
+
+
+@dataclass(frozen=True, slots=True)
+class Step:
+    """A check; ``needs_config``: it says nothing while the configuration cannot be used."""
+
+    subject: str
+    check: Check
+    needs_config: bool = True
+
+
+STEPS = (
+    Step("configuration", configuration.check, needs_config=False),
+    Step("software", software.check, needs_config=False),
+    Step("board", board.check, needs_config=False),
+    Step("clock", clock.check, needs_config=False),
+    Step("memory", memory.check),
+    Step("service", service.check, needs_config=False),
+    Step("network", network.check),
+    Step("daemon", health.check),
+    Step("permissions", permissions.check),
+    Step("camera", camera.check),
+    Step("imu", imu.check),
+    Step("calibration", calibration.check),
+)
+
+
+def examine(context: Context, steps: Sequence[Step] = STEPS, limit_s: float = LIMIT_S) -> Iterator[Finding]:
+    """What all checks find, as they find it.
+
+    A check that says nothing for ``limit_s`` is left behind in its thread, and told.
+    """
+    for step in steps:
+        if context.error is None or not step.needs_config:
+            yield from _within(limit_s, step, context)
+
+
+def _within(limit_s: float, step: Step, context: Context) -> Iterator[Finding]:
+    found: SimpleQueue[Finding | None] = SimpleQueue()
+    threading.Thread(target=_run, args=(step, context, found.put), name=step.subject, daemon=True).start()
+    try:
+        while (finding := found.get(timeout=limit_s)) is not None:
+            yield finding
+    except Empty:
+        text = (
+            f"does not come back within {limit_s:g} s: a device hangs in its driver; pull it out, or power off and on"
+        )
+        yield fail(step.subject, text, "sudo dmesg | tail -n 20")
+
+
+def _run(step: Step, context: Context, put: Callable[[Finding | None], None]) -> None:
+    try:
+        for finding in step.check(context):
+            put(finding)
+    except OSError as error:  # of a file that the check did not expect to fail
+        put(fail(step.subject, f"{error.filename or 'a device'}: {error.strerror}"))
+    except (LcfError, ValueError) as error:  # the latter: the kernel tells something in another form than known
+        put(fail(step.subject, short(error)))
+    finally:
+        put(None)

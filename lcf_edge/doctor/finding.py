@@ -1,0 +1,105 @@
+"""What a check is given, and what it answers."""
+
+import shlex
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+from functools import cached_property
+from pathlib import Path
+from typing import TypeAlias
+
+from drivers.camera.v4l2_ioctl import LINUX, Kernel
+from drivers.clock import SYSTEM_CLOCK, Clock
+from drivers.device import Device
+from drivers.imu.i2c_bus import I2cBus
+from drivers.records import Frame, ImuSample
+from lcf_edge.config import DEFAULT_PATH, Config
+from lcf_edge.devices import open_camera, open_imu
+from lcf_edge.doctor.daemon import Daemon, ask
+from lcf_edge.errors import ConfigError
+
+
+class Level(Enum):
+    """How bad it is."""
+
+    OK = "ok"
+    WARN = "warn"  # works, but worse than it could
+    FAIL = "fail"  # does not work
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One line of the report. ``remedy``: where one exists, a command to paste."""
+
+    level: Level
+    subject: str
+    text: str
+    remedy: str = ""
+
+
+@dataclass(frozen=True)
+class Context:
+    """What the checks look at; all but the first five are of the machine, and a test brings its own.
+
+    ``settings``: of ``--set``. ``given``: the keys that file or settings have, as "camera.height_m". ``error``: why the
+    configuration cannot be used; then ``config`` holds the defaults.
+    """
+
+    config: Config
+    path: Path = DEFAULT_PATH
+    settings: tuple[str, ...] = ()
+    given: frozenset[str] = frozenset()
+    error: ConfigError | None = None
+    dev: Path = Path("/dev")
+    sys: Path = Path("/sys")
+    proc: Path = Path("/proc")
+    kernel: Kernel = LINUX
+    open_camera: Callable[[Config, Clock], Device[Frame]] = open_camera
+    open_imu: Callable[[Config, Clock], Device[ImuSample] | None] = open_imu
+    open_bus: Callable[[int], I2cBus] = I2cBus
+    clock: Clock = SYSTEM_CLOCK
+    systemctl: Sequence[str] = ("systemctl",)
+
+    @cached_property
+    def daemon(self) -> Daemon | None:
+        """What the daemon that runs on this computer says of itself; None: none answers."""
+        return ask(self.config)
+
+    def again(self, *settings: str) -> str:
+        """The command that looks again with more settings, as "imu.bus=3"."""
+        words = [f"-c {shlex.quote(str(self.path))}"] if self.path != DEFAULT_PATH else []
+        words += [f"--set {shlex.quote(setting)}" for setting in (*self.settings, *settings)]
+        return " ".join(("lcf-edge doctor", *words)) + ("  # then in the configuration" if settings else "")
+
+    def calibrate(self, what: str) -> str:
+        """The command that measures something and writes it into the configuration."""
+        return f"lcf-edge calibrate {what} -c {shlex.quote(str(self.path))} --write"
+
+
+Check: TypeAlias = Callable[[Context], Iterator[Finding]]
+
+
+def ok(subject: str, text: str) -> Finding:
+    """As it should be."""
+    return Finding(Level.OK, subject, text)
+
+
+def warn(subject: str, text: str, remedy: str = "") -> Finding:
+    """Works, but worse than it could."""
+    return Finding(Level.WARN, subject, text, remedy)
+
+
+def fail(subject: str, text: str, remedy: str = "") -> Finding:
+    """Does not work."""
+    return Finding(Level.FAIL, subject, text, remedy)
+
+
+def edit(path: Path, comment: str = "") -> str:
+    """The command that opens a file for editing."""
+    command = f"sudoedit {path}" if path.is_relative_to("/etc") else f"${{EDITOR:-nano}} {path}"
+    return f"{command}  # {comment}" if comment else command
+
+
+def short(error: Exception) -> str:
+    """What an error says is wrong, without the remedy that follows."""
+    return str(error).partition("; ")[0]

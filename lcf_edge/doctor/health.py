@@ -1,0 +1,59 @@
+"""What a daemon that runs says of itself and of its devices."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+from lcf_edge.diagnostics import DeviceStatus
+from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
+from lcf_edge.doctor.processes import Process, daemon_with, processes
+
+_DEVICES = ("camera", "imu")  # told by their own checks
+_TOLD = ("rate_hz", "jitter_ms", "latency_p50_ms", "latency_p99_ms", "resident_mib", "budget_mib", "temperature_c")
+_JOURNAL = "journalctl -u lcf-edge -n 30 --no-pager"
+
+
+def check(context: Context) -> Iterator[Finding]:
+    """The daemon and its parts, but for the devices."""
+    daemon = context.daemon
+    running = next((process for process in processes(context.proc) if process.is_daemon), None)
+    if daemon is not None and daemon.scene:
+        yield warn("daemon", f"answers at {daemon.endpoint}, but has no scene ({daemon.scene})", _JOURNAL)
+    elif daemon is not None:
+        yield ok("daemon", f"answers at {daemon.endpoint}, has scenes")
+    elif running is not None:
+        yield warn(
+            "daemon",
+            f"{running} does not answer at {', '.join(context.config.zenoh.listen)}: another configuration than this?",
+            f"tr '\\0' ' ' < /proc/{running.pid}/cmdline",
+        )
+    else:
+        yield ok("daemon", "does not run")
+    for status in daemon.statuses.values() if daemon else ():
+        if status.name not in _DEVICES:
+            yield _of_status("daemon", status.name, status)
+
+
+def daemon_having(context: Context, name: str, path: Path) -> Process | None:
+    """The daemon that has a device open, or may have it, as far as it tells and this user may know."""
+    process = daemon_with(path.resolve(), context.proc)
+    if process is not None and process.files is None and context.daemon and name not in context.daemon.statuses:
+        return None  # it uses none of that kind
+    return process
+
+
+def of_device(context: Context, name: str, daemon: Process) -> Finding:
+    """A device that the daemon has open."""
+    status = context.daemon.statuses.get(name) if context.daemon else None
+    if status is not None:
+        return _of_status(name, "the daemon has it", status)
+    text = f"not opened, since {daemon} may have it, which tells nothing of it"
+    return warn(name, text, "sudo systemctl stop lcf-edge  # then look again")
+
+
+def _of_status(subject: str, whose: str, status: DeviceStatus) -> Finding:
+    values = [f"{name} {status.values[name]}" for name in _TOLD if name in status.values]
+    text = f"{whose}: {status.message}" + (f" ({', '.join(values)})" if values else "")
+    if status.level is StatusLevel.OK:
+        return ok(subject, text)
+    return (warn if status.level is StatusLevel.WARN else fail)(subject, text, _JOURNAL)

@@ -1,0 +1,89 @@
+"""Reading a device for a while."""
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+from statistics import pstdev
+from typing import Generic, Protocol, TypeVar
+
+from drivers.clock import Clock
+from drivers.device import Device
+
+
+class Stamped(Protocol):
+    """What a device delivers."""
+
+    @property
+    def stamp_ns(self) -> int:
+        """When it was."""
+        ...
+
+
+Record = TypeVar("Record", bound=Stamped)
+
+
+@dataclass(frozen=True, slots=True)
+class Measured(Generic[Record]):
+    """What came, oldest first, and what was counted meanwhile."""
+
+    name: str
+    records: list[Record]
+    counts: Counter[str]
+
+    @property
+    def rate_hz(self) -> float:
+        """Records a second; NaN: fewer than two came."""
+        if len(self.records) < 2:
+            return math.nan
+        return (len(self.records) - 1) / max((self.records[-1].stamp_ns - self.records[0].stamp_ns) / 1e9, 1e-9)
+
+    @property
+    def jitter_s(self) -> float:
+        """1 sigma of the interval between two."""
+        return pstdev(self._intervals_s) if len(self.records) > 2 else math.nan
+
+    @property
+    def longest_s(self) -> float:
+        """The longest interval between two."""
+        return max(self._intervals_s, default=math.nan)
+
+    @property
+    def steps_back(self) -> int:
+        """How often a stamp was not after the one before."""
+        return sum(interval_s <= 0 for interval_s in self._intervals_s)
+
+    @property
+    def _intervals_s(self) -> list[float]:
+        stamps_ns = [record.stamp_ns for record in self.records]
+        return [(later - earlier) / 1e9 for earlier, later in pairwise(stamps_ns)]
+
+    def told(self) -> str:
+        """Rate and jitter in words."""
+        return f"{self.rate_hz:.1f}/s, jitter {1e3 * self.jitter_s:.1f} ms"
+
+
+def measure(
+    open_device: Callable[[], Device[Record]], seconds: float, clock: Clock, settling_s: float = 0.0
+) -> Measured[Record]:
+    """Open a device, read it, close it. Raises ``DriverError``.
+
+    ``settling_s``: what comes so soon after the first record is thrown away, as of a camera that finds its exposure.
+    A device from which nothing comes is waited for until it complains, three times ``seconds`` at most.
+    """
+    device = open_device()
+    try:
+        records: list[Record] = []
+        end_ns = clock.monotonic_ns() + round(3e9 * (seconds + settling_s))
+        first_ns: int | None = None
+        while (now_ns := clock.monotonic_ns()) < end_ns:
+            read = device.read()
+            if read and first_ns is None:
+                first_ns = now_ns
+                end_ns = now_ns + round(1e9 * (seconds + settling_s))
+            if first_ns is not None and now_ns - first_ns >= settling_s * 1e9:
+                records += read
+        return Measured(device.name, records, +device.counts)
+    finally:
+        device.close()

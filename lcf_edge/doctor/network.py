@@ -1,0 +1,115 @@
+"""Zenoh: its configuration, its ports, and who reaches them."""
+
+import json
+from collections.abc import Iterator
+
+import msgspec
+import zenoh
+
+from lcf_edge.config import Zenoh
+from lcf_edge.doctor.endpoints import is_open, parsed, reachable_here
+from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
+from lcf_edge.doctor.processes import listening
+from lcf_edge.errors import PublishError
+from lcf_edge.zenoh_link.session import opened_session
+
+_LOOPBACK = 'zenoh.listen=["tcp/127.0.0.1:7447"]'
+_NEXT_PORT = 'zenoh.listen=["tcp/127.0.0.1:7457"]'
+
+
+def check(context: Context) -> Iterator[Finding]:
+    """Configuration, ports, exposure, neighbours."""
+    options = _with_the_files(context.config.zenoh)
+    taken = [endpoint for endpoint in options.listen if _is_taken(endpoint)]
+    if taken:
+        for endpoint in taken:
+            yield _held(context, endpoint)
+    else:
+        yield _opens(context.config.zenoh)
+    yield from exposed(context, options)
+    for endpoint in options.connect:
+        yield _connects(endpoint)
+
+
+def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
+    """Whether strangers can read scenes and tell the speed."""
+    outside = [endpoint for endpoint in options.listen if (parts := parsed(endpoint)) and not parts.local]
+    plain = [endpoint for endpoint in outside if (parts := parsed(endpoint)) and not parts.encrypted]
+    if plain:
+        yield warn(
+            "network",
+            f"{', '.join(plain)}: whoever reaches this port reads every scene and can send a speed "
+            "(no encryption, no passwords); docs/network.md says how to open it with TLS",
+            context.again(_LOOPBACK),
+        )
+    elif outside and not _wants_certificates(options):
+        yield warn(
+            "network",
+            f"{', '.join(outside)}: encrypted, but everybody is let in; docs/network.md has the lines for enable_mtls",
+            f"sudoedit {options.config_file or '/etc/lcf-edge/zenoh.json5'}",
+        )
+    elif outside:
+        yield ok("network", f"{', '.join(outside)}: open to the network, for those with a certificate")
+    else:
+        yield ok("network", "only this computer can reach it")
+
+
+def _wants_certificates(options: Zenoh) -> bool:
+    return bool(json.loads(_settings(options).get_json("transport/link/tls/enable_mtls")))
+
+
+def _with_the_files(options: Zenoh) -> Zenoh:
+    """Endpoints that the keys leave to ``zenoh.config_file``."""
+    settings = _settings(options)
+    listen = options.listen or _endpoints(settings, "listen")
+    connect = options.connect or _endpoints(settings, "connect")
+    return msgspec.structs.replace(options, listen=listen, connect=connect)
+
+
+def _endpoints(settings: zenoh.Config, name: str) -> list[str]:
+    """A list, or one for each mode."""
+    told = json.loads(settings.get_json(f"{name}/endpoints"))
+    return [endpoint for one in told.values() for endpoint in one] if isinstance(told, dict) else list(told)
+
+
+def _settings(options: Zenoh) -> zenoh.Config:
+    """Of the file; those of none where it cannot be read, which opening the session will tell."""
+    try:
+        return zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
+    except zenoh.ZError:
+        return zenoh.Config()
+
+
+def _is_taken(endpoint: str) -> bool:
+    parts = parsed(endpoint)
+    return parts is not None and not parts.datagrams and is_open(reachable_here(endpoint))
+
+
+def _held(context: Context, endpoint: str) -> Finding:
+    parts = parsed(endpoint)
+    holder = listening(parts, context.proc) if parts else None
+    if context.daemon is not None or (holder is not None and holder.is_daemon):
+        return ok("network", f"{endpoint}: the daemon listens" + (f" ({holder})" if holder else ""))
+    if holder is not None:
+        return fail(
+            "network", f"{endpoint}: taken by {holder}", f"kill {holder.pid}  # or: {context.again(_NEXT_PORT)}"
+        )
+    port = parts.port if parts else 0
+    return fail("network", f"{endpoint}: taken by another user's program", f"sudo ss -ltnp 'sport = :{port}'")
+
+
+def _opens(options: Zenoh) -> Finding:
+    try:
+        with opened_session(options):
+            return ok("network", f"Zenoh opens as {options.mode}, listens on {', '.join(options.listen) or 'nothing'}")
+    except PublishError as error:
+        file = options.config_file
+        return fail("network", str(error), f"sudoedit {file}" if file and file in str(error) else "")
+
+
+def _connects(endpoint: str) -> Finding:
+    if is_open(endpoint):
+        return ok("network", f"{endpoint}: somebody listens there")
+    parts = parsed(endpoint)
+    remedy = f"ping -c 3 {parts.host}  # is it on, is zenohd or another lcf-edge running there?" if parts else ""
+    return warn("network", f"{endpoint}: cannot be reached", remedy)

@@ -1,0 +1,87 @@
+"""Groups: whose the devices are, and whether this user is one of them."""
+
+import getpass
+import grp
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+from lcf_edge.config import Config
+from lcf_edge.devices import SERIAL
+from lcf_edge.doctor.finding import Context, Finding, ok, warn
+
+
+def group_of(driver: str) -> str:
+    """The group that may use what ``imu.driver`` means; "" for none."""
+    if driver in ("none", "recording"):
+        return ""
+    return "iio" if driver == "iio" else "dialout" if driver in SERIAL else "i2c"
+
+
+def check(context: Context) -> Iterator[Finding]:
+    """Each group that the configured devices need."""
+    for group, pattern in needed(context.config):
+        yield _group(group, sorted(context.dev.glob(pattern)))
+
+
+def join(group: str) -> str:
+    """The command that lets this user in."""
+    return f"sudo usermod -aG {group} $USER  # then log in again"
+
+
+def owner(path: Path) -> str:
+    """Group and mode of a device, as "group video, crw-rw----"; "" when it is not there."""
+    try:
+        status = path.stat()
+    except OSError:
+        return ""
+    return f"{_name(status.st_gid)}, mode {status.st_mode & 0o777:o}"
+
+
+def needed(config: Config) -> list[tuple[str, str]]:
+    """Groups, and which nodes in /dev should be theirs."""
+    nodes = {"video": "video*", "i2c": f"i2c-{config.imu.bus}", "dialout": _inside(config.imu.port), "iio": "iio:*"}
+    video = "video" if config.camera.driver == "v4l2" else ""
+    return [(group, nodes[group]) for group in (video, group_of(config.imu.driver)) if group]
+
+
+def _inside(path: str) -> str:
+    """A path in /dev as a pattern for there."""
+    return path.removeprefix("/dev/").lstrip("/") or "-"
+
+
+def _group(group: str, nodes: list[Path]) -> Finding:
+    try:
+        found = grp.getgrnam(group)
+    except KeyError:
+        return warn("permissions", f"there is no group {group}", f"sudo groupadd --system {group}  # {_MAKE}")
+    others = [node for node in nodes if not _belongs(node, found.gr_gid)]
+    user = getpass.getuser()
+    if others:
+        text = f"{others[0]} belongs to the {owner(others[0])}, and should be for the group {group}"
+        return warn("permissions", text, f"sudo chgrp {group} {others[0]} && sudo chmod g+rw {others[0]}  # {_MAKE}")
+    if os.geteuid() == 0:
+        return ok("permissions", f"root may open everything; others need the group {group}")
+    if found.gr_gid in (os.getegid(), *os.getgroups()):
+        return ok("permissions", f"{user} is in the group {group}")
+    if user in found.gr_mem:
+        return warn(
+            "permissions", f"{user} is in the group {group}, but only from the next login on", f"newgrp {group}"
+        )
+    return warn("permissions", f"{user} is not in the group {group}", join(group))
+
+
+_MAKE = "sudo make install, in the source, brings rules that last"
+
+
+def _belongs(node: Path, gid: int) -> bool:
+    """Whether the group may read and write it."""
+    status = node.stat()
+    return status.st_gid == gid and status.st_mode & 0o060 == 0o060
+
+
+def _name(gid: int) -> str:
+    try:
+        return f"group {grp.getgrgid(gid).gr_name}"
+    except KeyError:
+        return f"group {gid}"

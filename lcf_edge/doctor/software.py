@@ -1,0 +1,60 @@
+"""The program, what it rests on, and the computer that it runs on."""
+
+import platform
+import re
+import sys
+from collections.abc import Iterator, Mapping
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+
+from lcf_edge import __version__
+from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
+
+NEEDED: Mapping[str, tuple[tuple[int, int], tuple[int, int]]] = {
+    "numpy": ((2, 0), (3, 0)),
+    "opencv-python-headless": ((4, 10), (6, 0)),
+    "eclipse-zenoh": ((1, 5), (2, 0)),
+}
+"""From which version on, and before which."""
+
+_MODULES = {"plot": "matplotlib", "view": "aiohttp", "watch": "rich"}
+
+
+def check(_: Context) -> Iterator[Finding]:
+    """Versions."""
+    yield _computer(sys.maxsize > 2**32)
+    yield from packages({name: _installed(name) for name in NEEDED})
+    missing = [extra for extra, module in _MODULES.items() if find_spec(module) is None]
+    if missing:
+        yield ok(
+            "software",
+            f"for people only, and not here: {', '.join(missing)} (pip install 'lcf-edge[{','.join(missing)}]')",
+        )
+
+
+def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
+    """What is said of these versions; "": unknown."""
+    for name, (least, below) in NEEDED.items():
+        numbers = tuple(map(int, re.findall(r"\d+", installed[name])[:2]))
+        if numbers and not least <= numbers < below:
+            wanted = f">={least[0]}.{least[1]},<{below[0]}"
+            text = f"{name} {installed[name]} was never tried, wanted is {wanted}"
+            yield (fail if numbers < least else warn)("software", text, f"pip install '{name}{wanted}'")
+    told = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
+    yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {told}")
+
+
+def _computer(is_64_bit: bool) -> Finding:
+    text = f"{platform.system()} {platform.release()} on {platform.machine()}"
+    if is_64_bit:
+        return ok("software", f"{text}, 64 bits")
+    return fail("software", f"{text}: a Python of 32 bits, for which there is no Zenoh; install a 64-bit system")
+
+
+def _installed(name: str) -> str:
+    for same in (name, name.removesuffix("-headless")):
+        try:
+            return version(same)
+        except PackageNotFoundError:
+            continue
+    return ""

@@ -1,0 +1,87 @@
+"""Which IMU answers: chips on an I2C bus by their identity, protocols at a serial port by their frames. Only reads."""
+
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from dataclasses import dataclass
+from importlib import import_module
+
+from drivers.clock import Clock
+from drivers.errors import DriverError
+from drivers.imu.i2c_bus import I2cBus
+from drivers.imu.i2c_chips import CHIPS
+from drivers.imu.i2c_imu import I2cImu
+from drivers.imu.serial_port import SerialPort
+from drivers.imu.serial_protocols import PROTOCOLS
+
+LISTENED_S = 0.6
+LEAST_READINGS = 3  # fewer can be chance, or end with a slow one
+
+
+@dataclass(frozen=True, slots=True)
+class Chip:
+    """A chip that was recognised."""
+
+    driver: str
+    model: str
+    address: int
+
+    def __str__(self) -> str:
+        return f"{self.model} at 0x{self.address:02x}"
+
+    @property
+    def settings(self) -> tuple[str, str]:
+        """That make it the configured one."""
+        return f"imu.driver={self.driver}", f"imu.address=0x{self.address:02x}"
+
+
+def chips(bus: I2cBus) -> Iterator[Chip]:
+    """The chips at the addresses that IMUs have."""
+    kinds: dict[str, type[I2cImu]] = {
+        driver: getattr(import_module(f"drivers.imu.{driver}"), name) for driver, name in CHIPS.items()
+    }
+    addresses = sorted({kind.usual_address | last for kind in kinds.values() for last in (0, 1)})
+    for address in bus.scan(addresses):
+        for driver, kind in kinds.items():
+            if address in (kind.usual_address, kind.usual_address | 1):
+                with suppress(DriverError):
+                    model = kind.identities.get(bus.read(address, kind.identity_register, 1, tries=2)[0])
+                    if model is not None:
+                        yield Chip(driver, model, address)
+                        break
+
+
+@dataclass(frozen=True, slots=True)
+class Spoken:
+    """A protocol that was understood at a baud rate."""
+
+    driver: str
+    baud: int
+    readings: int
+
+    @property
+    def settings(self) -> tuple[str, str]:
+        """That make it the configured one."""
+        return f"imu.driver={self.driver}", f"imu.baud={self.baud}"
+
+
+def spoken(port: str, clock: Clock) -> Spoken | None:
+    """What is spoken at a port, tried at all baud rates in use; None: nothing that is known."""
+    bauds = dict.fromkeys(baud for protocol in PROTOCOLS.values() for baud in protocol.bauds)
+    understood = [found for baud in bauds for found in _understood(_heard(port, baud, clock), baud)]
+    best = max(understood, key=lambda found: found.readings, default=None)
+    return best if best is not None and best.readings >= LEAST_READINGS else None
+
+
+def _understood(data: bytes, baud: int) -> Iterator[Spoken]:
+    for name, protocol in PROTOCOLS.items():
+        yield Spoken(name, baud, len(protocol.parser().feed(data)))
+
+
+def _heard(port: str, baud: int, clock: Clock) -> bytes:
+    """What comes within ``LISTENED_S``; nothing where that rate cannot be had."""
+    heard = bytearray()
+    with suppress(DriverError), closing(SerialPort(port, baud)) as line:
+        end_ns = clock.monotonic_ns() + round(LISTENED_S * 1e9)
+        while clock.monotonic_ns() < end_ns:
+            heard += line.read()
+    return bytes(heard)

@@ -1,0 +1,27 @@
+"""The configuration that ``lcf-edge record`` puts into its files."""
+
+import struct
+from pathlib import Path
+
+from mcap.exceptions import McapError
+from mcap.records import Attachment, Chunk
+from mcap.stream_reader import StreamReader
+
+from lcf_edge.config import IN_RECORDING
+from lcf_edge.errors import ConfigError
+
+_LARGEST_BYTES = 2**24
+
+
+def attached_configuration(path: Path) -> bytes:
+    """The configuration with which a recording began. Raises ``OSError``, and ``ConfigError`` when it has none."""
+    with path.open("rb") as file:
+        try:
+            for record in StreamReader(file, emit_chunks=True, record_size_limit=_LARGEST_BYTES).records:
+                if isinstance(record, Attachment) and record.name == IN_RECORDING:
+                    return record.data
+                if isinstance(record, Chunk):  # ours lies before the first
+                    break
+        except (McapError, struct.error, UnicodeDecodeError, OverflowError):  # damaged
+            pass
+    raise ConfigError(f"{path}: no configuration in it; only lcf-edge record puts one in; name a TOML file with -c")

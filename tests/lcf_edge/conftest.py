@@ -1,0 +1,111 @@
+"""A rover for the tools that look at one: all that the daemon publishes, over real Zenoh, without a camera."""
+
+import threading
+import time
+from collections.abc import Callable, Iterator
+from functools import cached_property
+
+import cv2
+import numpy as np
+import pytest
+
+from lcf_edge.config import Config, Zenoh
+from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene, Shape
+from lcf_edge.zenoh_link import open_session
+from lcf_edge.zenoh_link.link import Link
+
+FRAME_S = 0.05
+PATIENCE_S = 20.0
+
+CIRCLES = np.zeros(5, CIRCLE)
+CIRCLES["id"] = (7, 3, 9, 12, 15)
+CIRCLES["kind"] = (Kind.NORMAL, Kind.REBEL, Kind.NORMAL, Kind.REBEL, Kind.NORMAL)
+CIRCLES["cause"] = (Cause.NONE, Cause.LEADING, Cause.NONE, Cause.INCOMING, Cause.NONE)
+CIRCLES["x"], CIRCLES["y"], CIRCLES["radius"] = (40, 90, 200, 150, 270), (60, 90, 150, 110, 80), (20, 15, 25, 30, 18)
+CIRCLES["ttc"] = (np.inf, 3.5, np.inf, 1.25, np.inf)
+CIRCLES["bearing"], CIRCLES["range"] = (-0.3, -0.2, 0.1, 0.05, 0.4), (np.nan, 6.5, np.nan, 2.5, np.nan)
+CIRCLES["support"], CIRCLES["trust"], CIRCLES["lateral"] = 11, 4.0, np.nan
+
+PSI = np.zeros(2, PSI_REGION)
+PSI["id"], PSI["shape"] = (1, 2), (Shape.CIRCLE, Shape.RECTANGLE)
+PSI["x"], PSI["y"], PSI["width"], PSI["height"] = (200, 280), (150, 200), 50, 40
+
+STATUS = (
+    DeviceStatus("camera", Level.OK, "delivers", {"rate_hz": "20.00", "age_s": "0.012"}),
+    DeviceStatus("imu", Level.ERROR, "away since 2026-01-01T00:00:00Z: unplugged", {"rate_hz": "nan"}),
+    DeviceStatus(
+        "pipeline", Level.OK, "runs", {"latency_p50_ms": "3.10", "latency_p99_ms": "8.20", "psi_fill": "2/32"}
+    ),
+    DeviceStatus("memory", Level.OK, "within the budget", {"resident_mib": "71.5", "budget_mib": "96"}),
+)
+
+
+class Rover:
+    """Publishes a frame each ``FRAME_S`` and its health with each, as long as it is there.
+
+    ``circles``, ``status``, ``silent`` (no scenes) may be changed meanwhile. ``unseen``: frames since a preview was
+    wanted.
+    """
+
+    def __init__(self, endpoint: str) -> None:
+        self.endpoint = endpoint
+        self.circles, self.status, self.silent = CIRCLES, STATUS, False
+        self.previews = self.unseen = 0
+        self._changed = threading.Condition()
+        self._leaves = threading.Event()
+        self.come()
+
+    def come(self) -> None:
+        """Begin, also again."""
+        self._leaves.clear()
+        self.link = Link(open_session(Zenoh(listen=[self.endpoint])), Config())
+        self._thread = threading.Thread(target=self._publish, name="rover")
+        self._thread.start()
+
+    def leave(self) -> None:
+        """Be away."""
+        self._leaves.set()
+        self._thread.join()
+        self.link.close()
+
+    def wait_for(self, happened: Callable[[], object]) -> None:
+        """Look with every frame until it ``happened``."""
+        with self._changed:
+            assert self._changed.wait_for(lambda: bool(happened()), PATIENCE_S)
+
+    def _publish(self) -> None:
+        seq = 0
+        while not self._leaves.wait(FRAME_S):
+            stamp_ns = time.time_ns() - 3_000_000
+            if not self.silent:
+                seq += 1
+                self.link.put_scene(Scene(stamp_ns, seq, 320, 240, 1.5, self.circles, PSI))
+            self.link.put_diagnostics(self.status, stamp_ns)
+            self.unseen += 1
+            if self.link.preview_wanted():
+                self.link.put_preview(self._jpeg, stamp_ns)
+                self.previews += 1
+                self.unseen = 0
+            with self._changed:
+                self._changed.notify_all()
+
+    @cached_property
+    def _jpeg(self) -> bytes:
+        """Two panels: the left one blue, the right one grey."""
+        panels = np.full((240, 640, 3), 90, np.uint8)
+        panels[:, :320] = (160, 40, 20)
+        return cv2.imencode(".jpg", panels)[1].tobytes()
+
+
+@pytest.fixture(scope="session")
+def rover_at() -> type[Rover]:
+    """A rover that publishes at an endpoint, until it leaves."""
+    return Rover
+
+
+@pytest.fixture
+def rover(endpoint: str) -> Iterator[Rover]:
+    rover = Rover(endpoint)
+    yield rover
+    rover.leave()

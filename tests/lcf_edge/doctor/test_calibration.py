@@ -1,0 +1,50 @@
+"""What the filter was not told about the vehicle."""
+
+from collections.abc import Callable
+
+from lcf_edge.config import Camera, Config, Imu, Vehicle
+from lcf_edge.doctor import calibration
+from lcf_edge.doctor.finding import Context, Level
+
+Machine = Callable[..., Context]
+AXES = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]
+
+
+def warned(context: Context) -> list[str]:
+    return [finding.text.split()[0] for finding in calibration.check(context) if finding.level is Level.WARN]
+
+
+def test_defaults_are_warned_of_one_by_one(machine: Machine) -> None:
+    found = list(calibration.check(machine(Config(imu=Imu(driver="mpu6050")))))
+    assert [finding.text.split()[0] for finding in found] == [
+        "camera.intrinsics",
+        "camera.height_m",
+        "imu.axes",
+        "nothing",
+    ]
+    assert all(finding.level is Level.WARN and finding.remedy for finding in found)
+
+
+def test_what_is_set_is_good(machine: Machine) -> None:
+    camera = Camera(intrinsics=[500.0, 501.0, 320.0, 241.0])
+    config = Config(camera=camera, imu=Imu(driver="mpu6050", axes=AXES), vehicle=Vehicle(speed_mps=1.0))
+    assert warned(machine(config, given=frozenset({"camera.height_m", "camera.pitch_rad"}))) == []
+
+
+def test_a_mounting_that_is_set_to_the_default_is_measured(machine: Machine) -> None:
+    assert "camera.height_m" in warned(machine(given=frozenset({"camera.pitch_rad"})))
+    assert "camera.height_m" not in warned(machine(given=frozenset({"camera.height_m", "camera.pitch_rad"})))
+
+
+def test_intrinsics_of_another_size_are_noticed(machine: Machine) -> None:
+    config = Config(camera=Camera(width=640, height=480, intrinsics=[1000.0, 1000.0, 640.0, 360.0]))
+    found = next(calibration.check(machine(config)))
+    assert found.level is Level.WARN
+    assert "are they of another size?" in found.text
+
+
+def test_the_accelerometer_alone_is_no_speed(machine: Machine) -> None:
+    config = Config(imu=Imu(driver="mpu6050", axes=AXES), vehicle=Vehicle(speed_source="imu"))
+    *_, speed = calibration.check(machine(config))
+    assert speed.level is Level.WARN
+    assert "drifts" in speed.text

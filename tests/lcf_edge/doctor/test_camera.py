@@ -1,0 +1,214 @@
+"""The camera's check, with the shipped driver on cameras behind a kernel that is played."""
+
+import errno
+import itertools
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.camera import v4l2_ioctl as v4l2
+from drivers.camera.v4l2 import V4l2Camera
+from drivers.clock import Clock
+from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel
+from hil_mocks.virtual_clock import VirtualClock
+from lcf_edge.config import Camera, Config
+from lcf_edge.diagnostics import DeviceStatus
+from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.doctor import camera
+from lcf_edge.doctor.daemon import Daemon
+from lcf_edge.doctor.finding import Context, Finding, Level
+
+PATH = "/dev/video0"
+WANTED = Camera(fps=30.0)
+
+Machine = Callable[..., Context]
+Grey = np.ndarray[Any, np.dtype[np.uint8]]
+
+
+@cache
+def drawn(width: int, height: int) -> Grey:
+    """Patches of grey that meet in good corners."""
+    grey = np.random.default_rng(1).integers(40, 161, (height // 12 + 1, width // 12 + 1), np.uint8)
+    sharp = np.kron(grey, np.ones((12, 12), np.uint8))[:height, :width]
+    return np.asarray(cv2.GaussianBlur(sharp, (3, 3), 0), np.uint8)
+
+
+def plain(grey: int) -> Callable[[int, int, int], Grey]:
+    return lambda _, width, height: np.full((height, width), grey, np.uint8)
+
+
+@pytest.fixture
+def webcam() -> MockCamera:
+    return MockCamera(pictures=lambda _, width, height: drawn(width, height))
+
+
+@pytest.fixture
+def look(machine: Machine, clock: VirtualClock, webcam: MockCamera) -> Callable[..., list[Finding]]:
+    """What is found with the webcam at ``PATH``; other cameras by path, None: the webcam is not plugged in."""
+
+    def find(wanted: Camera = WANTED, **cameras: MockCamera | None) -> list[Finding]:
+        kernel = MockKernel(clock)
+        for path, one in {"video0": webcam, **cameras}.items():
+            if one is not None:
+                kernel.plug(f"/dev/{path}", one)
+
+        def opened(config: Config, clock: Clock) -> V4l2Camera:
+            asked = config.camera
+            settings = {"width": asked.width, "height": asked.height, "fps": asked.fps, "exposure_s": asked.exposure_s}
+            return V4l2Camera(asked.device, pixel_format=asked.format, clock=clock, kernel=kernel, **settings)  # type: ignore[arg-type]
+
+        found = list(camera.check(machine(Config(camera=wanted), kernel=kernel, open_camera=opened)))
+        assert kernel.open_files == 0
+        return found
+
+    return find
+
+
+Look = Callable[..., list[Finding]]
+
+
+def one(findings: list[Finding], level: Level) -> Finding:
+    """The only one that bad, and none is worse."""
+    (found,) = [finding for finding in findings if finding.level is not Level.OK]
+    assert found.level is level, found
+    return found
+
+
+def test_a_good_camera_is_told_with_its_figures(look: Look) -> None:
+    name, rate, light = look()
+    assert {finding.level for finding in (name, rate, light)} == {Level.OK}
+    assert name.text == "/dev/video0: Mock Webcam"
+    assert rate.text.startswith("30.0/s, jitter 0.0 ms, longest gap 33 ms, exposure 25.0 ms")
+    assert "mean grey level 100 of 255" in light.text
+
+
+def test_a_missing_camera_names_those_that_are_there(look: Look) -> None:
+    found = one(look(video0=None, video2=MockCamera(card="HD Webcam")), Level.FAIL)
+    assert found.text == "/dev/video0: no such camera; there is /dev/video2 (HD Webcam)"
+    assert found.remedy.startswith("lcf-edge doctor --set camera.device=/dev/video2 ")
+
+
+def test_no_camera_at_all_asks_what_usb_sees(look: Look) -> None:
+    found = one(look(video0=None), Level.FAIL)
+    assert "ribbon cable" in found.text
+    assert found.remedy.startswith("lsusb")
+
+
+def test_without_permission_the_group_is_named(look: Look, webcam: MockCamera) -> None:
+    webcam.open_error = errno.EACCES
+    found = one(look(), Level.FAIL)
+    assert found.text.startswith("/dev/video0: this user may not open it")
+    assert found.remedy.startswith("sudo usermod -aG video $USER")
+
+
+def test_a_node_without_pictures_is_told(look: Look) -> None:
+    found = one(look(video0=MockCamera(caps=v4l2.CAP_STREAMING), video1=MockCamera()), Level.FAIL)
+    assert "gives no pictures" in found.text
+    assert "camera.device=/dev/video1" in found.remedy
+
+
+def test_a_camera_in_use_names_the_program(look: Look, webcam: MockCamera, process: Callable[..., None]) -> None:
+    process(4711, "/usr/bin/cheese", opened=("/dev/null", PATH))
+    webcam.format_error = errno.EBUSY
+    found = one(look(), Level.FAIL)
+    assert found.text == "/dev/video0: in use by cheese, process 4711"
+    assert found.remedy == "kill 4711"
+
+
+def test_a_program_that_may_not_be_known_is_asked_for(look: Look, webcam: MockCamera) -> None:
+    webcam.format_error = errno.EBUSY
+    assert one(look(), Level.FAIL).remedy == "sudo fuser -v /dev/video0"
+
+
+def test_what_only_looks_at_the_camera_is_no_trouble(look: Look, process: Callable[..., None]) -> None:
+    process(4711, "/usr/bin/wireplumber", opened=(PATH,))
+    assert all(finding.level is Level.OK for finding in look())
+
+
+@pytest.mark.parametrize(
+    ("wanted", "remedy"),
+    [
+        (Camera(), "--set camera.fps=15 "),  # the default rate of 20 is not on offer
+        (Camera(width=640, height=400, fps=30.0), "--set camera.height=480 "),
+        (Camera(width=1280, height=720, fps=30.0, format="YUYV"), "--set camera.format=auto "),
+    ],
+)
+def test_what_is_not_offered_comes_with_the_nearest_that_is(look: Look, wanted: Camera, remedy: str) -> None:
+    found = one(look(wanted), Level.FAIL)
+    assert "offered: " in found.text
+    assert found.remedy.startswith(f"lcf-edge doctor {remedy}")
+
+
+def test_the_remedy_of_a_refused_mode_works(look: Look) -> None:
+    refused = one(look(Camera()), Level.FAIL)
+    fps = float(refused.remedy.partition("camera.fps=")[2].split()[0])
+    assert all(finding.level is Level.OK for finding in look(Camera(fps=fps)))
+
+
+def test_a_silent_camera_fails(look: Look, webcam: MockCamera) -> None:
+    webcam.stalled = True
+    found = one(look(), Level.FAIL)
+    assert "no usable picture" in found.text
+    assert "dmesg" in found.remedy
+
+
+def test_pictures_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> None:
+    whole = itertools.cycle((True, False))
+    webcam.spoil = lambda data: data if next(whole) else data[:9]
+    found = one(look(), Level.WARN)
+    assert found.text.startswith("15.0/s")
+    assert "slower than camera.fps = 30" in found.text
+    assert "; short " in found.text
+    assert "camera.exposure_s=0.0167" in found.remedy
+
+
+def test_an_exposure_longer_than_the_frame_is_why_it_is_slow(look: Look, webcam: MockCamera) -> None:
+    webcam.controls[v4l2.CID_EXPOSURE_ABSOLUTE] = MockControl(500, 3, 2047)
+    assert all(finding.level is Level.OK for finding in look())  # it cannot be: the rate is kept
+    whole = itertools.cycle((True, False))
+    webcam.spoil = lambda data: data if next(whole) else data[:9]
+    found = one(look(), Level.WARN)
+    assert found.text.endswith("slower than camera.fps = 30, its exposure of 50.0 ms is longer than a frame")
+    assert "--set camera.exposure_s=0.0167" in found.remedy
+
+
+def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera) -> None:
+    del webcam.controls[v4l2.CID_EXPOSURE_ABSOLUTE]
+    assert all(finding.level is Level.OK and "exposure" not in finding.text for finding in look())
+
+
+@pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "burnt out")])
+def test_a_picture_without_use_is_told(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
+    webcam.pictures = plain(grey)
+    found = one(look(), Level.WARN)
+    assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")
+
+
+def test_stamps_of_another_clock_are_told(look: Look, webcam: MockCamera) -> None:
+    webcam.stamp_flags = v4l2.FLAG_STAMPED_AT_EXPOSURE
+    assert one(look(), Level.WARN).text.startswith("stamps that cannot be true (stamped at arrival ")
+
+
+def test_a_camera_that_the_daemon_has_is_not_opened_but_asked_for(
+    machine: Machine, clock: VirtualClock, webcam: MockCamera, process: Callable[..., None]
+) -> None:
+    process(7, "/opt/lcf-edge/bin/python", "/opt/lcf-edge/bin/lcf-edge", "run", opened=(PATH,))
+    kernel = MockKernel(clock)
+    kernel.plug(PATH, webcam)
+
+    def untouched(config: Config, clock: Clock) -> V4l2Camera:
+        raise AssertionError(f"opened {config} {clock}")
+
+    context = machine(Config(camera=WANTED), kernel=kernel, open_camera=untouched)
+    _, silent = camera.check(context)
+    assert silent.level is Level.WARN
+    assert silent.remedy.startswith("sudo systemctl stop lcf-edge")
+
+    status = DeviceStatus("camera", StatusLevel.STALE, "silent since then", {"rate_hz": "29.97"})
+    context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"camera": status}, "")
+    _, told = camera.check(context)
+    assert (told.level, told.text) == (Level.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")
