@@ -12,13 +12,24 @@ from lcf_edge.records import Scene
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 
 
+def reading_from(endpoint: str, config_file: str = "") -> config.Zenoh:
+    """The session of somebody who only reads: it waits for a daemon or a router at ``endpoint``.
+
+    It is of mode "router", a leaf since it listens nowhere: a router hands a peer nothing from other peers, and a
+    client cannot wait.
+    """
+    return config.Zenoh(mode="router", connect=[endpoint], listen=[], config_file=config_file)
+
+
 class Scenes(Iterator[Scene]):
     """An iterator over scenes that waits for the next one. Close it, or let it go.
 
-    ``broken`` counts payloads that were no scene; they are skipped.
+    ``key``: of the last scene, which tells the rover where the subscription is to several. ``broken`` counts payloads
+    that were no scene; they are skipped.
     """
 
     def __init__(self, options: config.Zenoh, key: str, kept: int) -> None:
+        self.key = ""
         self.broken = 0
         session = open_session(options)
         self._close = weakref.finalize(self, close_session, session)
@@ -31,12 +42,15 @@ class Scenes(Iterator[Scene]):
     def __next__(self) -> Scene:
         while self._close.alive:
             try:
-                payload = self._subscriber.recv().payload.to_bytes()
-                return decode_scene(payload)
+                sample = self._subscriber.recv()
+                scene = decode_scene(sample.payload.to_bytes())
             except CdrError:
                 self.broken += 1
             except zenoh.ZError:  # closed while it waited
                 break
+            else:
+                self.key = str(sample.key_expr)
+                return scene
         raise StopIteration
 
     def close(self) -> None:
@@ -47,9 +61,9 @@ class Scenes(Iterator[Scene]):
 def scenes(endpoint: str, key: str = "lcf/scene", *, kept: int = 64, config_file: str = "") -> Scenes:
     """Subscribe to a running pipeline: yields each scene until interrupted.
 
-    Connects to ``endpoint`` (for example ``tcp/127.0.0.1:7447``) now or as soon as somebody listens there, and again
+    Connects to ``endpoint``, a daemon or a router (``tcp/127.0.0.1:7447``), now or as soon as it listens, and again
     when the connection was lost. Of scenes not yet asked for the newest ``kept`` wait; what is no scene is skipped and
     counted. ``config_file``: a Zenoh configuration (JSON5), for TLS. Raises ``PublishError`` for a bad endpoint, key
     or file.
     """
-    return Scenes(config.Zenoh(connect=[endpoint], listen=[], config_file=config_file), key, kept)
+    return Scenes(reading_from(endpoint, config_file), key, kept)

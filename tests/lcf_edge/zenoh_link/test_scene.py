@@ -63,9 +63,11 @@ def samples(session: zenoh.Session, peer: Any, publish: Publish, scenes: list[Sc
     peer.subscribe("**")
     publisher = ScenePublisher(session, publish)
     assert publisher.wait_for_subscriber(PATIENCE_S)
-    for one in scenes:
+    received = []
+    for one in scenes:  # one by one: on a busy machine a few at once are too many, and dropped
         publisher.put(one)
-    return list(peer.receive("**", len(scenes)))
+        received += peer.receive("**")
+    return received
 
 
 def test_the_payload_is_the_scene(session: zenoh.Session, peer: Any, scene: NewScene) -> None:
