@@ -1,0 +1,75 @@
+"""Camera and IMU watched together: what turns and samples they give, for ``by_camera`` and ``time_offset``."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.records import Frame, ImuSample
+from lcf_edge.calibrate.guide import Guide
+from lcf_edge.calibrate.image_rotation import Turn, turn
+from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.tracks import Tracker
+from lcf_edge.config import Config
+from lcf_edge.lens import Lens
+
+LIVE_S = 20.0
+
+_BRISK_RADPS = 0.15
+
+
+@dataclass
+class Watched:
+    """``guessed``: nobody knows the lens, it is taken from the field of view."""
+
+    turns: list[Turn] = field(default_factory=list)
+    samples: list[ImuSample] = field(default_factory=list)
+    guessed: bool = False
+    brisk_s: float = 0.0  # of turning
+
+    def add(self, turned: Turn) -> None:
+        """One interval."""
+        self.turns.append(turned)
+        if np.hypot(*turned.rate_radps[:2]) > _BRISK_RADPS:
+            self.brisk_s += (turned.end_ns - turned.start_ns) * 1e-9
+
+
+def watch(source: Source, config: Config, seconds: float | None, guide: Guide) -> Watched:
+    """Everything from ``source``; live for ``seconds``, 20 unless given. Raises what the source raises."""
+    if source.live:
+        seconds = seconds or LIVE_S
+        guide.say(
+            f"Turn it in place for {seconds:g} s: to and fro, nod, tilt, briskly and unevenly, before something still "
+            "that is some metres away."
+        )
+    seen, tracker = Watched(), None
+    for item in for_a_while(source.items(), seconds, Frame):
+        if isinstance(item, ImuSample):
+            seen.samples.append(item)
+            continue
+        if tracker is None:
+            lens, seen.guessed = lens_of(source, config, item)
+            tracker = Tracker(lens)
+        tracks = tracker.add(item)
+        if tracks is not None:
+            seen.add(turn(tracks, travel(config)))
+        guide.progress(
+            f"{len(seen.turns)} pictures, {len(seen.samples)} samples, {seen.brisk_s:.0f} s of brisk turning"
+        )
+    guide.end()
+    if tracker is not None:
+        for reason, count in tracker.left_out.items():
+            guide.say(f"left out: {count} intervals, {reason}")
+    return seen
+
+
+def lens_of(source: Source, config: Config, frame: Frame) -> tuple[Lens, bool]:
+    """The lens for ``frame``, and whether it is only guessed."""
+    height, width = frame.image.shape
+    lens = source.lens(width, height)
+    return (lens, False) if lens else (Lens.from_config(config.camera, width, height), True)
+
+
+def travel(config: Config) -> npt.NDArray[np.float64]:
+    """The direction of travel in camera axes, by the configured mounting."""
+    return np.array([-np.tan(config.camera.yaw_rad), np.tan(config.camera.pitch_rad), 1.0])

@@ -1,0 +1,26 @@
+"""What a calibration answers with, and how it refuses."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from lcf_edge.errors import LcfError
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Value = str | int | float | list[float] | list[list[float]]
+
+
+class CalibrationError(LcfError):
+    """Data that do not tell what is asked of them; the text says why and what to do."""
+
+
+@dataclass(frozen=True)
+class Result:
+    """``findings``: lines that tell whether to believe it; ``values``: keys of one ``table`` of the configuration."""
+
+    findings: tuple[str, ...]
+    table: str
+    values: Mapping[str, Value]
+    paint: "Callable[[Figure], None]"  # draws the report

@@ -1,0 +1,105 @@
+"""Corners followed from picture to picture (Shi & Tomasi; pyramidal Lucas-Kanade, there and back again)."""
+
+from collections import Counter
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from drivers.records import Frame
+from lcf_edge.lens import Lens
+
+Floats = npt.NDArray[np.float64]
+Pixels = npt.NDArray[np.float32]
+
+_CORNERS = 400
+_LEAST_TRACKS = 25
+_LEAST_CORNER_PX = 8.0
+_THERE_AND_BACK_PX = 0.7
+_WINDOW_PX = (21, 21)
+_LEVELS = 4
+_LONGEST_S = 0.5  # between two pictures
+
+
+@dataclass(frozen=True)
+class Tracks:
+    """Where corners were and are: x/z, y/z of the ideal pinhole, (n, 2) each."""
+
+    start_ns: int
+    end_ns: int
+    before: Floats
+    after: Floats
+
+    @property
+    def dt_s(self) -> float:
+        """Between the two pictures."""
+        return (self.end_ns - self.start_ns) * 1e-9
+
+
+class Tracker:
+    """Follows corners; ``left_out`` counts intervals that gave none, by reason.
+
+    The next interval begins when the median corner has moved ``least_motion_px``, after ``most_frames`` pictures at
+    the latest.
+    """
+
+    def __init__(self, lens: Lens, least_motion_px: float = 0.0, most_frames: int = 1) -> None:
+        self.left_out: Counter[str] = Counter()
+        self._lens = lens
+        self._least_motion_px, self._most_frames = least_motion_px, most_frames
+        self._first: Frame | None = None
+        self._last: Frame | None = None
+        self._start = self._now = np.empty((0, 2), np.float32)
+        self._frames = 0
+
+    def add(self, frame: Frame) -> Tracks | None:
+        """Follow into ``frame``; answers with the interval that ends here, if one does."""
+        last, self._last = self._last, frame
+        if self._first is None or last is None:
+            self._begin(frame)
+            return None
+        dt_s = (frame.stamp_ns - last.stamp_ns) * 1e-9
+        if not 0 < dt_s <= _LONGEST_S:
+            self.left_out["pictures too far apart"] += 1
+            self._begin(frame)
+            return None
+        self._follow(last, frame)
+        self._frames += 1
+        if len(self._now) < _LEAST_TRACKS:
+            self.left_out["too few corners"] += 1
+            self._begin(frame)
+            return None
+        moved_px = float(np.median(np.hypot(*(self._now - self._start).T)))
+        if moved_px < self._least_motion_px and self._frames < self._most_frames:
+            return None
+        tracks = Tracks(self._first.stamp_ns, frame.stamp_ns, *self._rays(self._start, self._now))
+        self._begin(frame)
+        return tracks
+
+    def _begin(self, frame: Frame) -> None:
+        self._first, self._frames = frame, 0
+        found = np.asarray(cv2.goodFeaturesToTrack(frame.image, _CORNERS, 0.01, _LEAST_CORNER_PX))
+        self._start = self._now = (found if found.ndim == 3 else np.empty(0)).astype(np.float32).reshape(-1, 2)
+
+    def _follow(self, last: Frame, frame: Frame) -> None:
+        if not len(self._now):
+            return
+        there, found, _ = cv2.calcOpticalFlowPyrLK(
+            last.image, frame.image, self._now, np.empty(0), winSize=_WINDOW_PX, maxLevel=_LEVELS
+        )
+        back, found_back, _ = cv2.calcOpticalFlowPyrLK(
+            frame.image, last.image, there, np.empty(0), winSize=_WINDOW_PX, maxLevel=_LEVELS
+        )
+        good = (found.ravel() == 1) & (found_back.ravel() == 1)
+        good &= np.hypot(*(back - self._now).T) < _THERE_AND_BACK_PX
+        self._start, self._now = self._start[good], np.asarray(there[good], np.float32)
+
+    def _rays(self, before: Pixels, after: Pixels) -> tuple[Floats, Floats]:
+        lens = self._lens
+        one, two = (
+            (lens.undistort(points).astype(np.float64) - (lens.cx, lens.cy)) / (lens.fx, lens.fy)
+            for points in (before, after)
+        )
+        seen = np.isfinite(one).all(axis=1) & np.isfinite(two).all(axis=1)
+        return one[seen], two[seen]

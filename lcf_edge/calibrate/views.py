@@ -1,0 +1,114 @@
+"""Which pictures of a board are worth keeping, and where it should be held next."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from drivers.records import Frame
+from lcf_edge.calibrate.board import Board, Sighting
+
+Floats = npt.NDArray[np.float64]
+
+CELLS = (8, 6)  # across and down, of the coverage
+
+_LARGEST_EDGE_PX = 5.0
+_LARGEST_MOTION_PX = 1.0  # between two pictures of a film
+_LONGEST_INTERVAL_S = 1.0  # finding a board takes a small computer most of that
+_LEAST_NEWS = 0.08  # of the picture's width, that the board's corners are from where they were in any other view
+_LEAST_NEWS_OF_PICTURES = 0.01  # somebody chose these
+_SIDES = (("upper", "middle", "lower"), ("left", "middle", "right"))
+_TILTED = 1.12  # ratio of opposite sides
+_WANTED_TILTED = 0.5  # share of the views
+
+
+@dataclass
+class Views:
+    """Sightings of a board in pictures of one size; ``left_out`` counts the others by reason.
+
+    ``film``: pictures follow each other closely, so that a board in motion is seen to move.
+    """
+
+    board: Board
+    film: bool
+    kept: list[Sighting] = field(default_factory=list)
+    left_out: Counter[str] = field(default_factory=Counter)
+    size: tuple[int, int] = (0, 0)  # width and height, px
+    _outlines: list[Floats] = field(default_factory=list)
+    _before: tuple[int, Sighting] | None = None
+
+    def consider(self, frame: Frame) -> str:
+        """Keep the board in ``frame``, or answer with the reason why not; "" when it is kept."""
+        self.size = frame.image.shape[1], frame.image.shape[0]
+        seen = self.board.find(frame.image)
+        before, self._before = self._before, None if seen is None else (frame.stamp_ns, seen)
+        reason = "no board" if seen is None else self._flaw(seen, before, frame.stamp_ns)
+        if reason:
+            self.left_out[reason] += 1
+        return reason
+
+    def _flaw(self, seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> str:
+        if seen.edge_px > _LARGEST_EDGE_PX:
+            return "blurred"
+        if self.film and not _stands(seen, before, stamp_ns):
+            return "moving"
+        outline = self._outline(seen)
+        if outline is None:
+            return "too few corners"
+        news = min((np.hypot(*(outline - other).T).mean() for other in self._outlines), default=np.inf)
+        if news < (_LEAST_NEWS if self.film else _LEAST_NEWS_OF_PICTURES) * self.size[0]:
+            return "seen like this before"
+        self.kept.append(seen)
+        self._outlines.append(outline)
+        return ""
+
+    def covered(self) -> npt.NDArray[np.bool_]:
+        """(down, across) cells of the picture in which a corner was seen."""
+        seen = np.zeros(CELLS[::-1], np.bool_)
+        for view in self.kept:
+            column, row = (np.clip(view.corners / self.size, 0, 0.999) * CELLS).astype(int).T
+            seen[row, column] = True
+        return seen
+
+    def wish(self) -> str:
+        """What the next view should be like."""
+        tilted = sum(_foreshortening(outline) > _TILTED for outline in self._outlines)
+        if len(self.kept) >= 4 and tilted < _WANTED_TILTED * len(self.kept):
+            return "tilt it, by 30 to 45°, another way than before"
+        held = np.zeros((3, 3), int)
+        for view in self.kept:
+            column, row = np.clip(view.corners.mean(axis=0) / self.size * 3, 0, 2.999).astype(int)
+            held[row, column] += 1
+        held[1, 1] += 1  # the middle comes by itself
+        row, column = np.unravel_index(np.argmin(held), held.shape)
+        where = f"{_SIDES[0][row]} {_SIDES[1][column]}".replace("middle middle", "middle")
+        return f"hold it in the {where} of the picture, so near that it fills a third of it"
+
+    def _outline(self, seen: Sighting) -> Floats | None:
+        """(4, 2) where the board's outer corners are, or would be; None: too few to tell."""
+        places = self.board.places[:, :2]
+        homography = np.asarray(cv2.findHomography(places[seen.numbers], seen.corners)[0])
+        if homography.shape != (3, 3):
+            return None
+        (left, top), (right, bottom) = places.min(axis=0), places.max(axis=0)
+        outer = np.array([[[left, top], [right, top], [right, bottom], [left, bottom]]], np.float64)
+        outline = np.asarray(cv2.perspectiveTransform(outer, homography)[0], np.float64)
+        return outline if np.abs(outline).max() < 10 * max(self.size) else None
+
+
+def _stands(seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
+    """Whether the corners are where they were in the picture before."""
+    if before is None or stamp_ns - before[0] > _LONGEST_INTERVAL_S * 1e9:
+        return False
+    _, now, then = np.intersect1d(seen.numbers, before[1].numbers, return_indices=True)
+    moved = seen.corners[now] - before[1].corners[then]
+    return bool(len(moved)) and float(np.median(np.hypot(*moved.T))) < _LARGEST_MOTION_PX
+
+
+def _foreshortening(outline: Floats) -> float:
+    """Ratio of opposite sides, the larger by the smaller."""
+    sides = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
+    ratio = np.maximum(sides[:2], sides[2:]) / np.maximum(np.minimum(sides[:2], sides[2:]), 1e-6)
+    return float(ratio.max())
