@@ -17,8 +17,6 @@ from lcf_edge.errors import ConfigError
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 LARGEST_FILE_BYTES = 2**20
-IN_RECORDING = "lcf-edge.toml"
-"""Name of the attachment of a recording that holds the configuration with which it was made."""
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -269,7 +267,7 @@ def _start_of(path: Path) -> bytes:
 
 
 def _attached(path: Path) -> bytes:
-    from lcf_edge.recordings.attachment import attached_configuration  # noqa: PLC0415  # a vehicle reads none
+    from lcf_edge.recorded_config import attached_configuration  # noqa: PLC0415  # a vehicle reads none
 
     return attached_configuration(path)
 

@@ -16,10 +16,10 @@ from lcf_edge.daemon.degrade import Degradation
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.mailbox import Newest, SampleRing
-from lcf_edge.daemon.meters import DurationHistogram
 from lcf_edge.daemon.preview import Previewer
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
 from lcf_edge.lens import Lens
+from lcf_edge.meters import DurationHistogram
 from lcf_edge.pipeline import Outcome, Pipeline
 from lcf_edge.recorder.messages import Seen
 from lcf_edge.records import Scene

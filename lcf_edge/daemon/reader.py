@@ -11,7 +11,7 @@ from drivers.errors import DriverError
 from lcf_edge.daemon.clock import StoppableClock
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.mailbox import Stamped
-from lcf_edge.daemon.meters import IntervalMeter
+from lcf_edge.meters import IntervalMeter
 
 Record = TypeVar("Record", bound=Stamped)
 

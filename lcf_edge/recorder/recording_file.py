@@ -8,7 +8,7 @@ from mcap.writer import CompressionType, Writer
 
 from lcf_edge import __version__
 from lcf_edge.cdr import restamped
-from lcf_edge.config import IN_RECORDING
+from lcf_edge.recorded_config import IN_RECORDING
 from lcf_edge.recorder.messages import TOPICS, Message
 from lcf_edge.recorder.schemas import ENCODING, schema
 

@@ -45,13 +45,13 @@ class Rover:
     """Publishes a frame each ``FRAME_S`` and its health with each, as long as it is there.
 
     ``circles``, ``status``, ``silent`` (no scenes) may be changed meanwhile. ``unseen``: frames since a preview was
-    wanted.
+    wanted; ``seq``: of the newest scene.
     """
 
     def __init__(self, endpoint: str) -> None:
         self.endpoint = endpoint
         self.circles, self.status, self.silent = CIRCLES, STATUS, False
-        self.previews = self.unseen = 0
+        self.previews = self.unseen = self.seq = 0
         self._changed = threading.Condition()
         self._leaves = threading.Event()
         self.come()
@@ -75,12 +75,11 @@ class Rover:
             assert self._changed.wait_for(lambda: bool(happened()), PATIENCE_S)
 
     def _publish(self) -> None:
-        seq = 0
         while not self._leaves.wait(FRAME_S):
             stamp_ns = time.time_ns() - 3_000_000
             if not self.silent:
-                seq += 1
-                self.link.put_scene(Scene(stamp_ns, seq, 320, 240, 1.5, self.circles, PSI))
+                self.seq += 1
+                self.link.put_scene(Scene(stamp_ns, self.seq, 320, 240, 1.5, self.circles, PSI))
             self.link.put_diagnostics(self.status, stamp_ns)
             self.unseen += 1
             if self.link.preview_wanted():

@@ -7,8 +7,10 @@ from mcap.exceptions import McapError
 from mcap.records import Attachment, Chunk
 from mcap.stream_reader import StreamReader
 
-from lcf_edge.config import IN_RECORDING
 from lcf_edge.errors import ConfigError
+
+IN_RECORDING = "lcf-edge.toml"
+"""Name of the attachment."""
 
 _LARGEST_BYTES = 2**24
 

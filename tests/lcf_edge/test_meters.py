@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.daemon.meters import DurationHistogram, IntervalMeter
+from lcf_edge.meters import DurationHistogram, IntervalMeter
 
 
 def test_rate_and_jitter_are_those_of_the_stamps() -> None:
