@@ -1,4 +1,4 @@
-"""The command line: reads arguments, runs a command, prints; every error is one line on standard error.
+"""The command line: runs a command with what ``arguments`` read, prints; every error is one line on standard error.
 
 Exit status: 0 done, 1 failed at run time, 2 wrong usage or configuration, 130 interrupted, 141 the reader
 of the output went away. What a command needs is imported when it runs, so that ``--help`` is quick.
@@ -6,27 +6,19 @@ of the output went away. What a command needs is imported when it runs, so that 
 
 import argparse
 import io
-import math
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, NoReturn
+from typing import TYPE_CHECKING
 
-from lcf_edge import __version__
-from lcf_edge.errors import LcfError, UsageError
+from lcf_edge.arguments import parser
+from lcf_edge.errors import LcfError
 
 if TYPE_CHECKING:
+    from lcf_edge.commands.calibrate import Task
     from lcf_edge.config import Config
-
-_LONGEST_DEMO_S = 120.0
-
-
-class _Parser(argparse.ArgumentParser):
-    """Wrong usage is a ``UsageError``, one line like every other."""
-
-    def error(self, message: str) -> NoReturn:
-        raise UsageError(f"{message}; see {self.prog} --help")
+    from lcf_edge.live.source import Source
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -38,8 +30,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         sys.stdout.reconfigure(errors="backslashreplace")  # where there are no Greek letters
     try:
         try:
-            arguments = _parser().parse_args(argv)
-            arguments.run(arguments)
+            arguments = parser().parse_args(argv)
+            _COMMANDS[arguments.command](arguments)
         finally:
             _tell()  # also what argparse printed
     except LcfError as error:
@@ -51,63 +43,6 @@ def main(argv: Sequence[str] | None = None) -> int:
         _abandon_stdout()
         return 141
     return 0
-
-
-def _parser() -> argparse.ArgumentParser:
-    parser = _Parser(
-        prog="lcf-edge",
-        allow_abbrev=False,
-        description="The Line-Circle filter: camera and IMU in, circles and psi regions out over Zenoh.",
-    )
-    parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
-
-    settings = _Parser(add_help=False)
-    settings.add_argument("-c", "--config", type=Path, metavar="FILE", help="configuration, TOML")
-    settings.add_argument(
-        "--set",
-        action="append",
-        default=[],
-        metavar="KEY=VALUE",
-        help="set one key, as in vehicle.half_width_m=0.6",
-    )
-
-    demo = commands.add_parser("demo", allow_abbrev=False, help="see the filter work on a drive that it renders itself")
-    demo.add_argument("--out", type=Path, default=Path("demo-out"), metavar="DIR", help="where to write (%(default)s)")
-    demo.add_argument("--seconds", type=_demo_seconds, default=10.0, metavar="N", help="length of the drive (10)")
-    demo.set_defaults(run=_demo)
-
-    replay = commands.add_parser(
-        "replay", allow_abbrev=False, parents=[settings], help="run the filter over a recording"
-    )
-    replay.add_argument("recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or pictures")
-    replay.add_argument("-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output")
-    replay.add_argument("--video", type=Path, metavar="FILE.mp4", help="what the filter saw, two panels")
-    replay.add_argument("--plot", type=Path, metavar="FILE.png", help="rows in use of each table")
-    replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
-    replay.add_argument("--realtime", action="store_true", help="as slow as the recording was made")
-    replay.set_defaults(run=_replay)
-
-    run = commands.add_parser(
-        "run", allow_abbrev=False, parents=[settings], help="the daemon: camera and IMU in, scenes out over Zenoh"
-    )
-    run.set_defaults(run=_run)
-
-    config = commands.add_parser(
-        "config", allow_abbrev=False, parents=[settings], help="check and print the effective configuration"
-    )
-    config.set_defaults(run=_config)
-    return parser
-
-
-def _demo_seconds(text: str) -> float:
-    try:
-        seconds = float(text)
-    except ValueError:
-        seconds = math.nan
-    if not 1.0 <= seconds <= _LONGEST_DEMO_S:  # NaN neither
-        raise argparse.ArgumentTypeError(f"{text}: write a number between 1 and {_LONGEST_DEMO_S:.0f}")
-    return seconds
 
 
 def _load(arguments: argparse.Namespace) -> "Config":
@@ -123,10 +58,41 @@ def _config(arguments: argparse.Namespace) -> None:
     _tell(report(config))
 
 
+def _doctor(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.doctor import doctor  # noqa: PLC0415
+
+    doctor(arguments.config, arguments.set, as_json=arguments.json, tell=_tell)
+
+
 def _run(arguments: argparse.Namespace) -> None:
     from lcf_edge.commands.run import run  # noqa: PLC0415
 
     run(arguments.config, arguments.set)
+
+
+def _record(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.record import record  # noqa: PLC0415
+
+    _tell(record(arguments.file, arguments.seconds, arguments.config, arguments.set))
+
+
+def _source(arguments: argparse.Namespace) -> "Source":
+    from lcf_edge.live.source import Source  # noqa: PLC0415
+
+    return Source(arguments.connect, arguments.prefix, arguments.zenoh_config)
+
+
+def _watch(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.watch import watch_lines, watch_table  # noqa: PLC0415
+
+    watch = watch_lines if arguments.json else watch_table
+    watch(_source(arguments), _tell)
+
+
+def _view(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.view import view  # noqa: PLC0415
+
+    view(_source(arguments), arguments.listen, arguments.port, _tell)
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -141,10 +107,58 @@ def _replay(arguments: argparse.Namespace) -> None:
         _tell(*summary)
 
 
+def _task(arguments: argparse.Namespace) -> "Task":
+    from lcf_edge.commands.calibrate import Task  # noqa: PLC0415
+
+    return Task(
+        _load(arguments),
+        arguments.config,
+        arguments.recording,
+        arguments.report,
+        arguments.write,
+        getattr(arguments, "seconds", None),
+    )
+
+
+def _calibrate(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands import calibrate  # noqa: PLC0415
+
+    if arguments.what == "camera" and arguments.print_board:
+        _tell(*calibrate.print_board(arguments.board, arguments.print_board))
+        return
+    task = _task(arguments)
+    match arguments.what:
+        case "camera":
+            _tell(*calibrate.camera(task, arguments.board, arguments.model, arguments.views))
+        case "imu" if arguments.at_rest:
+            _tell(*calibrate.imu_at_rest(task))
+        case "imu" if arguments.by_camera:
+            _tell(*calibrate.imu_by_camera(task, arguments.snap))
+        case "imu":
+            _tell(*calibrate.imu_by_motions(task, arguments.snap))
+        case "foe":
+            _tell(*calibrate.foe(task))
+        case "time":
+            _tell(*calibrate.time(task))
+
+
 def _demo(arguments: argparse.Namespace) -> None:
     from lcf_edge.commands.demo import demo  # noqa: PLC0415
 
     demo(arguments.out, arguments.seconds, _tell)
+
+
+_COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
+    "demo": _demo,
+    "replay": _replay,
+    "run": _run,
+    "record": _record,
+    "watch": _watch,
+    "view": _view,
+    "doctor": _doctor,
+    "calibrate": _calibrate,
+    "config": _config,
+}
 
 
 def _say(text: str) -> None:

@@ -77,7 +77,7 @@ def test_what_it_prints_is_toml_and_what_it_writes_is_used(
         (["imu", "--at-rest"], "it moved while it should rest", 1),
         (["camera", "--board", "chess"], "--board chess: write it as", 2),
         (["camera", "--views", "3"], "write a number between 8 and 100", 2),
-        (["imu", "--snap", "90"], "write degrees between 0 and 45", 2),
+        (["imu", "--snap", "90"], "write a number between 0 and 45", 2),
         (["time", "--write", "-c", "missing.toml"], "missing.toml: cannot be read", 2),
         (["time", "--report", "report.txt"], "report.txt: the name must end in .png", 2),
         (["imu", "--at-rest", "--by-camera"], "not allowed with", 2),

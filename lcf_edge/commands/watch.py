@@ -1,0 +1,53 @@
+"""``lcf-edge watch``: what a running daemon sees, in a terminal or line by line."""
+# ruff: noqa: PLC0415
+
+import time
+from collections.abc import Callable
+from contextlib import closing, suppress
+
+import msgspec
+
+from lcf_edge.errors import LcfError
+from lcf_edge.live.lines import scene_fields
+from lcf_edge.live.source import Source
+from lcf_edge.zenoh_link.scene import scene_key
+from lcf_edge.zenoh_link.subscription import scenes
+
+PLAIN_INTERVAL_S = 1.0
+PLAIN_LINES = 100
+
+
+def watch_lines(source: Source, tell: Callable[[str], None]) -> None:
+    """One JSON object a scene, until interrupted. Raises ``PublishError``."""
+    with closing(scenes(source.endpoint, scene_key(source.prefix), config_file=source.config_file)) as arriving:
+        for scene in arriving:
+            tell(msgspec.json.encode(scene_fields(scene)).decode())
+
+
+def watch_table(source: Source, tell: Callable[[str], None]) -> None:
+    """The table, until q is pressed or Ctrl-C; where standard output is no terminal, plain text for ``tell``.
+
+    Raises ``PublishError``, and ``LcfError`` without the extra ``watch``.
+    """
+    try:
+        from rich.console import Console
+    except ImportError as error:
+        raise LcfError("watch: rich is missing; run pip install 'lcf-edge[watch]', or use --json") from error
+    from lcf_edge.live.monitor import Monitor
+    from lcf_edge.watch.screen import Screen
+    from lcf_edge.watch.terminal import show
+
+    console = Console(highlight=False, markup=False, emoji=False)
+    with closing(Monitor(source)) as monitor, suppress(KeyboardInterrupt):
+
+        def screen() -> Screen:
+            return Screen(monitor.snapshot(), source.endpoint, time.time_ns())
+
+        if console.is_terminal and not console.is_dumb_terminal:
+            show(console, screen)
+            return
+        while True:
+            with console.capture() as text:
+                console.print(screen(), height=PLAIN_LINES)
+            tell(text.get())
+            time.sleep(PLAIN_INTERVAL_S)
