@@ -1,0 +1,96 @@
+"""Who may look: this machine alone, or who knows the token.
+
+On loopback every request must name a loopback host, so that no page of the internet can point a name of its own here
+(DNS rebinding). Opened to the network, a request must bring the token instead, which no such page knows. In both cases
+the Origin of a request, where there is one, must be the page's own.
+"""
+
+import hmac
+import ipaddress
+import secrets
+from collections.abc import Awaitable, Callable
+from urllib.parse import urlsplit
+
+from aiohttp import web
+
+TOKEN = "token"
+_LOOPBACK_NAMES = frozenset({"localhost", "ip6-localhost"})
+_HEADERS = {
+    "Content-Security-Policy": (
+        "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self'; connect-src 'self'; "
+        "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+    ),
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+    "X-Frame-Options": "DENY",
+    "Cache-Control": "no-store",
+    "Server": "lcf-edge",
+}
+
+Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
+
+
+class Guard:
+    """Lets requests through or refuses them. ``token``: None where only loopback is listened on."""
+
+    def __init__(self, host: str) -> None:
+        self.token = None if is_loopback(host) else secrets.token_urlsafe(24)
+
+    def protect(self, application: web.Application) -> None:
+        """Stand before all that ``application`` answers."""
+
+        @web.middleware
+        async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
+            return self._refusal(request) or self._welcome(request) or await handler(request)
+
+        application.middlewares.append(guarded)
+        application.on_response_prepare.append(_add_headers)
+
+    def _refusal(self, request: web.Request) -> web.Response | None:
+        """The answer to who may not look."""
+        if self.token is None and not is_loopback(_name(request.host)):
+            return web.Response(status=403, text=f"{request.host} is not this machine; use http://127.0.0.1\n")
+        if request.headers.get("Origin", f"//{request.host}").partition("//")[2] != request.host:
+            return web.Response(status=403, text="another page may not look\n")
+        if self.token is None:
+            return None
+        brought = request.query.get(TOKEN) or request.cookies.get(_cookie(request), "")
+        if not hmac.compare_digest(brought.encode(errors="replace"), self.token.encode()):
+            return web.Response(status=403, text="open the address that lcf-edge view printed when it started\n")
+        return None
+
+    def _welcome(self, request: web.Request) -> web.Response | None:
+        """Put the token of the address into a cookie, and out of sight."""
+        if self.token is None or TOKEN not in request.query or request.path != "/":
+            return None
+        response = web.Response(status=303, headers={"Location": "/"})
+        response.set_cookie(_cookie(request), self.token, httponly=True, samesite="Strict")
+        return response
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can be meant."""
+    try:
+        return ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return host.lower() in _LOOPBACK_NAMES
+
+
+def _cookie(request: web.Request) -> str:
+    """One for each port: cookies know no ports."""
+    place = request.transport.get_extra_info("sockname") if request.transport else None
+    return f"lcf_edge_view_{place[1] if place else 0}"
+
+
+def _name(host: str) -> str:
+    """Without the port; empty: it is no name."""
+    try:
+        return urlsplit(f"//{host}").hostname or ""
+    except ValueError:
+        return ""
+
+
+async def _add_headers(_: web.Request, response: web.StreamResponse) -> None:
+    response.headers.update(_HEADERS)

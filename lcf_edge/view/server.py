@@ -1,0 +1,202 @@
+"""Answers browsers: the page, the updates over a WebSocket, the file of the last seconds.
+
+A browser asks for each update when it has drawn the last one. So a slow one gets fewer, newer updates and nothing
+waits for it here; one that does not ask for ``SILENCE_S`` is let go. Pictures are subscribed to only while somebody
+looks.
+"""
+
+import asyncio
+import logging
+import signal
+import socket
+import time
+from collections.abc import Awaitable, Callable
+from contextlib import suppress
+from datetime import UTC, datetime
+from importlib.resources import files
+
+from aiohttp import WSMsgType, web
+from aiohttp.http_exceptions import HttpProcessingError
+
+from lcf_edge.errors import LcfError
+from lcf_edge.live.history import History
+from lcf_edge.live.monitor import Monitor
+from lcf_edge.live.source import Source
+from lcf_edge.view.guard import TOKEN, Guard
+from lcf_edge.view.saving import mcap_parts
+from lcf_edge.view.update import Audience
+
+INTERVAL_S = 0.1  # between two updates for one browser
+PULSE_S = 1.0  # an update comes, even with nothing new
+SILENCE_S = 10.0
+MOST_BROWSERS = 16
+
+PAGE = {
+    "index.html": "text/html",
+    "page.css": "text/css",
+    "page.js": "text/javascript",
+    "picture.js": "text/javascript",
+    "tables.js": "text/javascript",
+    "traces.js": "text/javascript",
+    "icon.svg": "image/svg+xml",
+}
+
+
+async def serve(source: Source, host: str, port: int, tell: Callable[[str], None]) -> None:
+    """Serve until SIGINT or SIGTERM; ``tell`` hears the address. Raises ``PublishError``, ``LcfError``."""
+    logging.getLogger("aiohttp").addHandler(_OneLine())
+    ended = asyncio.Event()
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, ended.set)
+    guard = Guard(host)
+    server = Server(source)
+    runner = web.AppRunner(server.application(guard), access_log=None, handle_signals=False, shutdown_timeout=1.0)
+    try:
+        await runner.setup()
+        try:
+            await web.TCPSite(runner, host, port).start()
+        except (OSError, OverflowError) as error:
+            raise LcfError(_cannot_listen(error, host, port)) from error
+        tell(f"open {_address(host, runner.addresses[0][1], guard.token)} (Ctrl-C ends)")
+        await ended.wait()
+    finally:
+        await runner.cleanup()
+        server.close()
+
+
+class Server:
+    """What is served, of one daemon."""
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self._history = History()
+        self._loop = asyncio.get_running_loop()
+        self._came = asyncio.Event()
+        self._sockets: set[web.WebSocketResponse] = set()
+        self._wanting = asyncio.Lock()
+        self._monitor = Monitor(source, history=self._history, changed=self._changed)
+
+    def application(self, guard: Guard) -> web.Application:
+        """All that it answers."""
+        application = web.Application()
+        guard.protect(application)
+        for name, kind in PAGE.items():
+            path = "/" if name == "index.html" else f"/{name}"
+            application.router.add_get(path, _sent(name, kind))
+        application.router.add_get("/updates", self._updates)
+        application.router.add_get("/save", self._save)
+        application.on_shutdown.append(self._let_go)
+        return application
+
+    def close(self) -> None:
+        """Unsubscribe."""
+        self._monitor.close()
+
+    def _changed(self) -> None:
+        """In Zenoh's threads."""
+        with suppress(RuntimeError):  # the loop has ended
+            self._loop.call_soon_threadsafe(self._came.set)
+
+    async def _updates(self, request: web.Request) -> web.StreamResponse:
+        if len(self._sockets) >= MOST_BROWSERS:
+            raise web.HTTPServiceUnavailable(text=f"{MOST_BROWSERS} browsers look already\n")
+        browser = web.WebSocketResponse(max_msg_size=64, compress=False, timeout=1.0)
+        await browser.prepare(request)
+        self._sockets.add(browser)
+        await self._want_preview()
+        try:
+            await self._tell(browser)
+        except (TimeoutError, ConnectionError):  # it does not ask any more; it is gone
+            pass
+        finally:
+            self._sockets.discard(browser)
+            await self._want_preview()
+            await browser.close()
+        return browser
+
+    async def _tell(self, browser: web.WebSocketResponse) -> None:
+        audience, last_s = Audience(), -INTERVAL_S
+        while (await browser.receive(SILENCE_S)).type is WSMsgType.TEXT:
+            await asyncio.sleep(last_s + INTERVAL_S - time.monotonic())
+            if self._monitor.snapshot().version == audience.told_version:
+                self._came.clear()
+                with suppress(TimeoutError):
+                    await asyncio.wait_for(self._came.wait(), PULSE_S)
+            last_s = time.monotonic()
+            for part in audience.update(self._monitor, self._source.endpoint):
+                await (browser.send_str(part) if isinstance(part, str) else browser.send_bytes(part))
+
+    async def _want_preview(self) -> None:
+        async with self._wanting:
+            await asyncio.to_thread(self._monitor.want_preview, bool(self._sockets))
+
+    async def _save(self, request: web.Request) -> web.StreamResponse:
+        now_ns = time.time_ns()
+        messages = self._history.messages(now_ns)
+        if not messages:
+            raise web.HTTPNotFound(text="nothing came in the last seconds: there is nothing to save\n")
+        name = f"lcf-edge-{datetime.fromtimestamp(now_ns / 1e9, UTC):%Y%m%dT%H%M%SZ}.mcap"
+        response = web.StreamResponse(
+            headers={
+                "Content-Disposition": f'attachment; filename="{name}"',
+                "Content-Type": "application/octet-stream",
+            }
+        )
+        await response.prepare(request)
+        for part in mcap_parts(messages, self._source.prefix):
+            await response.write(part)
+        await response.write_eof()
+        return response
+
+    async def _let_go(self, _: web.Application) -> None:
+        for browser in [*self._sockets]:
+            await browser.close(code=1001, message=b"lcf-edge view ends")
+
+
+def _sent(name: str, kind: str) -> Callable[[web.Request], Awaitable[web.Response]]:
+    """Answers with a file of the page."""
+    body = (files("lcf_edge.view") / "page" / name).read_bytes()
+
+    async def send(_: web.Request) -> web.Response:
+        return web.Response(body=body, content_type=kind, charset="utf-8")
+
+    return send
+
+
+def _address(host: str, port: int, token: str | None) -> str:
+    if token is None:
+        return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+    return f"http://{_own_address(host)}:{port}/?{TOKEN}={token}"
+
+
+def _own_address(host: str) -> str:
+    """By which other machines reach this one, as far as it knows; nothing is sent."""
+    if host not in {"0.0.0.0", "::", ""}:
+        return f"[{host}]" if ":" in host else host
+    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.connect(("192.0.2.1", 9))
+        return str(probe.getsockname()[0])
+    return socket.gethostname()
+
+
+def _cannot_listen(error: OSError | OverflowError, host: str, port: int) -> str:
+    reason = getattr(error, "strerror", None) or str(error)
+    return f"view: {host}:{port}: cannot be listened on ({reason}); choose with --listen HOST and --port N"
+
+
+class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
+    """What aiohttp complains about, on standard error; not that somebody sent what is no HTTP."""
+
+    def emit(self, record: logging.LogRecord) -> None:
+        if not isinstance(_cause(record), HttpProcessingError):
+            super().emit(record)
+
+    def format(self, record: logging.LogRecord) -> str:
+        cause = _cause(record)
+        text = f"{record.getMessage()}{'' if cause is None else f': {cause!r}'}"
+        return f"lcf-edge: warning: view: {' '.join(text.split())}"
+
+
+def _cause(record: logging.LogRecord) -> BaseException | None:
+    return record.exc_info[1] if record.exc_info else None

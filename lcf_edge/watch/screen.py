@@ -1,0 +1,192 @@
+"""What the terminal shows: as much of it as fits, the most urgent first."""
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from rich.console import Console, ConsoleOptions, Group, RenderableType, RenderResult
+from rich.table import Table
+from rich.text import Text
+
+from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.live.monitor import Presence, Snapshot
+from lcf_edge.live.traces import TABLES, Figures
+from lcf_edge.records import Cause, Kind
+
+STALE_S = 1.0  # scenes older than this are not of now
+_TABLE_HEAD = 2  # lines: how many there are, the names of the columns
+_LEAST_CIRCLES = 3  # are shown before anything below them is
+
+_LEVELS = {Level.OK: "green", Level.WARN: "yellow", Level.ERROR: "bold red", Level.STALE: "bold yellow"}
+_WORST_FIRST = (Level.ERROR, Level.STALE, Level.WARN)
+_CAUSES = {Cause.NONE: "rebel", Cause.CROSSING: "crossing", Cause.INCOMING: "incoming", Cause.LEADING: "leading"}
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One figure of a circle."""
+
+    name: str
+    least_columns: int  # a narrower terminal goes without it
+    text: Callable[[np.void], str]
+    columns: int | None = None  # it takes at least, so that it does not move; None: those of its name
+
+
+def _figure(field: str, digits: int, factor: float = 1.0, *, sign: bool = False) -> Callable[[np.void], str]:
+    def text(circle: np.void) -> str:
+        value = float(circle[field]) * factor
+        return f"{value:{'+' if sign else ''}.{digits}f}" if math.isfinite(value) else "-"
+
+    return text
+
+
+def _name(circle: np.void) -> str:
+    return _CAUSES[Cause(circle["cause"])] if circle["kind"] == Kind.REBEL else "normal"
+
+
+COLUMNS = (
+    Column("circle", 0, _name, 8),
+    Column("contact s", 0, _figure("ttc", 1)),
+    Column("bearing °", 0, _figure("bearing", 1, math.degrees(1), sign=True)),
+    Column("range m", 40, _figure("range", 1)),
+    Column("lateral m", 50, _figure("lateral", 1, sign=True)),
+    Column("elevation °", 80, _figure("elevation", 1, math.degrees(1), sign=True)),
+    Column("support", 60, lambda circle: str(circle["support"])),
+    Column("trust", 60, _figure("trust", 1)),
+    Column("id", 70, lambda circle: str(circle["id"]), 4),
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Screen:
+    """A snapshot as it looks ``now_ns`` (system clock, ns). Fits into the height that it is given."""
+
+    snapshot: Snapshot
+    endpoint: str
+    now_ns: int
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """As rich asks for it."""
+        height = options.height or console.height
+        free = options.update(height=None)
+
+        def lines(parts: Sequence[RenderableType]) -> int:
+            return sum(len(console.render_lines(part, free, pad=False)) for part in parts)
+
+        head, (ill, well) = [self._connection(), self._figures()], self._devices()
+        scene = self.snapshot.scene
+        rebels = 0 if scene is None else int((scene.circles["kind"] == Kind.REBEL).sum())
+        left = height - lines(head) - _TABLE_HEAD - max(rebels, _LEAST_CIRCLES)
+        foot: list[Text] = []
+        for part in ([*ill], [*well, self._tables()]):  # what is wrong has its place before what is not
+            if lines(foot + part) <= left:
+                foot += part
+        yield Group(*head, *self._circles(options.max_width, height - lines([*head, *foot])), *foot)
+
+    def _connection(self) -> Text:
+        snapshot = self.snapshot
+        age_s = snapshot.scene_age_s(self.now_ns)
+        since = f"since {_clock(snapshot.since_ns)} ({_duration((self.now_ns - snapshot.since_ns) / 1e9)})"
+        state = {
+            Presence.SOUGHT: Text(f"waiting for a daemon {since}", "bold yellow"),
+            Presence.AWAY: Text(f"daemon away {since}", "bold red"),
+            Presence.THERE: Text("live", "bold green")
+            if age_s < STALE_S
+            else Text("there, no scenes" + ("" if math.isinf(age_s) else f" for {_duration(age_s)}"), "bold yellow"),
+        }[snapshot.presence]
+        robots = Text(f"  {', '.join(snapshot.robots)}" if snapshot.robots else "", "bold")
+        rest = f"  {self.endpoint}  {_clock(self.now_ns)}  q: end"
+        return Text.assemble(state, robots, (rest, "dim"), no_wrap=True, overflow="ellipsis")
+
+    def _figures(self) -> Text:
+        """Rates, times, memory."""
+        snapshot, figures = self.snapshot, Figures(self.snapshot.diagnostics)
+        parts = []
+        if snapshot.scene is not None and math.isfinite(snapshot.rate_hz):
+            parts.append(f"{snapshot.rate_hz:.1f} scenes/s")
+        if math.isfinite(snapshot.latency_s):
+            parts.append(f"latency {1e3 * snapshot.latency_s:.1f} ms")
+        if (p99_ms := figures.number("pipeline", "latency_p99_ms")) is not None:
+            parts.append(f"99% {p99_ms:.1f} ms")
+        if (resident_mib := figures.number("memory", "resident_mib")) is not None:
+            parts.append(f"memory {resident_mib:.0f} of {figures.text('memory', 'budget_mib')} MiB")
+        if (temperature_c := figures.number("board", "temperature_c")) is not None:
+            parts.append(f"{temperature_c:.0f} °C")
+        if snapshot.scene is not None:
+            speed_mps = snapshot.scene.vehicle_speed
+            parts.append(f"speed {speed_mps:.2f} m/s" if math.isfinite(speed_mps) else "speed unknown")
+        if snapshot.broken:
+            parts.append(f"{snapshot.broken} payloads refused")
+        return Text("  ".join(parts), no_wrap=True, overflow="ellipsis")
+
+    def _circles(self, width: int, lines: int) -> Sequence[RenderableType]:
+        """The table, rebels first; what has no room is counted."""
+        scene = self.snapshot.scene
+        if scene is None or lines < 1:
+            return []
+        rows = ordered(scene.circles)
+        rebels = int((rows["kind"] == Kind.REBEL).sum())
+        shown = rows[: max(lines - _TABLE_HEAD, 0)]
+        hidden = f", {len(rows) - len(shown)} not shown" if len(shown) < len(rows) else ""
+        counts = (f" rebel{'s' * (rebels != 1)}  ", f"{len(rows) - rebels} normal  {len(scene.psi)} ψ{hidden}")
+        first = (str(rebels), "bold red" if rebels else "")
+        count = Text.assemble(first, *counts, no_wrap=True, overflow="ellipsis")
+        columns = [column for column in COLUMNS if width >= column.least_columns]
+        table = Table(box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="dim")
+        for column in columns:
+            side: Literal["left", "right"] = "left" if column is COLUMNS[0] else "right"
+            table.add_column(column.name, justify=side, no_wrap=True, min_width=column.columns)
+        stale = self.snapshot.scene_age_s(self.now_ns) >= STALE_S
+        for row in shown:
+            style = "dim" if stale else "bold red" if row["kind"] == Kind.REBEL else "green"
+            table.add_row(*(column.text(row) for column in columns), style=style)
+        return [count, table] if lines > _TABLE_HEAD else [count]
+
+    def _devices(self) -> tuple[list[Text], list[Text]]:
+        """A line for each that is not well, the worst first; one for all that are."""
+        diagnostics = self.snapshot.diagnostics
+        if diagnostics is None:
+            return [], []
+        well = [status for status in diagnostics.status if status.level is Level.OK]
+        ill = [status for status in diagnostics.status if status.level is not Level.OK]
+        ill.sort(key=lambda status: _WORST_FIRST.index(status.level))
+        ok = [Text.assemble(("ok  ", "green"), ", ".join(_with_rate(status) for status in well))] if well else []
+        return [_device(status) for status in ill], ok
+
+    def _tables(self) -> Text:
+        figures = Figures(self.snapshot.diagnostics)
+        fills = ((table, figures.fill(table)) for table in TABLES)
+        texts = [f"{table.replace('_', ' ')} {fill[0]}/{fill[1]}" for table, fill in fills if fill is not None]
+        return Text("  ".join(texts), "dim")
+
+
+def ordered(circles: npt.NDArray[np.void]) -> npt.NDArray[np.void]:
+    """Rebels first, soonest contact first, then by id so that rows keep their places."""
+    rebel = circles["kind"] == Kind.REBEL
+    contact_s = np.where(rebel & np.isfinite(circles["ttc"]), circles["ttc"], np.inf)
+    return circles[np.lexsort((circles["id"], contact_s, ~rebel))]
+
+
+def _device(status: DeviceStatus) -> Text:
+    return Text.assemble((f"{status.level.name.lower()}  ", _LEVELS[status.level]), f"{status.name}: {status.message}")
+
+
+def _with_rate(status: DeviceStatus) -> str:
+    rate_hz = status.values.get("rate_hz", "nan")
+    return status.name if rate_hz in {"nan", ""} else f"{status.name} {rate_hz} Hz"
+
+
+def _clock(moment_ns: int) -> str:
+    return datetime.fromtimestamp(moment_ns / 1e9).astimezone().strftime("%H:%M:%S")
+
+
+def _duration(seconds: float) -> str:
+    """Short, and steady to look at."""
+    whole = max(int(seconds), 0)
+    if whole < 60:
+        return f"{whole} s"
+    return f"{whole // 60} min" if whole < 3600 else f"{whole // 3600} h {whole % 3600 // 60:02} min"

@@ -1,0 +1,113 @@
+"""What the terminal shows: what is urgent first, and never more than fits."""
+
+import math
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from rich.console import Console
+
+from lcf_edge.cdr import DiagnosticArray, Header
+from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.live.monitor import Presence, Snapshot
+from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene
+from lcf_edge.watch.screen import Screen, ordered
+
+NOW_NS = 1_700_000_000_000_000_000
+OK = DeviceStatus("camera", Level.OK, "delivers", {"rate_hz": "20.00"})
+AWAY = DeviceStatus("imu", Level.ERROR, "away since 2026-01-01T00:00:00Z: unplugged")
+MEMORY = DeviceStatus("memory", Level.WARN, "gave up the preview", {"resident_mib": "91.2", "budget_mib": "96"})
+PIPELINE = DeviceStatus("pipeline", Level.OK, "runs", {"corners_fill": "700/1500", "latency_p99_ms": "8.20"})
+
+
+def circles(rebels: int, normals: int) -> Any:
+    rows = np.zeros(rebels + normals, CIRCLE)
+    rows["id"] = np.arange(len(rows))[::-1]
+    rows["kind"] = np.arange(len(rows)) >= normals
+    rows["ttc"] = np.where(rows["kind"] == Kind.REBEL, 0.5 + np.arange(len(rows))[::-1], np.inf)
+    rows["cause"] = np.where(rows["kind"] == Kind.REBEL, Cause.CROSSING, Cause.NONE)
+    rows["range"] = rows["lateral"] = np.nan
+    return rows
+
+
+def snapshot(rebels: int = 2, normals: int = 5, *status: DeviceStatus) -> Snapshot:
+    scene = Scene(NOW_NS, 1, 640, 480, 1.5, circles(rebels, normals), np.zeros(3, PSI_REGION))
+    diagnostics = DiagnosticArray(Header(NOW_NS, ""), "rover", status or (OK, AWAY, MEMORY, PIPELINE))
+    there = Presence.THERE, NOW_NS - 5 * 10**9, ("rover",)
+    return Snapshot(9, *there, scene, NOW_NS, 20.0, 0.0031, diagnostics, NOW_NS, None, 0)
+
+
+def shown(snapshot: Snapshot, width: int = 100, height: int = 24, later_s: float = 0.1) -> list[str]:
+    console = Console(width=width, height=height, color_system=None, force_terminal=False)
+    with console.capture() as text:
+        console.print(Screen(snapshot, "tcp/127.0.0.1:7447", NOW_NS + round(later_s * 1e9)), height=height)
+    return text.get().splitlines()
+
+
+def test_all_of_it_is_on_a_usual_terminal() -> None:
+    lines = shown(snapshot())
+    assert lines[0].startswith("live  rover  tcp/127.0.0.1:7447")
+    assert lines[1].split("  ")[:3] == ["20.0 scenes/s", "latency 3.1 ms", "99% 8.2 ms"]
+    assert "memory 91 of 96 MiB" in lines[1]
+    assert "speed 1.50 m/s" in lines[1]
+    assert lines[2].strip() == "2 rebels  5 normal  3 ψ"
+    assert lines[4].split()[:4] == ["crossing", "0.5", "+0.0", "-"]
+    assert [line.split()[0] for line in lines[4:11]] == ["crossing"] * 2 + ["normal"] * 5
+    assert lines[11:14] == [
+        "error  imu: away since 2026-01-01T00:00:00Z: unplugged",
+        "warn  memory: gave up the preview",
+        "ok  camera 20.00 Hz, pipeline",
+    ]
+    assert lines[14] == "corners 700/1500"
+
+
+@settings(max_examples=30)
+@given(st.integers(20, 200), st.integers(2, 60), st.integers(0, 12), st.integers(0, 60))
+def test_it_always_fits_and_rebels_go_before_the_rest(width: int, height: int, rebels: int, normals: int) -> None:
+    lines = shown(snapshot(rebels, normals), width, height)
+    assert len(lines) <= height
+    assert all(len(line) <= width for line in lines)
+    if width < 40:  # names are cut
+        return
+    kinds = [word for line in lines if (word := line.split(" ")[0]) in {"crossing", "normal"}]
+    assert kinds == sorted(kinds)
+    assert kinds.count("crossing") >= min(rebels, height - 4)  # two lines above, two of the table's own
+    if len(kinds) < rebels + normals and height > 2:
+        assert f", {rebels + normals - len(kinds)} not" in lines[2]
+
+
+@given(st.lists(st.tuples(st.booleans(), st.floats(0.1, 100) | st.just(math.inf)), max_size=20))
+def test_rebels_first_then_the_soonest_contact(rows: list[tuple[bool, float]]) -> None:
+    table = np.zeros(len(rows), CIRCLE)
+    table["kind"], table["ttc"] = [kind for kind, _ in rows], [ttc for _, ttc in rows]
+    table["id"] = np.arange(len(rows))
+    result = ordered(table)
+    assert sorted(result["id"]) == sorted(table["id"])
+    for one, next_one in pairwise(result):
+        assert one["kind"] >= next_one["kind"]
+        if one["kind"] == next_one["kind"] == Kind.REBEL:
+            assert one["ttc"] <= next_one["ttc"]
+        if one["kind"] == next_one["kind"] == Kind.NORMAL:
+            assert one["id"] < next_one["id"]  # a row keeps its place
+
+
+@pytest.mark.parametrize(
+    ("known", "later_s", "text"),
+    [
+        (replace(snapshot(), presence=Presence.AWAY, robots=()), 65.0, "daemon away since"),
+        (replace(snapshot(), presence=Presence.SOUGHT, scene=None), 1.0, "waiting for a daemon since"),
+        (snapshot(), 4.0, "there, no scenes for 4 s"),
+        (replace(snapshot(), scene=None), 4.0, "there, no scenes"),
+        (snapshot(), 0.5, "live"),
+    ],
+)
+def test_it_says_whether_the_daemon_is_there(known: Snapshot, later_s: float, text: str) -> None:
+    assert shown(known, later_s=later_s)[0].startswith(text)
+
+
+def test_what_was_refused_is_told() -> None:
+    assert "3 payloads refused" in shown(replace(snapshot(), broken=3), width=120)[1]
