@@ -3,19 +3,21 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench lint types clean help install install-program install-files uninstall
+.PHONY: demo test bench hil soak lint types clean help install install-program install-files uninstall
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
 	@echo "make test   run the tests"
 	@echo "make bench  measure detection quality and speed against other methods (tables in benchmarks/results/)"
+	@echo "make hil    as root: the installed daemon on a real kernel, in a virtual machine (docs/hil.md)"
+	@echo "make soak   the daemon at full speed with random faults: MINUTES=60 or FRAMES=200000"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
 # One stamp per set of dependencies, so that the demo does not install the test tools.
 $(VENV)/.run: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[plot]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[plot,view,watch]"
 	touch $@
 
 $(VENV)/.dev: pyproject.toml
@@ -31,6 +33,12 @@ test: $(VENV)/.dev
 
 bench: $(VENV)/.dev
 	$(BIN)/python -m benchmarks.run $(BENCH)
+
+hil: $(VENV)/.dev
+	$(BIN)/python -m pytest hil_mocks/vm -o timeout=600 -p no:cacheprovider --durations=5 $(HIL)
+
+soak: $(VENV)/.dev
+	$(BIN)/python -m hil_mocks.soak $(if $(FRAMES),--frames $(FRAMES),--minutes $(or $(MINUTES),10)) $(SOAK)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -67,7 +75,7 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 
 install-program:
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
-	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check .
+	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check ".[view,watch]"
 	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
 	install -d "$(dir $(COMMAND))"
 	ln -sfn /opt/lcf-edge/bin/lcf-edge "$(COMMAND)"

@@ -19,8 +19,8 @@ class Guide:
         """In place of the last progress."""
         if self._on_terminal and text != self._shown:
             columns = os.get_terminal_size(sys.stderr.fileno()).columns or 80
-            self._write(self._cleared() + text[: columns - 1])
-            self._shown = text
+            cleared, self._shown = self._cleared(), text  # before it is: Ctrl-C may come at any moment
+            self._write(cleared + text[: columns - 1])
 
     def end(self) -> None:
         """No more progress."""

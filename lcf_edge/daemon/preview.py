@@ -3,6 +3,7 @@
 import threading
 
 import cv2
+import numpy as np
 
 from drivers.records import Frame
 from lcf_edge.daemon.clock import StoppableClock
@@ -11,6 +12,7 @@ from lcf_edge.daemon.mailbox import Newest
 from lcf_edge.pipeline import Outcome
 
 JPEG_QUALITY = 70
+WIDEST_PX = 1920  # both panels: a message may not be larger than 1 MiB
 _WAKE_S = 0.25
 
 
@@ -55,5 +57,10 @@ class Previewer(threading.Thread):
     def _draw(self, frame: Frame, outcome: Outcome) -> None:
         from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
 
-        _, jpeg = cv2.imencode(".jpg", draw(frame.image, outcome), (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
+        picture = draw(frame.image, outcome)
+        height, width = picture.shape[:2]
+        if width > WIDEST_PX:
+            size = WIDEST_PX, round(height * WIDEST_PX / width)
+            picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
+        _, jpeg = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
         self._link.put_preview(jpeg.tobytes(), outcome.scene.stamp_ns)

@@ -19,6 +19,7 @@ from lcf_edge.daemon.preview import Previewer
 from lcf_edge.errors import ConfigError
 from lcf_edge.pipeline import run
 from lcf_edge.recordings import open_recording
+from lcf_edge.zenoh_link import LARGEST_MESSAGE_BYTES
 
 PATIENCE_S = 20.0
 
@@ -213,3 +214,13 @@ def test_a_preview_is_drawn_only_while_somebody_looks(
     ((jpeg, stamp_ns),) = link.previews
     assert stamp_ns == link.scenes[1].stamp_ns
     assert np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)).shape == (240, 640, 3)
+
+
+def test_a_preview_of_a_large_camera_fits_into_a_message(start: Start, mail: Mail, link: Any, noise: Any) -> None:
+    start(Config(camera=Camera(width=1920, height=1080)))
+    link.looks = True
+    mail.frames.put(Frame(time.monotonic_ns(), 0, noise(width=1920, height=1080)))
+    link.wait_for(lambda: link.previews)
+    ((jpeg, _),) = link.previews
+    assert len(jpeg) < LARGEST_MESSAGE_BYTES
+    assert np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)).shape == (540, 1920, 3)
