@@ -64,9 +64,7 @@ def parser() -> argparse.ArgumentParser:
         help="the daemon, with camera, IMU, speed and scenes recorded into a file",
     )
     record.add_argument("file", type=Path, metavar="FILE.mcap", help="a new file")
-    record.add_argument(
-        "--seconds", type=_number(0.001, math.inf), metavar="N", help="length of the recording (until Ctrl-C)"
-    )
+    record.add_argument("--seconds", type=_positive, metavar="N", help="length of the recording (until Ctrl-C)")
 
     source = _Parser(add_help=False)
     source.add_argument(
@@ -171,7 +169,7 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
     clocks = add("time", "the offset between the clocks of camera and IMU, from turning to and fro")
     for kind, usual in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20")):
         text = f"how long to take ({usual}; of a recording: all)"
-        kind.add_argument("--seconds", type=_number(0.001, math.inf), metavar="N", help=text)
+        kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
 
 def _number(least: float, most: float) -> Callable[[str], float]:
@@ -180,12 +178,21 @@ def _number(least: float, most: float) -> Callable[[str], float]:
             number = float(text)
         except ValueError:
             number = math.nan
-        if not least <= number <= most or math.isinf(number):  # NaN neither
-            between = f"between {least:g} and {most:g}" if most < math.inf else f"of {least:g} at least"
-            raise argparse.ArgumentTypeError(f"{text}: write a number {between}")
+        if not least <= number <= most:  # NaN neither
+            raise argparse.ArgumentTypeError(f"{text}: write a number between {least:g} and {most:g}")
         return number
 
     return read
+
+
+def _positive(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: write a number above 0")
+    return number
 
 
 def _whole(least: int, most: int) -> Callable[[str], int]:
