@@ -15,6 +15,7 @@ PROGRAM_MIB = 68.0
 """Python, NumPy, OpenCV, an open Zenoh session and the program, without tables and pictures."""
 
 SHED_AT = 0.9  # of the budget
+GROWN_MIB = 1.0
 _STATM = Path("/proc/self/statm")
 _MIB = 2**20
 
@@ -77,8 +78,10 @@ class Shedding:
 
 
 class MemoryWatch:
-    """Gives up one thing after the other while more than ``SHED_AT`` of the budget is resident.
+    """Gives up a thing when more than ``SHED_AT`` of the budget is resident, and the next when that was not enough.
 
+    Memory that is let go seldom goes back to the system: it was enough unless ``GROWN_MIB`` more are resident, or more
+    than the budget.
     ``resident_mib``: at the last ``check``. ``shed``: what was given up; it stays so until a restart.
     """
 
@@ -86,14 +89,16 @@ class MemoryWatch:
         self.budget_mib = budget_mib
         self.resident_mib = measure_mib()
         self._order = list(order)
+        self._mark_mib = SHED_AT * budget_mib
         self._measure_mib = measure_mib
         self.shed: list[str] = []
 
     def check(self) -> None:
         """Measure, and give up the next thing if it is too much; one a call, so that it can take effect."""
         self.resident_mib = self._measure_mib()
-        if self.resident_mib <= SHED_AT * self.budget_mib or not self._order:
+        if self.resident_mib <= self._mark_mib or not self._order:
             return
+        self._mark_mib = min(self.resident_mib + GROWN_MIB, self.budget_mib)
         thing = self._order.pop(0)
         thing.give_up()
         self.shed.append(thing.name)
