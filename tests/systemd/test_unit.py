@@ -132,3 +132,7 @@ def test_the_names_that_the_documents_and_the_configuration_use_are_made() -> No
     used = {name for text in texts for name in re.findall(r"/dev/lcf-edge/\w+", text.read_text(encoding="utf-8"))}
     assert used
     assert used <= made
+
+
+def test_a_reload_needs_no_program_that_a_minimal_system_lacks() -> None:
+    assert settings()["ExecReload"] == ["/bin/sh -c 'kill -HUP $MAINPID'"]  # /bin/kill is of a package of its own

@@ -1,0 +1,1 @@
+"""What runs inside the machine: ``agent`` carries out commands, ``bno055`` lets registers live."""

@@ -1,0 +1,186 @@
+"""A virtual machine in qemu that carries out commands; every wait is bounded, nothing is left behind."""
+
+import shutil
+import socket
+import subprocess
+import time
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+
+import msgspec
+
+from hil_mocks.vm.guest.agent import Command, Outcome
+from hil_mocks.vm.image import Image
+from lcf_edge.errors import LcfError
+
+QEMU = "qemu-system-x86_64"
+BOOTS_S = 240.0
+PROBE_S = 10.0
+ENDS_S = 30.0
+REPLY_S = 20.0  # beyond a command's own time
+ZENOH_PORT = 7447  # in the guest
+MEMORY_MIB, PROCESSORS = 1024, 2
+
+
+class MachineError(LcfError):
+    """The machine does not do what it is told."""
+
+
+class Machine:
+    """Boots ``image``; changes to its disk are forgotten. Leaves its console and journal in ``folder``.
+
+    ``share``: a folder that the guest sees as /mnt. ``endpoint``: where the host reaches the guest's Zenoh. ``imu``:
+    the other end of the guest's USB serial port. Raises ``MachineError``.
+    """
+
+    def __init__(self, image: Image, folder: Path) -> None:
+        self.folder = folder
+        self.share = folder / "share"
+        shutil.rmtree(self.share, ignore_errors=True)
+        self.share.mkdir(parents=True)
+        self.port = _free_port()
+        self.endpoint = f"tcp/127.0.0.1:{self.port}"
+        self._number, self._read = 0, b""
+        self._agent_path, self._imu_path = folder / "agent.sock", folder / "imu.sock"
+        with ExitStack() as resources:
+            log = resources.enter_context((folder / "qemu.txt").open("wb"))
+            self._process = subprocess.Popen(self._command(image), stdin=subprocess.DEVNULL, stdout=log, stderr=log)
+            resources.callback(self._process.wait)
+            resources.callback(self._process.kill)
+            deadline_s = time.monotonic() + BOOTS_S
+            self._agent = resources.enter_context(self._connect(self._agent_path, deadline_s))
+            self.imu = resources.enter_context(self._connect(self._imu_path, deadline_s))
+            self.run("modprobe 9pnet_virtio && mount -t 9p -o trans=virtio,version=9p2000.L share /mnt", BOOTS_S)
+            self._resources = resources.pop_all()
+
+    def _command(self, image: Image) -> list[str]:
+        return [
+            QEMU,
+            *("-accel", _accelerator(), "-cpu", "max"),
+            *("-m", str(MEMORY_MIB), "-smp", str(PROCESSORS)),
+            *("-display", "none", "-monitor", "none", "-no-reboot", "-serial", f"file:{self.folder / 'console.txt'}"),
+            *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
+            *("-append", "root=/dev/vda ro console=ttyS0 quiet panic=-1 net.ifnames=0 systemd.show_status=0"),
+            *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
+            *("-nic", f"user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
+            *("-virtfs", f"local,path={self.share},mount_tag=share,security_model=none"),
+            *(
+                "-device",
+                "virtio-serial-pci",
+                "-chardev",
+                f"socket,id=agent,path={self._agent_path},server=on,wait=off",
+            ),
+            *("-device", "virtserialport,chardev=agent,name=hil"),
+            *("-usb", "-chardev", f"socket,id=imu,path={self._imu_path},server=on,wait=off"),
+            *("-device", "usb-serial,chardev=imu,always-plugged=on"),
+        ]
+
+    def run(self, shell: str, timeout_s: float = 60.0) -> str:
+        """Run a command as root; what it wrote. Raises ``MachineError`` with that when it fails or takes too long."""
+        outcome = self.tried(shell, timeout_s)
+        if outcome.status:
+            raise MachineError(f"exit status {outcome.status} in the machine: {shell}\n{outcome.output}")
+        return outcome.output.rstrip("\n")
+
+    def tried(self, shell: str, timeout_s: float = 60.0) -> Outcome:
+        """Run a command as root. Raises ``MachineError`` when the machine does not answer."""
+        self._number += 1
+        deadline_s = time.monotonic() + timeout_s + REPLY_S
+        try:
+            self._agent.sendall(msgspec.json.encode(Command(self._number, shell, timeout_s)) + b"\n")
+            while True:
+                outcome = msgspec.json.decode(self._line(deadline_s), type=Outcome)
+                if outcome.number == self._number:  # an earlier one came too late
+                    return outcome
+        except (OSError, msgspec.DecodeError) as error:
+            raise MachineError(f"{shell}: the machine does not answer; {self._said()}") from error
+
+    def _line(self, deadline_s: float) -> bytes:
+        """The next line of the agent. Raises ``OSError``."""
+        while b"\n" not in self._read:
+            self._agent.settimeout(max(deadline_s - time.monotonic(), 0.01))
+            came = self._agent.recv(65536)
+            if not came:
+                raise ConnectionResetError
+            self._read += came
+        line, _, self._read = self._read.partition(b"\n")
+        return line
+
+    def wait_until(self, shell: str, timeout_s: float = 60.0) -> None:
+        """Wait until a command succeeds. Raises ``MachineError``."""
+        self.run(f"until {{ {shell}; }} >/dev/null 2>&1; do sleep 0.2; done", timeout_s)
+
+    def uptime_s(self) -> float:
+        """Since it booted."""
+        return float(self.run("cut -d' ' -f1 /proc/uptime"))
+
+    def journal(self, since_s: float = 0.0) -> str:
+        """All that was logged since that uptime."""
+        lines = self.tried("journalctl -b --no-pager -q -o short-monotonic").output.splitlines()
+        return "\n".join(line for line in lines if _logged_s(line) >= since_s)
+
+    def close(self) -> None:
+        """Keep the journal, power off."""
+        try:
+            (self.folder / "journal.txt").write_text(self.journal() + "\n", encoding="utf-8")
+            self.tried("systemctl --no-block poweroff")
+            self._process.wait(ENDS_S)
+        except (MachineError, subprocess.TimeoutExpired):
+            pass  # it is ended all the same
+        finally:
+            self._resources.close()
+
+    def __enter__(self) -> "Machine":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _connect(self, path: Path, deadline_s: float) -> socket.socket:
+        """To a socket that qemu makes soon."""
+        while self._process.poll() is None and time.monotonic() < deadline_s:
+            connection = socket.socket(socket.AF_UNIX)
+            try:
+                connection.connect(str(path))
+            except OSError:
+                connection.close()
+                time.sleep(0.05)
+            else:
+                return connection
+        raise MachineError(f"the machine does not start; {self._said()}")
+
+    def _said(self) -> str:
+        """The last words of qemu and of the console."""
+        said = (
+            (self.folder / name).read_bytes()[-500:].decode(errors="replace") for name in ("qemu.txt", "console.txt")
+        )
+        return " | ".join(" ".join(text.split()) for text in said)
+
+
+def _accelerator() -> str:
+    """KVM where a processor can be set up with it, else emulation."""
+    probe = (QEMU, "-accel", "kvm", "-cpu", "max", "-display", "none", "-nodefaults", "-S", "-monitor", "stdio")
+    try:
+        works = (
+            subprocess.run(probe, check=False, input=b"quit\n", capture_output=True, timeout=PROBE_S).returncode == 0
+        )
+    except subprocess.TimeoutExpired:
+        works = False
+    return "kvm" if works else "tcg,thread=multi"
+
+
+def _logged_s(line: str) -> float:
+    """``[   12.345678] rover …``; lines that go on belong to the one before."""
+    try:
+        return float(line[1 : line.index("]")])
+    except ValueError:
+        return float("inf")
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])

@@ -1,0 +1,121 @@
+"""Inertial samples through `/dev/i2c-N` and through a serial port."""
+
+import threading
+import time
+from collections.abc import Iterator
+
+import pytest
+
+from hil_mocks import scenes
+from hil_mocks.vm.daemon import USUAL, Daemon, Subscriber, write_lines
+from hil_mocks.vm.machine import Machine
+
+I2C = '\n[imu]\ndriver = "bno055"\nbus = {bus}\n'
+SERIAL = '\n[imu]\ndriver = "csv"\nport = "/dev/lcf-edge/imu"\nbaud = 115200\n'
+CHIP = "systemd-run --quiet --collect --unit=bno055 /opt/lcf-edge/bin/python -m hil_mocks.vm.guest.bno055"
+SPOIL = "import sys, smbus2; smbus2.SMBus(int(sys.argv[1])).write_i2c_block_data(0x28, 0, [0] * 32)"
+WITHOUT_IDENTITY = f"/opt/lcf-edge/bin/python -c '{SPOIL}'"
+LINES_HZ = 100
+LEAST_HZ = 10  # an emulated processor may not keep up
+
+
+@pytest.fixture(scope="module")
+def bus(machine: Machine) -> Iterator[int]:
+    """The number of a bus with a living BNO055 on it."""
+    samples = scenes.imu(scenes.make("slow_rover", 1, seconds=10.0))[::2]
+    write_lines(machine.share / "samples.csv", [[*sample.gyro, *sample.accel] for sample in samples])
+    number = int(machine.run("basename $(dirname $(grep -l SMBus.stub /sys/bus/i2c/devices/i2c-*/name))").split("-")[1])
+    machine.run(f"{CHIP} {number} /mnt/samples.csv")
+    yield number
+    machine.run("systemctl stop bno055")
+
+
+class SerialImu(threading.Thread):
+    """Lines into the machine's serial port, from the host; ``garbled``: with noise in between."""
+
+    def __init__(self, machine: Machine) -> None:
+        super().__init__(name="serial IMU", daemon=True)
+        self.garbled = False
+        self.ended = threading.Event()
+        self._port = machine.imu
+
+    def run(self) -> None:
+        """One line each 10 ms."""
+        self._port.settimeout(1.0)
+        number, due_s = 0, time.monotonic()
+        while not self.ended.wait(max(due_s - time.monotonic(), 0)):
+            number, due_s = number + 1, due_s + 1 / LINES_HZ
+            line = b"%d,0.01,0.02,0.03,0.1,-9.81,0.1\n" % (number * 1_000_000 // LINES_HZ)
+            if self.garbled and number % 10 == 0:
+                line = b"\xff\x00" + line[7:]
+            try:
+                self._port.sendall(line)
+            except TimeoutError:  # nobody reads in the machine
+                continue
+
+
+@pytest.fixture
+def serial_imu(machine: Machine) -> Iterator[SerialImu]:
+    """An IMU at the serial port, sending."""
+    imu = SerialImu(machine)
+    imu.start()
+    yield imu
+    imu.ended.set()
+    imu.join()
+
+
+def wait_for_rate(subscriber: Subscriber, least_hz: float, most_hz: float) -> None:
+    """Wait until the IMU's samples are so far apart; what had piled up before comes first."""
+
+    def settled() -> bool:
+        return (
+            "imu" in subscriber.statuses and least_hz <= float(subscriber.statuses["imu"].values["rate_hz"]) <= most_hz
+        )
+
+    subscriber.wait_for(settled, f"imu at {least_hz:g} to {most_hz:g}/s")
+
+
+def test_a_living_chip_on_the_i2c_bus_is_read(daemon: Daemon, subscriber: Subscriber, bus: int) -> None:
+    daemon.start(USUAL + I2C.format(bus=bus))
+    subscriber.wait_for_status("imu", "delivers")
+    wait_for_rate(subscriber, LEAST_HZ, 110)
+    subscriber.wait_for_scenes()
+    assert "no inertial samples" not in subscriber.message("pipeline")
+
+
+def test_a_bus_that_goes_is_used_again(daemon: Daemon, subscriber: Subscriber, bus: int) -> None:
+    daemon.start(USUAL + I2C.format(bus=bus))
+    subscriber.wait_for_status("imu", "delivers")
+    # Whoever has the bus open holds its module: the chip's own registers are what can be taken away.
+    daemon.machine.run(f"systemctl stop bno055; {WITHOUT_IDENTITY} {bus}")
+    subscriber.wait_for_status("imu", "away since")
+    subscriber.wait_for_scenes()
+    daemon.machine.run(f"{CHIP} {bus} /mnt/samples.csv")
+    subscriber.wait_for_status("imu", "delivers")
+    assert daemon.restarts == 0
+
+
+def test_a_serial_imu_is_read(daemon: Daemon, subscriber: Subscriber, serial_imu: SerialImu) -> None:
+    assert serial_imu.is_alive()
+    daemon.start(USUAL + SERIAL)
+    subscriber.wait_for_status("imu", "delivers")
+    wait_for_rate(subscriber, 0.8 * LINES_HZ, 1.2 * LINES_HZ)
+    serial_imu.garbled = True
+    subscriber.wait_for_count("imu", "bad_line", 5)
+    serial_imu.garbled = False
+    assert subscriber.message("imu") == "delivers"
+
+
+def test_a_serial_port_that_is_unplugged_is_used_again(
+    daemon: Daemon, subscriber: Subscriber, serial_imu: SerialImu
+) -> None:
+    assert serial_imu.is_alive()
+    daemon.start(USUAL + SERIAL)
+    subscriber.wait_for_status("imu", "delivers")
+    port = daemon.machine.run("basename $(dirname $(grep -l 'QEMU USB SERIAL' /sys/bus/usb/devices/*/product))")
+    daemon.machine.run(f"echo {port} > /sys/bus/usb/drivers/usb/unbind")
+    subscriber.wait_for_status("imu", "away since")
+    subscriber.wait_for_scenes()
+    daemon.machine.run(f"echo {port} > /sys/bus/usb/drivers/usb/bind")
+    subscriber.wait_for_status("imu", "delivers")
+    assert daemon.restarts == 0
