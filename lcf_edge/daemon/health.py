@@ -49,7 +49,8 @@ class Health:
         """One for each part."""
         if time.monotonic() - self._turned_s > LATENCY_TURN_S:
             self._turned_s = time.monotonic()
-            self._loop.latency.turn()
+            for durations in (self._loop.latency, self._loop.detect, self._loop.filter):
+                durations.turn()
         devices = [self._device(reader) for reader in self._readers]
         return [*devices, self._pipeline(config), _memory(memory), self._board(), self._published()]
 
@@ -99,6 +100,8 @@ class Health:
         values = {
             "latency_p50_ms": f"{1e3 * loop.latency.percentile_s(50):.2f}",
             "latency_p99_ms": f"{1e3 * loop.latency.percentile_s(99):.2f}",
+            "detect_p50_ms": f"{1e3 * loop.detect.percentile_s(50):.2f}",
+            "filter_p50_ms": f"{1e3 * loop.filter.percentile_s(50):.2f}",
             "scenes": str(loop.frames),
             "evicted": str(loop.evicted),
             "clock_steps": str(self._system_time.steps),

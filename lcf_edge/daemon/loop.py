@@ -63,8 +63,8 @@ class Loop(threading.Thread):
     """Turns whenever a frame comes, and without one each ``FRAME_WAIT_S``, until ``clock`` is stopped.
 
     For others to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last), ``evicted``,
-    ``latency`` (from the frame's stamp to after the put), ``degradation``. ``first_scene`` is called once. Raises
-    ``ConfigError`` for pictures that the lens of the configuration does not fit.
+    ``latency`` (from the frame's stamp to after the put) and in it ``detect`` and ``filter``, ``degradation``.
+    ``first_scene`` is called once. Raises ``ConfigError`` for pictures that the lens of the configuration does not fit.
     """
 
     def __init__(
@@ -83,7 +83,7 @@ class Loop(threading.Thread):
         self.frames = 0
         self.scene: Scene | None = None
         self.evicted = 0
-        self.latency = DurationHistogram()
+        self.latency, self.detect, self.filter = DurationHistogram(), DurationHistogram(), DurationHistogram()
         self.degradation = Degradation(config)
         self._config = config
         self._pipeline: Pipeline | None = None  # the first picture tells its size
@@ -134,6 +134,8 @@ class Loop(threading.Thread):
         scene = replace(scene, stamp_ns=self._system_time.system_ns(frame.stamp_ns))
         self._link.put_scene(scene)
         self.latency.add((time.monotonic_ns() - frame.stamp_ns) / 1e9)
+        self.detect.add(scene.timing.detect / 1e6)
+        self.filter.add(scene.timing.filter / 1e6)
         self.scene = scene
         self.frames += 1
         self.evicted += scene.sizes.evicted

@@ -31,6 +31,8 @@ class Point(msgspec.Struct, frozen=True):
     rate_hz: float | None
     latency_p50_ms: float | None
     latency_p99_ms: float | None
+    detect_p50_ms: float | None
+    filter_p50_ms: float | None
     resident_mib: float | None
     budget_mib: float | None
     temperature_c: float | None
@@ -49,6 +51,8 @@ class Point(msgspec.Struct, frozen=True):
             rate_hz if math.isfinite(rate_hz) else None,
             figures.number("pipeline", "latency_p50_ms"),
             figures.number("pipeline", "latency_p99_ms"),
+            figures.number("pipeline", "detect_p50_ms"),
+            figures.number("pipeline", "filter_p50_ms"),
             figures.number("memory", "resident_mib"),
             figures.number("memory", "budget_mib"),
             figures.number("board", "temperature_c"),

@@ -8,6 +8,7 @@ const field = (name) => (point) => point[name];
 const PLOTS = [
   ["Scenes a second", 1, [["", "first", field("rate_hz")]]],
   ["Latency, ms", 1, [["half below", "first", field("latency_p50_ms")], ["99 % below", "second", field("latency_p99_ms")]]],
+  ["Of that, half below, ms", 1, [["corners", "first", field("detect_p50_ms")], ["filter", "normal", field("filter_p50_ms")]]],
   ["Memory, MiB", 0, [["resident", "first", field("resident_mib")], ["budget", "error", field("budget_mib")]]],
   ["Circles", 0, [["rebel", "rebel", field("rebels")], ["normal", "normal", field("normals")], ["ψ", "psi", field("psi")]]],
   ["Tables, % full", 0, [
