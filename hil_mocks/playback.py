@@ -52,7 +52,7 @@ class Playback:
         self.recording = open_recording(path, config)
         self._config = config
         self._users = 0
-        self._lock = threading.Lock()
+        self._lock, self._turn = threading.Lock(), threading.Lock()
         self._waiting: dict[type, deque[tuple[int, Item]]] = {kind: deque(maxlen=held) for kind, held in _HELD.items()}
         self._items: Iterator[Item] = iter(())
         self._lap = -1
@@ -79,7 +79,9 @@ class Playback:
 
     def next(self, kind: type[Record]) -> tuple[int, Record]:
         """The next record of a kind and when it comes, by the clock, ns. Raises ``RecordingError``: there is none."""
-        with self._lock:
+        with self._turn:  # in turn: a camera that is late, and asks again at once, does not keep out the others
+            self._lock.acquire()
+        try:
             lap = self._lap
             while not self._waiting[kind]:
                 if self._lap > lap + 1:
@@ -88,6 +90,8 @@ class Playback:
             due_ns, record = self._waiting[kind].popleft()
             assert isinstance(record, kind)
             return due_ns, record
+        finally:
+            self._lock.release()
 
     def _advance(self) -> None:
         """Put the recording's next item to those that wait for their reader, or begin again."""

@@ -29,14 +29,18 @@ def parser() -> argparse.ArgumentParser:
 
     settings = _Parser(add_help=False)
     settings.add_argument(
-        "-c", "--config", type=Path, metavar="FILE", help="configuration: TOML, or a recording that holds one"
+        "-c",
+        "--config",
+        type=Path,
+        metavar="FILE",
+        help="configuration: TOML, or a recording that holds one (/etc/lcf-edge/config.toml, if there)",
     )
     settings.add_argument(
         "--set",
         action="append",
         default=[],
         metavar="KEY=VALUE",
-        help="set one key, as in vehicle.half_width_m=0.6",
+        help="set one key, as in vehicle.half_width_m=0.6; may be repeated",
     )
 
     demo = commands.add_parser("demo", allow_abbrev=False, help="see the filter work on a drive that it renders itself")

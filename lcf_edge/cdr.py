@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import LcfError
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene
 
 Vector = tuple[float, float, float]
 
@@ -272,12 +272,16 @@ def restamped(payload: bytes, stamp_ns: int) -> bytes:
 def decode_scene(payload: bytes | memoryview) -> Scene:
     """``lcf_msgs/msg/Scene``; circles and ψ are read-only views of a little-endian payload.
 
-    Sizes, timing and notes, which are not sent, have their defaults. Raises ``CdrError``.
+    Sizes, timing and notes, which are not sent, have their defaults. Raises ``CdrError``, also for a kind or a
+    cause that the message does not know.
     """
     reader = _Reader(payload)
     header = reader.header()
     seq, width, height, speed = reader.scalars("QIIf")
     circles, psi = reader.sequence(CIRCLE, align=4), reader.sequence(PSI_REGION, align=4)
+    for name, known in (("kind", Kind), ("cause", Cause)):
+        if not np.isin(circles[name], [*known]).all():
+            raise CdrError(f"CDR: the {name} of a circle is none that is known")
     return Scene(header.stamp_ns, seq, width, height, speed, circles, psi)
 
 

@@ -199,11 +199,11 @@ class Record(Table, frozen=True):
     format: Literal["jpeg", "png"] = "jpeg"  # png: without loss, some five times as large
     jpeg_quality: Annotated[int, msgspec.Meta(ge=1, le=100)] = 80
     ttc_s: Positive = 1.5  # a rebel circle that is met sooner is a threat
-    before_s: NotNegative = 2.0  # that are saved of what came before a threat
-    after_s: NotNegative = 5.0
+    before_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 2.0  # that are saved of what came before a threat
+    after_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 5.0
     buffer_mib: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # of memory: what waits for the disk, or for a threat
     file_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = 512.0  # then the next file begins,
-    file_s: Annotated[float, msgspec.Meta(gt=0, le=7200)] = 900.0  # or after this: its index lies in memory
+    file_s: Annotated[float, msgspec.Meta(gt=0, le=1800)] = 900.0  # or after this: its index lies in memory
     total_mib: Positive = 4096.0  # of all files in the folder; the oldest give way
     free_mib: NotNegative = 512.0  # that are left free on the disk
 

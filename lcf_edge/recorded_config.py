@@ -24,6 +24,6 @@ def attached_configuration(path: Path) -> bytes:
                     return record.data
                 if isinstance(record, Chunk):  # ours lies before the first
                     break
-        except (McapError, struct.error, UnicodeDecodeError, OverflowError):  # damaged
+        except (McapError, struct.error, UnicodeDecodeError, OverflowError, MemoryError):  # damaged, its lengths too
             pass
     raise ConfigError(f"{path}: no configuration in it; only lcf-edge record puts one in; name a TOML file with -c")

@@ -4,6 +4,7 @@ import os
 import shutil
 import tempfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 import tomlkit
@@ -60,6 +61,9 @@ def _replace(target: Path, text: str) -> None:
         except ConfigError as error:
             reason = str(error).removeprefix(f"{new}: ")
             raise ConfigError(f"{target}: left as it was, it would not be valid: {reason}") from error
+        owner = target.stat()
+        with suppress(PermissionError):  # only root may give it to others
+            os.chown(new, owner.st_uid, owner.st_gid)
         shutil.copymode(target, new)
         new.replace(target)
     finally:

@@ -12,11 +12,13 @@ from lcf_edge.doctor.configuration import context_of
 from lcf_edge.doctor.examination import examine
 from lcf_edge.doctor.finding import Finding, Level
 from lcf_edge.errors import LcfError
+from lcf_edge.printable import printable
 
 Tell = Callable[[str], None]
 
 _COLOURS = {Level.OK: "32", Level.WARN: "33", Level.FAIL: "31"}
 _WIDE = len("configuration")
+_LONGEST = 4096  # a path may be
 
 
 class UnfitError(LcfError):
@@ -47,8 +49,8 @@ def line(finding: Finding, *, coloured: bool = False) -> str:
     """A finding for people; its remedy below it, in a line of its own that can be pasted."""
     level = finding.level.value
     shown = f"\x1b[{_COLOURS[finding.level]}m{level:<4}\x1b[0m" if coloured else f"{level:<4}"
-    text = f"{shown}  {finding.subject:<{_WIDE}}  {finding.text}"
-    return f"{text}\n{'':<{_WIDE + 8}}{finding.remedy}" if finding.remedy else text
+    text = f"{shown}  {finding.subject:<{_WIDE}}  {printable(finding.text, _LONGEST)}"
+    return f"{text}\n{'':<{_WIDE + 8}}{printable(finding.remedy, _LONGEST)}" if finding.remedy else text
 
 
 def json_line(finding: Finding) -> str:

@@ -27,7 +27,7 @@ def watch_lines(source: Source, tell: Callable[[str], None]) -> None:
 def watch_table(source: Source, tell: Callable[[str], None]) -> None:
     """The table, until q is pressed or Ctrl-C; where standard output is no terminal, plain text for ``tell``.
 
-    Raises ``PublishError``, and ``LcfError`` without the extra ``watch``.
+    Raises ``PublishError``, and ``LcfError`` without the extra ``watch`` or when the terminal goes away.
     """
     try:
         from rich.console import Console
@@ -44,7 +44,10 @@ def watch_table(source: Source, tell: Callable[[str], None]) -> None:
             return Screen(monitor.snapshot(), source.endpoint, time.time_ns())
 
         if console.is_terminal and not console.is_dumb_terminal:
-            show(console, screen)
+            try:
+                show(console, screen)
+            except OSError as error:
+                raise LcfError(f"watch: the terminal is gone ({error.strerror})") from error
             return
         while True:
             with console.capture() as text:

@@ -5,12 +5,14 @@ import threading
 import time
 from collections import Counter
 
+import msgspec
+
 from lcf_edge.cdr import CdrError
 from lcf_edge.config import Config, to_toml
 from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.log import LOGGER
-from lcf_edge.recorder.destination import MIB, Destination, free_mib
+from lcf_edge.recorder.destination import MIB, Destination, Named, free_mib
 from lcf_edge.recorder.messages import PICTURES, Message
 from lcf_edge.recorder.recording_file import CHUNK_BYTES, RecordingFile
 
@@ -77,7 +79,7 @@ class DiskWriter(threading.Thread):
             return
         if self._attached is not self.config:
             self._attached = self.config
-            file.attach(to_toml(self.config), time.monotonic_ns())
+            file.attach(self._config_text(), time.monotonic_ns())
         try:
             file.add(message)
         except CdrError:
@@ -110,10 +112,17 @@ class DiskWriter(threading.Thread):
         path = self._destination.next(now_ns + offset_ns)
         self._check_room()
         self._attached = self.config
-        file = RecordingFile(path, self.config.publish.prefix, to_toml(self.config), offset_ns, now_ns)
+        file = RecordingFile(path, self.config.publish.prefix, self._config_text(), offset_ns, now_ns)
         self.counts["files"] += 1
         self._begun_ns, self._sync_at_ns = now_ns, now_ns + round(SYNC_S * 1e9)
         return file
+
+    def _config_text(self) -> str:
+        """What is attached. That a command asked for this one file is not a wish to record whenever it is used."""
+        config = self.config
+        if isinstance(self._destination, Named):
+            config = msgspec.structs.replace(config, record=msgspec.structs.replace(config.record, when="never"))
+        return to_toml(config)
 
     def _sync(self) -> None:
         """Have on the disk what is due."""

@@ -96,7 +96,8 @@ def fail(subject: str, text: str, remedy: str = "") -> Finding:
 
 def edit(path: Path, comment: str = "") -> str:
     """The command that opens a file for editing."""
-    command = f"sudoedit {path}" if path.is_relative_to("/etc") else f"${{EDITOR:-nano}} {path}"
+    file = shlex.quote(str(path))
+    command = f"sudoedit {file}" if path.is_relative_to("/etc") else f"${{EDITOR:-nano}} {file}"
     return f"{command}  # {comment}" if comment else command
 
 

@@ -1,14 +1,16 @@
 """Zenoh: its configuration, its ports, and who reaches them."""
 
 import json
+import shlex
 from collections.abc import Iterator
+from pathlib import Path
 
 import msgspec
 import zenoh
 
 from lcf_edge.config import Zenoh
 from lcf_edge.doctor.endpoints import is_open, parsed, reachable_here
-from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
+from lcf_edge.doctor.finding import Context, Finding, edit, fail, ok, warn
 from lcf_edge.doctor.processes import listening
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.session import opened_session
@@ -46,7 +48,7 @@ def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
         yield warn(
             "network",
             f"{', '.join(outside)}: encrypted, but everybody is let in; docs/network.md has the lines for enable_mtls",
-            f"sudoedit {options.config_file or '/etc/lcf-edge/zenoh.json5'}",
+            edit(Path(options.config_file or "/etc/lcf-edge/zenoh.json5")),
         )
     elif outside:
         yield ok("network", f"{', '.join(outside)}: open to the network, for those with a certificate")
@@ -104,12 +106,13 @@ def _opens(options: Zenoh) -> Finding:
             return ok("network", f"Zenoh opens as {options.mode}, listens on {', '.join(options.listen) or 'nothing'}")
     except PublishError as error:
         file = options.config_file
-        return fail("network", str(error), f"sudoedit {file}" if file and file in str(error) else "")
+        return fail("network", str(error), edit(Path(file)) if file and file in str(error) else "")
 
 
 def _connects(endpoint: str) -> Finding:
     if is_open(endpoint):
         return ok("network", f"{endpoint}: somebody listens there")
     parts = parsed(endpoint)
-    remedy = f"ping -c 3 {parts.host}  # is it on, is zenohd or another lcf-edge running there?" if parts else ""
+    asked = "is it on, is zenohd or another lcf-edge running there?"
+    remedy = f"ping -c 3 {shlex.quote(parts.host)}  # {asked}" if parts else ""
     return warn("network", f"{endpoint}: cannot be reached", remedy)

@@ -1,6 +1,7 @@
 """Who has a device or a port open, as far as ``/proc`` lets this user see."""
 
 import os
+import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
@@ -50,7 +51,7 @@ def in_use(subject: str, path: Path, proc: Path) -> Finding:
     found = holders(path.resolve(), proc)
     if found:
         return fail(subject, f"{path}: in use by {' and '.join(map(str, found))}", f"kill {found[0].pid}")
-    return fail(subject, f"{path}: in use by another user's program", f"sudo fuser -v {path}")
+    return fail(subject, f"{path}: in use by another user's program", f"sudo fuser -v {shlex.quote(str(path))}")
 
 
 def daemon_with(path: Path, proc: Path) -> Process | None:

@@ -12,6 +12,7 @@ from lcf_edge.cdr import DiagnosticArray
 from lcf_edge.records import Kind, Scene
 
 POINTS = 300
+_MOST_DIGITS = 9  # of a number of rows
 TABLES = (
     "corners",
     "edges_normal",
@@ -85,7 +86,9 @@ class Figures:
     def fill(self, table: str) -> tuple[int, int] | None:
         """Rows in use of a table, and its capacity."""
         rows, _, capacity = self.text("pipeline", f"{table}_fill").partition("/")
-        return (int(rows), int(capacity)) if rows.isdecimal() and capacity.isdecimal() else None
+        if not (rows.isdecimal() and capacity.isdecimal()) or max(len(rows), len(capacity)) > _MOST_DIGITS:
+            return None
+        return int(rows), int(capacity)
 
 
 class Traces:
@@ -96,11 +99,14 @@ class Traces:
         self._lock = threading.Lock()
 
     def add(self, point: Point) -> None:
-        """Keep a point; the oldest makes room."""
+        """Keep a point; the oldest makes room, and those that are later, since the clock was set back, go."""
         with self._lock:
+            while self._points and self._points[-1].at_ns >= point.at_ns:
+                self._points.pop()
             self._points.append(point)
 
     def since(self, at_ns: int) -> list[Point]:
-        """Points later than that, oldest first."""
+        """Points later than that, oldest first; all when none is as late, since the clock was set back."""
         with self._lock:
-            return [point for point in self._points if point.at_ns > at_ns]
+            was_set_back = bool(self._points) and self._points[-1].at_ns < at_ns
+            return [point for point in self._points if point.at_ns > at_ns or was_set_back]

@@ -2,6 +2,8 @@
 
 import re
 import shutil
+import stat
+from contextlib import suppress
 from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
@@ -10,7 +12,7 @@ from typing import Protocol
 from lcf_edge.config import Record
 
 MIB = 2**20
-_OURS = re.compile(r"lcf-edge-(\d{6,})-\d{8}T\d{6}Z\.mcap")
+_OURS = re.compile(r"lcf-edge-(\d{6,18})-\d{8}T\d{6}Z\.mcap", re.ASCII)
 
 
 class Destination(Protocol):
@@ -40,21 +42,26 @@ class Folder:
         """The path of a file that begins now, with room for it. Raises ``OSError``."""
         self.folder.mkdir(parents=True, exist_ok=True)
         files = self._files()
-        number = max(files, default=0) + 1
-        sizes = {number: path.stat().st_size for number, path in files.items()}
-        for oldest in sorted(files):
-            if sum(sizes.values()) <= self._room_bytes:
+        number = max((number for number, *_ in files), default=0) + 1
+        taken_bytes = sum(size_bytes for *_, size_bytes in files)
+        for _, path, size_bytes in sorted(files):
+            if taken_bytes <= self._room_bytes:
                 break
-            files[oldest].unlink()
-            del sizes[oldest]
+            path.unlink(missing_ok=True)
+            taken_bytes -= size_bytes
             self.removed += 1
         begun = datetime.fromtimestamp(system_ns / 1e9, UTC)
         return self.folder / f"lcf-edge-{number:06}-{begun:%Y%m%dT%H%M%SZ}.mcap"
 
-    def _files(self) -> dict[int, Path]:
-        """Our files by number."""
-        named = ((path, _OURS.fullmatch(path.name)) for path in self.folder.iterdir())
-        return {int(name[1]): path for path, name in named if name}
+    def _files(self) -> list[tuple[int, Path, int]]:
+        """Number, path and size (bytes) of our files; a link or a folder with such a name is none of ours."""
+        files = []
+        for path in self.folder.iterdir():
+            name = _OURS.fullmatch(path.name)
+            with suppress(FileNotFoundError):  # somebody has removed it meanwhile
+                if name and stat.S_ISREG((status := path.lstat()).st_mode):
+                    files.append((int(name[1]), path, status.st_size))
+        return files
 
 
 class Named:

@@ -100,7 +100,8 @@ class RecordingFile:
 
     def abandon(self) -> None:
         """Close it as it is."""
-        os.close(self._file)
+        with suppress(OSError):  # the disk is gone; the number of the file is given back even so
+            os.close(self._file)
 
 
 class _Pending:

@@ -7,6 +7,7 @@ looks.
 
 import asyncio
 import logging
+import os
 import signal
 import socket
 import time
@@ -30,6 +31,8 @@ INTERVAL_S = 0.1  # between two updates for one browser
 PULSE_S = 1.0  # an update comes, even with nothing new
 SILENCE_S = 10.0
 MOST_BROWSERS = 16
+MOST_SAVING = 2  # at a time: each keeps the messages of its file
+FAREWELL_S = 1.0
 
 PAGE = {
     "index.html": "text/html",
@@ -73,7 +76,8 @@ class Server:
         self._history = History()
         self._loop = asyncio.get_running_loop()
         self._came = asyncio.Event()
-        self._sockets: set[web.WebSocketResponse] = set()
+        self._sockets: dict[web.WebSocketResponse, web.Request] = {}
+        self._saving = 0
         self._wanting = asyncio.Lock()
         self._monitor = Monitor(source, history=self._history, changed=self._changed)
 
@@ -103,14 +107,14 @@ class Server:
             raise web.HTTPServiceUnavailable(text=f"{MOST_BROWSERS} browsers look already\n")
         browser = web.WebSocketResponse(max_msg_size=64, compress=False, timeout=1.0)
         await browser.prepare(request)
-        self._sockets.add(browser)
-        await self._want_preview()
+        self._sockets[browser] = request
         try:
+            await self._want_preview()
             await self._tell(browser)
-        except (TimeoutError, ConnectionError):  # it does not ask any more; it is gone
-            pass
+        except (TimeoutError, ConnectionError):  # it neither asks nor takes any more; it is gone
+            _abort(request)
         finally:
-            self._sockets.discard(browser)
+            self._sockets.pop(browser)
             await self._want_preview()
             await browser.close()
         return browser
@@ -124,14 +128,24 @@ class Server:
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._came.wait(), PULSE_S)
             last_s = time.monotonic()
-            for part in audience.update(self._monitor, self._source.endpoint):
-                await (browser.send_str(part) if isinstance(part, str) else browser.send_bytes(part))
+            async with asyncio.timeout(SILENCE_S):
+                for part in audience.update(self._monitor, self._source.endpoint):
+                    await (browser.send_str(part) if isinstance(part, str) else browser.send_bytes(part))
 
     async def _want_preview(self) -> None:
         async with self._wanting:
             await asyncio.to_thread(self._monitor.want_preview, bool(self._sockets))
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
+        if self._saving >= MOST_SAVING:
+            raise web.HTTPServiceUnavailable(text=f"{MOST_SAVING} save already\n")
+        self._saving += 1
+        try:
+            return await self._saved(request)
+        finally:
+            self._saving -= 1
+
+    async def _saved(self, request: web.Request) -> web.StreamResponse:
         now_ns = time.time_ns()
         messages = self._history.messages(now_ns)
         if not messages:
@@ -144,14 +158,28 @@ class Server:
             }
         )
         await response.prepare(request)
-        for part in mcap_parts(messages, self._source.prefix):
-            await response.write(part)
-        await response.write_eof()
+        try:
+            for part in mcap_parts(messages, self._source.prefix):
+                async with asyncio.timeout(SILENCE_S):
+                    await response.write(part)
+            await response.write_eof()
+        except TimeoutError:  # it takes nothing any more
+            _abort(request)
         return response
 
     async def _let_go(self, _: web.Application) -> None:
-        for browser in [*self._sockets]:
-            await browser.close(code=1001, message=b"lcf-edge view ends")
+        ends = [browser.close(code=1001, message=b"lcf-edge view ends") for browser in self._sockets]
+        with suppress(TimeoutError):
+            async with asyncio.timeout(FAREWELL_S):
+                await asyncio.gather(*ends)
+        for request in self._sockets.values():  # who did not take it
+            _abort(request)
+
+
+def _abort(request: web.Request) -> None:
+    """Drop the connection with what waits to be sent, which nobody takes."""
+    if request.transport is not None:
+        request.transport.abort()
 
 
 def _sent(name: str, kind: str) -> Callable[[web.Request], Awaitable[web.Response]]:
@@ -181,7 +209,8 @@ def _own_address(host: str) -> str:
 
 
 def _cannot_listen(error: OSError | OverflowError, host: str, port: int) -> str:
-    reason = getattr(error, "strerror", None) or str(error)
+    code = getattr(error, "errno", None) or 0  # of a name that is not known below 0, with a text of its own
+    reason = os.strerror(code) if code > 0 else getattr(error, "strerror", None) or str(error)
     return f"view: {host}:{port}: cannot be listened on ({reason}); choose with --listen HOST and --port N"
 
 

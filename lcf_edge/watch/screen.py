@@ -15,10 +15,12 @@ from rich.text import Text
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.live.monitor import Presence, Snapshot
 from lcf_edge.live.traces import TABLES, Figures
+from lcf_edge.printable import printable
 from lcf_edge.records import Cause, Kind
 
 STALE_S = 1.0  # scenes older than this are not of now
 _TABLE_HEAD = 2  # lines: how many there are, the names of the columns
+_MOST_ILL = 100  # of the devices are looked at, the worst first
 _LEAST_CIRCLES = 3  # are shown before anything below them is
 
 _LEVELS = {Level.OK: "green", Level.WARN: "yellow", Level.ERROR: "bold red", Level.STALE: "bold yellow"}
@@ -77,17 +79,19 @@ class Screen:
         def lines(parts: Sequence[RenderableType]) -> int:
             return sum(len(console.render_lines(part, free, pad=False)) for part in parts)
 
-        head, (ill, well) = [self._connection(), self._figures()], self._devices()
+        head = [self._connection(options.is_terminal), self._figures(options.max_width)]
+        ill, well = self._devices()
         scene = self.snapshot.scene
         rebels = 0 if scene is None else int((scene.circles["kind"] == Kind.REBEL).sum())
         left = height - lines(head) - _TABLE_HEAD - max(rebels, _LEAST_CIRCLES)
         foot: list[Text] = []
-        for part in ([*ill], [*well, self._tables()]):  # what is wrong has its place before what is not
-            if lines(foot + part) <= left:
-                foot += part
+        for part in (*([one] for one in ill), [*well, self._tables()]):  # what is wrong before what is not
+            if lines(foot + part) > left:
+                break
+            foot += part
         yield Group(*head, *self._circles(options.max_width, height - lines([*head, *foot])), *foot)
 
-    def _connection(self) -> Text:
+    def _connection(self, is_terminal: bool) -> Text:
         snapshot = self.snapshot
         age_s = snapshot.scene_age_s(self.now_ns)
         since = f"since {_clock(snapshot.since_ns)} ({_duration((self.now_ns - snapshot.since_ns) / 1e9)})"
@@ -98,29 +102,31 @@ class Screen:
             if age_s < STALE_S
             else Text("there, no scenes" + ("" if math.isinf(age_s) else f" for {_duration(age_s)}"), "bold yellow"),
         }[snapshot.presence]
-        robots = Text(f"  {', '.join(snapshot.robots)}" if snapshot.robots else "", "bold")
-        rest = f"  {self.endpoint}  {_clock(self.now_ns)}  q: end"
+        robots = Text(f"  {printable(', '.join(snapshot.robots))}" if snapshot.robots else "", "bold")
+        rest = f"  {self.endpoint}  {_clock(self.now_ns)}{'  q: end' if is_terminal else ''}"
         return Text.assemble(state, robots, (rest, "dim"), no_wrap=True, overflow="ellipsis")
 
-    def _figures(self) -> Text:
-        """Rates, times, memory."""
+    def _figures(self, width: int) -> Text:
+        """Rates, times, speed, memory: as many as fit, each whole."""
         snapshot, figures = self.snapshot, Figures(self.snapshot.diagnostics)
         parts = []
+        if snapshot.broken:
+            parts.append(f"{snapshot.broken} payloads refused")
         if snapshot.scene is not None and math.isfinite(snapshot.rate_hz):
             parts.append(f"{snapshot.rate_hz:.1f} scenes/s")
         if math.isfinite(snapshot.latency_s):
-            parts.append(f"latency {1e3 * snapshot.latency_s:.1f} ms")
+            parts.append(f"latency {1e3 * snapshot.latency_s:.0f} ms")
         if (p99_ms := figures.number("pipeline", "latency_p99_ms")) is not None:
-            parts.append(f"99% {p99_ms:.1f} ms")
-        if (resident_mib := figures.number("memory", "resident_mib")) is not None:
-            parts.append(f"memory {resident_mib:.0f} of {figures.text('memory', 'budget_mib')} MiB")
-        if (temperature_c := figures.number("board", "temperature_c")) is not None:
-            parts.append(f"{temperature_c:.0f} °C")
+            parts.append(f"99% {p99_ms:.0f} ms")
         if snapshot.scene is not None:
             speed_mps = snapshot.scene.vehicle_speed
             parts.append(f"speed {speed_mps:.2f} m/s" if math.isfinite(speed_mps) else "speed unknown")
-        if snapshot.broken:
-            parts.append(f"{snapshot.broken} payloads refused")
+        if (resident_mib := figures.number("memory", "resident_mib")) is not None:
+            parts.append(f"memory {resident_mib:.0f} of {printable(figures.text('memory', 'budget_mib'), 9)} MiB")
+        if (temperature_c := figures.number("board", "temperature_c")) is not None:
+            parts.append(f"{temperature_c:.0f} °C")
+        while len(parts) > 1 and len("  ".join(parts)) > width:
+            parts.pop()
         return Text("  ".join(parts), no_wrap=True, overflow="ellipsis")
 
     def _circles(self, width: int, lines: int) -> Sequence[RenderableType]:
@@ -155,7 +161,7 @@ class Screen:
         ill = [status for status in diagnostics.status if status.level is not Level.OK]
         ill.sort(key=lambda status: _WORST_FIRST.index(status.level))
         ok = [Text.assemble(("ok  ", "green"), ", ".join(_with_rate(status) for status in well))] if well else []
-        return [_device(status) for status in ill], ok
+        return [_device(status) for status in ill[:_MOST_ILL]], ok
 
     def _tables(self) -> Text:
         figures = Figures(self.snapshot.diagnostics)
@@ -172,12 +178,13 @@ def ordered(circles: npt.NDArray[np.void]) -> npt.NDArray[np.void]:
 
 
 def _device(status: DeviceStatus) -> Text:
-    return Text.assemble((f"{status.level.name.lower()}  ", _LEVELS[status.level]), f"{status.name}: {status.message}")
+    text = printable(f"{status.name}: {status.message}")
+    return Text.assemble((f"{status.level.name.lower()}  ", _LEVELS[status.level]), text)
 
 
 def _with_rate(status: DeviceStatus) -> str:
     rate_hz = status.values.get("rate_hz", "nan")
-    return status.name if rate_hz in {"nan", ""} else f"{status.name} {rate_hz} Hz"
+    return printable(status.name if rate_hz in {"nan", ""} else f"{status.name} {rate_hz} Hz")
 
 
 def _clock(moment_ns: int) -> str:

@@ -8,7 +8,7 @@ import termios
 import time
 import tty
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from types import FrameType
 
 from rich.console import Console, RenderableType
@@ -36,10 +36,12 @@ def show(console: Console, picture: Callable[[], RenderableType]) -> None:
 def _draw(
     live: Live, picture: Callable[[], RenderableType], pressed: Callable[[float], bytes], stopped: set[int]
 ) -> bool:
-    """True: q was pressed; False: Ctrl-Z was."""
+    """True: q was pressed, or the terminal is gone; False: Ctrl-Z was."""
     due_s = time.monotonic()
     while not stopped:
         live.update(picture(), refresh=True)
+        if not live.console.is_terminal:  # any more
+            return True
         due_s = max(due_s + INTERVAL_S, time.monotonic())  # what was missed is not made up for
         while not stopped and (left_s := due_s - time.monotonic()) > 0:
             if _END_KEYS & set(pressed(left_s)):
@@ -77,13 +79,19 @@ def _keys() -> Iterator[Callable[[float], bytes]]:
 
     def pressed(timeout_s: float) -> bytes:
         ready, _, _ = select.select([file], [], [], timeout_s)
-        return os.read(file, 64) if ready else b""
+        if not ready:
+            return b""
+        with suppress(OSError):
+            if keys := os.read(file, 64):
+                return keys
+        return b"q"  # the terminal is gone
 
     try:
         tty.setcbreak(file)
         yield pressed
     finally:
-        termios.tcsetattr(file, termios.TCSADRAIN, before)
+        with suppress(termios.error):
+            termios.tcsetattr(file, termios.TCSADRAIN, before)
 
 
 def _no_keys(timeout_s: float) -> bytes:

@@ -77,7 +77,7 @@ def _settings(options: config.Zenoh) -> zenoh.Config:
         settings = zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
     except zenoh.ZError as error:
         raise PublishError(
-            f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); mend zenoh.config_file"
+            f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); mend it, or name another"
         ) from error
     untouched = zenoh.Config()
     for key, value in _UNLESS_THE_FILE_SAYS.items():
@@ -86,11 +86,12 @@ def _settings(options: config.Zenoh) -> zenoh.Config:
     settings.insert_json5("scouting/gossip/enabled", json.dumps(options.gossip))
     settings.insert_json5("mode", json.dumps(options.mode))
     for name, endpoints in (("connect", options.connect), ("listen", options.listen)):
-        if endpoints or not options.config_file:
+        key = f"{name}/endpoints"
+        if endpoints or settings.get_json(key) == untouched.get_json(key):  # else Zenoh listens on all interfaces
             try:
-                settings.insert_json5(f"{name}/endpoints", json.dumps(endpoints))
+                settings.insert_json5(key, json.dumps(endpoints))
             except zenoh.ZError as error:
-                wrong = f"zenoh.{name}: {', '.join(endpoints)}: {reason(error)}"
+                wrong = f"zenoh.{name}: {', '.join(endpoints)}: no endpoint, which is protocol/address"
                 raise PublishError(f"{wrong}; write for example tcp/127.0.0.1:7447") from error
     return settings
 

@@ -177,7 +177,7 @@ def _filled(dtype: np.dtype[np.void], rows: int, rng: np.random.Generator) -> np
     """Records with random fields; what lies between the fields is not zero."""
     records = np.frombuffer(bytes([0xAA]) * dtype.itemsize * rows, dtype).copy()
     for name in dtype.names or ():
-        records[name] = rng.integers(1, 100, rows)
+        records[name] = rng.integers(1, {"kind": 2, "cause": 4}.get(name, 100), rows)
     return records
 
 
@@ -270,6 +270,14 @@ def test_a_message_cut_short_is_an_error(ros: Typestore, samples: Callable[[str]
     assert len(ends) >= 20
     if needed == 0:
         assert len(ends) == len(payload)
+
+
+@pytest.mark.parametrize(("field", "value"), [("kind", 2), ("cause", 4), ("cause", 255)])
+def test_a_circle_of_an_unknown_kind_is_refused(field: str, value: int) -> None:
+    sent = scene(3, 2)
+    sent.circles[field][1] = value
+    with pytest.raises(cdr.CdrError, match=f"the {field} of a circle"):
+        cdr.decode_scene(cdr.encode_scene(sent, "camera"))
 
 
 def test_a_count_beyond_the_payload_takes_no_memory() -> None:

@@ -420,3 +420,9 @@ def test_tables_that_need_more_than_the_budget_are_refused(capsys: pytest.Captur
 
 def test_the_shipped_tables_take_a_small_part_of_their_budget() -> None:
     assert main(["config", "--set", f"memory.budget_mib={Memory().budget_mib / 20}"]) == 0
+
+
+@pytest.mark.parametrize("key", ["before_s", "after_s"])
+def test_a_threat_is_saved_with_an_hour_around_it_at_most(key: str) -> None:
+    assert getattr(load(None, [f"record.{key}=3600"]).record, key) == 3600
+    assert f"record.{key}" in refused(None, f"record.{key}=1e300")

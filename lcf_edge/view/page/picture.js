@@ -1,6 +1,7 @@
 // The picture: a preview's two panels, or one of them with ψ drawn on top; without previews the scene alone.
 
 const FRESH_MS = 2500;
+const LARGEST_PX = 8192; // of a side of the canvas, whatever a scene says
 const BEHIND_S = 0.25; // pictures come after everything else
 const COLOURS = { rebel: "#ff5a5a", normal: "#46d746", psi: "#ffe100", text: "#ffffff" };
 const KEYS = {
@@ -69,7 +70,7 @@ export class Picture {
 
   #drawScene() {
     const scene = this.#scene;
-    const context = this.#sized(scene.image_width, scene.image_height);
+    const context = this.#sized(Math.min(scene.image_width, LARGEST_PX), Math.min(scene.image_height, LARGEST_PX));
     context.fillStyle = "#10161c";
     context.fillRect(0, 0, scene.image_width, scene.image_height);
     drawPsi(context, scene.psi);

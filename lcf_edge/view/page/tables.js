@@ -56,9 +56,11 @@ export function showCircles(body, count, scene) {
 export function showDevices(box, status) {
   box.querySelector(":scope > p")?.remove();
   const shown = new Map([...box.children].map((element) => [element.dataset.name, element]));
+  const kept = new Set();
   for (const one of status) {
     const element = shown.get(one.name) ?? box.appendChild(device(one.name));
     shown.delete(one.name);
+    kept.add(element);
     const [, level, message] = element.firstElementChild.children;
     level.dataset.level = one.level;
     set(level, one.level);
@@ -68,7 +70,7 @@ export function showDevices(box, status) {
     while (values.children.length > texts.length) values.lastElementChild.remove();
     texts.forEach((text, at) => set(values.children[at] ?? values.appendChild(make(at % 2 ? "dd" : "dt")), text));
   }
-  shown.forEach((element) => element.remove());
+  [...box.children].forEach((element) => kept.has(element) || element.remove());
 }
 
 function device(title) {

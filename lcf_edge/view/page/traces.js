@@ -40,8 +40,7 @@ export class Traces {
   }
 
   add(points) {
-    const last = this.#points.at(-1)?.at_ns ?? 0;
-    const all = [...this.#points, ...points.filter((point) => point.at_ns > last)];
+    const all = [...this.#points.filter((point) => point.at_ns < points[0].at_ns), ...points];
     const newest = all.at(-1).at_ns;
     this.#points = all.filter((point) => newest - point.at_ns <= SPAN_S * 1e9);
     this.draw();

@@ -1,5 +1,6 @@
 """What was found goes into the configuration file, and nothing else of it changes."""
 
+import os
 import tomllib
 from pathlib import Path
 
@@ -43,6 +44,16 @@ def test_a_link_stays_one_and_the_mode_stays(tmp_path: Path) -> None:
     assert path.stat().st_mode & 0o777 == 0o640
     assert load(path).camera.pitch_rad == 0.1
     assert sorted(file.name for file in tmp_path.iterdir()) == ["config.toml", "rover.toml"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root may write for others")
+def test_the_owner_stays(tmp_path: Path) -> None:
+    path = tmp_path / "rover.toml"
+    path.write_text(FILE, encoding="utf-8")
+    path.chmod(0o640)
+    os.chown(path, 1234, 4321)
+    write(path, "camera", {"pitch_rad": 0.1})
+    assert (path.stat().st_uid, path.stat().st_gid, path.stat().st_mode & 0o777) == (1234, 4321, 0o640)
 
 
 def test_what_would_not_be_valid_changes_nothing(tmp_path: Path) -> None:

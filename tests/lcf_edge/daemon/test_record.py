@@ -81,6 +81,7 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
     assert counts["/lcf/speed"] > 0
     assert counts["/lcf/diagnostics"] > 0
     assert load(file).camera.height_m == 0.77
+    assert load(file).record.when == "never"  # run -c drive.mcap records nothing unasked
     assert replayed(file, "-c", file).split()[:2] == ["frames", f"{pictures},"]
 
 

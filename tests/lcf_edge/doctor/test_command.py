@@ -117,6 +117,12 @@ def test_colours_are_for_terminals_that_want_them(no_color: str, colours: bool) 
     assert said.startswith("\x1b[31mfail\x1b[0m  configuration" if colours else "fail  configuration")
 
 
+def test_names_of_others_do_not_command_the_terminal() -> None:
+    told = line(Finding(Level.FAIL, "network", "taken by \x1b]0;mine\x07\x9b2J\n, process 7", "kill 7"))
+    assert all(part.isprintable() for part in told.split("\n"))
+    assert len(told.split("\n")) == 2
+
+
 def test_the_remedy_is_below_and_can_be_pasted() -> None:
     told = line(Finding(Level.WARN, "clock", "wrong", "sudo timedatectl set-ntp true"))
     first, remedy = told.splitlines()

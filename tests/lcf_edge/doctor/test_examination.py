@@ -12,7 +12,7 @@ from lcf_edge.config import Config
 from lcf_edge.doctor import configuration
 from lcf_edge.doctor.configuration import check, context_of
 from lcf_edge.doctor.examination import STEPS, Step, examine
-from lcf_edge.doctor.finding import Context, Finding, Level, ok
+from lcf_edge.doctor.finding import Context, Finding, Level, edit, ok
 from lcf_edge.errors import ConfigError
 
 Machine = Callable[..., Context]
@@ -101,6 +101,11 @@ def test_a_remedy_keeps_what_was_asked_for(tmp_path: Path) -> None:
 def test_the_configuration_of_a_recording_sets_every_key(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(configuration, "load", lambda *_: Config())
     assert {"camera.height_m", "log.level"} <= context_of(Path("drive.mcap"), []).given
+
+
+def test_a_file_of_any_name_can_be_pasted() -> None:
+    assert edit(Path("/home/a b;reboot/$x.toml")) == "${EDITOR:-nano} '/home/a b;reboot/$x.toml'"
+    assert edit(Path("/etc/it's"), "why") == "sudoedit '/etc/it'\"'\"'s'  # why"
 
 
 def test_a_wrong_key_fails_with_the_file_to_edit(tmp_path: Path) -> None:

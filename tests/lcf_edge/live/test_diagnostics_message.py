@@ -45,3 +45,12 @@ def test_a_figure_is_a_number_or_unknown(value: str) -> None:
     figures.fill("psi")
     number = figures.number("pipeline", "x")
     assert number is None or number == float(value)
+
+
+@pytest.mark.parametrize("digits", [10, 30, 5000])
+def test_a_fill_that_no_table_has_is_unknown(digits: int) -> None:
+    """Larger numbers would fit neither ``int`` nor JSON."""
+    pipeline = DeviceStatus("pipeline", Level.OK, "", {"psi_fill": f"{'9' * digits}/32", "corners_fill": "3/1500"})
+    figures = Figures(decode_diagnostics(encode_diagnostics(0, "", [pipeline])))
+    assert figures.fill("psi") is None
+    assert figures.fill("corners") == (3, 1500)

@@ -4,6 +4,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.live.history import History, Message
+from lcf_edge.live.traces import Point, Traces
 
 SECOND_NS = 10**9
 
@@ -37,3 +38,21 @@ def test_what_is_old_goes_also_when_nothing_comes() -> None:
     history.add(Message("scene", 0, b"x"))
     assert history.messages(5 * SECOND_NS)
     assert not history.messages(5 * SECOND_NS + 1)
+
+
+def test_traces_go_on_when_the_clock_was_set_back() -> None:
+    traces = Traces()
+
+    def add(*moments_s: int) -> None:
+        for at_s in moments_s:
+            traces.add(Point.of(at_s * SECOND_NS, None, 0.0, None))
+
+    def since(at_s: int) -> list[int]:
+        return [point.at_ns // SECOND_NS for point in traces.since(at_s * SECOND_NS)]
+
+    add(100, 101, 102)
+    assert (since(100), since(102)) == ([101, 102], [])
+    add(101)
+    assert since(102) == [100, 101]
+    add(102)
+    assert since(101) == [102]

@@ -37,6 +37,26 @@ def test_the_oldest_of_ours_give_way_and_no_others(tmp_path: Path) -> None:
     assert path.name.startswith("lcf-edge-000013-")
 
 
+def test_links_and_folders_with_such_a_name_are_not_ours(tmp_path: Path) -> None:
+    elsewhere = filled(tmp_path / "elsewhere", 100)
+    ours = filled(tmp_path / "ours" / "lcf-edge-000004-20261121T134100Z.mcap", 1)
+    names = [ours.with_name(f"lcf-edge-{number:06}-20261121T134100Z.mcap") for number in range(1, 4)]
+    names[0].symlink_to(elsewhere)
+    names[1].symlink_to(tmp_path / "nowhere")
+    names[2].mkdir()
+    folder = Folder(Record(folder=str(ours.parent), file_mib=10, total_mib=10))
+    assert folder.next(NOW_NS).name.startswith("lcf-edge-000005-")
+    assert folder.removed == 1
+    assert sorted(ours.parent.iterdir()) == names
+    assert elsewhere.exists()
+
+
+def test_two_of_the_same_number_count_both(tmp_path: Path) -> None:
+    ours = [filled(tmp_path / f"lcf-edge-000001-{year}1121T134100Z.mcap", 9) for year in (2025, 2026)]
+    Folder(Record(folder=str(tmp_path), file_mib=10, total_mib=20)).next(NOW_NS)
+    assert [file.exists() for file in ours] == [False, True]
+
+
 def test_a_folder_that_cannot_be_made(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(OSError, match="file"):

@@ -1,5 +1,6 @@
 """A file is whole, or readable up to where something ended it."""
 
+import errno
 import os
 import shutil
 from pathlib import Path
@@ -86,6 +87,15 @@ def test_a_recording_of_others_has_no_configuration(tmp_path: Path, whole: Path)
             load(file)
 
 
+def test_an_attachment_of_exabytes_is_none(whole: Path) -> None:
+    data = bytearray(whole.read_bytes())
+    kind = data.index(b"application/toml") + len(b"application/toml")
+    data[kind : kind + 8] = b"\xff" * 7 + b"\x3f"  # the length of the attachment's data
+    whole.write_bytes(data)
+    with pytest.raises(ConfigError, match="no configuration in it"):
+        load(whole)
+
+
 def test_what_was_synced_is_there_without_an_end(tmp_path: Path, recorded: Any, by_mcap: Any) -> None:
     file = begun(tmp_path / "open.mcap")
     messages = list(recorded(4))
@@ -130,4 +140,16 @@ def test_it_notices_that_it_was_removed(tmp_path: Path) -> None:
     assert not file.vanished
     file.path.unlink()
     assert file.vanished
+    file.abandon()
+
+
+def test_a_disk_that_fails_at_closing_ends_nothing_else(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = begun(tmp_path / "pulled.mcap")
+    close = os.close
+
+    def fail(number: int) -> None:
+        close(number)
+        raise OSError(errno.EIO, "Input/output error")
+
+    monkeypatch.setattr(os, "close", fail)
     file.abandon()

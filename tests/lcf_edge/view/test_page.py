@@ -67,6 +67,17 @@ def test_it_says_that_the_rover_is_away_and_comes_back(rover: Any, view: Callabl
     browser.wait_for(f"{STATE}.startsWith('rover is there, but no scenes for ')")
 
 
+def test_two_devices_of_one_name_are_two(rover: Any, view: Callable[..., Any], browser: Any) -> None:
+    camera, imu, *_ = rover.status
+    rover.status = (camera, imu, replace(imu, level=Level.STALE, message="<b>again</b>"))
+    browser.open(view().address)
+    browser.wait_for(f"{LIVE} && document.querySelectorAll('#devices details').length")
+    seq = rover.seq
+    rover.wait_for(lambda: rover.seq > seq + 30)
+    assert browser.evaluate("document.querySelectorAll('#devices details').length") == 3
+    assert "<b>again</b>" in browser.evaluate("document.getElementById('devices').textContent")
+
+
 def test_without_a_rover_it_waits(view: Callable[..., Any], browser: Any, endpoint: str) -> None:
     browser.open(view().address)
     browser.wait_for(f"{STATE}.startsWith('waiting for a daemon at {endpoint} since ')")

@@ -13,11 +13,17 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import aiohttp
+import numpy as np
 import pytest
+from aiohttp import web
 from mcap.reader import make_reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lcf_edge.command_line import main
+from lcf_edge.live.source import Source
+from lcf_edge.records import CIRCLE
+from lcf_edge.view import server
+from lcf_edge.view.guard import Guard
 
 PATIENCE_S = 30.0
 
@@ -219,6 +225,46 @@ def test_with_nothing_to_save_it_says_so(lonely: str) -> None:
     assert (answer.status, answer.body) == (404, b"nothing came in the last seconds: there is nothing to save\n")
 
 
+def deaf(address: str) -> socket.socket:
+    """A browser that asks for update after update and reads none of them."""
+    parts = urlsplit(address)
+    browser = socket.socket()
+    browser.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 4096)
+    browser.connect((parts.hostname, parts.port))
+    browser.sendall(
+        f"GET /updates HTTP/1.1\r\nHost: {parts.netloc}\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+        "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n".encode()
+    )
+    browser.sendall(b"\x81\x84\0\0\0\0next" * 100)  # masked with zeros
+    return browser
+
+
+def test_a_signal_ends_it_while_somebody_takes_nothing(rover: Any, view: Callable[..., Any]) -> None:
+    rover.circles = np.zeros(15_000, CIRCLE)  # a few updates fill what lies between the two
+    served = view()
+    with deaf(served.address):
+        rover.wait_for(lambda: rover.previews > 20)
+        assert served.end() == (0, "")
+
+
+def test_who_takes_nothing_is_let_go(rover: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server, "SILENCE_S", 1.0)
+    rover.circles = np.zeros(15_000, CIRCLE)
+
+    async def look() -> None:
+        serving = server.Server(Source(rover.endpoint))
+        runner = web.AppRunner(serving.application(Guard("127.0.0.1")))
+        await runner.setup()
+        await web.TCPSite(runner, "127.0.0.1", 0).start()
+        with deaf(f"http://127.0.0.1:{runner.addresses[0][1]}/"):
+            await asyncio.to_thread(rover.wait_for, lambda: rover.previews)
+            await asyncio.to_thread(rover.wait_for, lambda: rover.unseen > 20)
+        await runner.cleanup()
+        serving.close()
+
+    asyncio.run(look())
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_a_signal_ends_it_while_somebody_looks(rover: Any, view: Callable[..., Any], number: signal.Signals) -> None:
     served = view()
@@ -253,7 +299,7 @@ def test_what_cannot_be_served_ends_in_one_line(
 def test_a_port_in_use(lonely: str, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(urlsplit(lonely).port)
     assert main(["view", "--port", port]) == 1
-    assert f"127.0.0.1:{port}: cannot be listened on (" in capsys.readouterr().err
+    assert f"127.0.0.1:{port}: cannot be listened on (Address already in use)" in capsys.readouterr().err
 
 
 def test_without_the_library_it_names_the_extra(

@@ -51,7 +51,7 @@ def shown(snapshot: Snapshot, width: int = 100, height: int = 24, later_s: float
 def test_all_of_it_is_on_a_usual_terminal() -> None:
     lines = shown(snapshot())
     assert lines[0].startswith("live  rover  tcp/127.0.0.1:7447")
-    assert lines[1].split("  ")[:3] == ["20.0 scenes/s", "latency 3.1 ms", "99% 8.2 ms"]
+    assert lines[1].split("  ")[:3] == ["20.0 scenes/s", "latency 3 ms", "99% 8 ms"]
     assert "memory 91 of 96 MiB" in lines[1]
     assert "speed 1.50 m/s" in lines[1]
     assert lines[2].strip() == "2 rebels  5 normal  3 ψ"
@@ -109,5 +109,46 @@ def test_it_says_whether_the_daemon_is_there(known: Snapshot, later_s: float, te
     assert shown(known, later_s=later_s)[0].startswith(text)
 
 
+def test_figures_are_whole_or_not_there() -> None:
+    of_80 = ["20.0 scenes/s", "latency 3 ms", "99% 8 ms", "speed 1.50 m/s", "memory 91 of 96 MiB"]
+    for width in range(13, 81):
+        figures = shown(snapshot(), width)[1].split("  ")
+        assert figures == of_80[: len(figures)]
+    assert len(figures) == len(of_80)
+
+
+def test_only_a_terminal_has_a_key_to_press() -> None:
+    for is_terminal in (False, True):
+        console = Console(width=80, height=24, color_system=None, force_terminal=is_terminal)
+        with console.capture() as text:
+            console.print(Screen(snapshot(), "tcp/127.0.0.1:7447", NOW_NS))
+        assert ("q: end" in text.get()) == is_terminal
+
+
 def test_what_was_refused_is_told() -> None:
     assert "3 payloads refused" in shown(replace(snapshot(), broken=3), width=120)[1]
+
+
+def test_what_others_send_does_not_command_the_terminal() -> None:
+    evil = "\x1b]0;mine\x07\x1b[2J\x9b2J\r\n\u202e"
+    status = [DeviceStatus(f"a{evil}", level, f"b{evil}", {"rate_hz": evil}) for level in Level]
+    memory = DeviceStatus("memory", Level.OK, "", {"resident_mib": "1", "budget_mib": evil})
+    lines = shown(replace(snapshot(1, 1, *status, memory), robots=(f"rover{evil}",)))
+    assert len(lines) <= 24
+    assert "rover\ufffd]0;mine" in lines[0]
+    assert all(line.isprintable() for line in lines)
+
+
+def test_an_endless_message_takes_a_few_lines_only() -> None:
+    lines = shown(snapshot(1, 1, DeviceStatus("imu", Level.ERROR, "bad " * 200_000)))
+    assert sum("bad" in line for line in lines) < 10
+
+
+def test_of_many_devices_that_are_not_well_the_worst_are_shown() -> None:
+    many = [DeviceStatus(f"d{number}", Level.WARN, "slow") for number in range(500)]
+    lines = shown(snapshot(2, 5, *many, AWAY))
+    assert [line for line in lines if line.startswith(("error", "warn"))][:2] == [
+        "error  imu: away since 2026-01-01T00:00:00Z: unplugged",
+        "warn  d0: slow",
+    ]
+    assert len(lines) <= 24

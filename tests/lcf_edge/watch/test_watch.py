@@ -231,3 +231,15 @@ def test_wrong_usage_is_one_line(arguments: tuple[str, ...], status: int, part: 
         assert done.returncode == status
         assert len(done.stderr.splitlines()) == 1
         assert part in done.stderr
+
+
+def test_when_the_terminal_goes_away_it_ends(endpoint: str) -> None:
+    ours, theirs = pty.openpty()
+    command = (sys.executable, "-m", "lcf_edge", "watch", "--connect", endpoint)
+    process = subprocess.Popen(command, stdin=theirs, stdout=theirs, stderr=subprocess.PIPE, start_new_session=True)
+    os.close(theirs)
+    os.read(ours, 1)  # it draws
+    os.close(ours)  # it is not the terminal of its session: no SIGHUP comes
+    _, said = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode in {0, 1}  # it wanted to read, or to write
+    assert len(said.decode().splitlines()) == process.returncode

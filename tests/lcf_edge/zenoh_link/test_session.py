@@ -74,6 +74,16 @@ def test_without_an_endpoint_nothing_listens() -> None:
 
 
 @needs_proc
+@pytest.mark.parametrize("mode", ["peer", "router"])
+def test_with_a_configuration_file_that_names_no_endpoint_nothing_listens(tmp_path: Path, mode: str) -> None:
+    """Zenoh itself would listen on all interfaces."""
+    file = tmp_path / "zenoh.json5"
+    file.write_text("{transport: {link: {tls: {enable_mtls: true}}}}")
+    options = Zenoh(mode=mode, listen=[], config_file=str(file))  # type: ignore[arg-type]
+    assert listening_addresses(options) == (set(), set())
+
+
+@needs_proc
 def test_a_configuration_file_is_heard_and_the_keys_go_on_top(tmp_path: Path, endpoint: str) -> None:
     file = tmp_path / "zenoh.json5"
     file.write_text(f'{{listen: {{endpoints: ["{endpoint}"]}}, mode: "router"}}')
