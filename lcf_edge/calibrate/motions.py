@@ -258,9 +258,7 @@ def _painter(motions: Motions) -> "Callable[[Figure], None]":
         for axes, values, title in both:
             for column, colour, name in zip(values.T, report.AXIS_COLOURS, "xyz", strict=True):
                 axes.plot(times_s, column, color=colour, linewidth=1, label=f"IMU's {name}")
-            axes.set_title(title, loc="left")
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
+            report.plain(axes, title)
             axes.legend(loc="upper right", fontsize=8)
         axes.set_xlabel("s")
 

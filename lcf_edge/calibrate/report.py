@@ -10,10 +10,11 @@ from lcf_edge.errors import UsageError
 from lcf_edge.sinks import cannot_write, check_output
 
 if TYPE_CHECKING:
+    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 SUFFIXES = (".png", ".svg", ".pdf")
-BLUE, RED, GREEN, GREY = "#1f77b4", "#d62728", "#2ca02c", "#8a8a8a"
+BLUE, RED, GREEN = "#1f77b4", "#d62728", "#2ca02c"
 AXIS_COLOURS = (RED, GREEN, BLUE)  # x, y, z
 
 
@@ -39,3 +40,10 @@ def save_figure(figure: "Figure", path: Path) -> None:
         figure.savefig(path)
     except OSError as error:
         raise cannot_write(path, error) from error
+
+
+def plain(axes: "Axes", title: str) -> None:
+    """A plot of curves as all of them look."""
+    axes.set_title(title, loc="left")
+    axes.grid(alpha=0.25)
+    axes.spines[["top", "right"]].set_visible(False)

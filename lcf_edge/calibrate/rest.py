@@ -164,9 +164,7 @@ def painter(samples: Sequence[ImuSample], rest: Rest) -> "Callable[[Figure], Non
             for column, colour, name in zip(values.T, report.AXIS_COLOURS, "xyz", strict=True):
                 axes.plot(times_s, column, ".", color=colour, markersize=2, label=name)
                 axes.axhline(column.mean(), color=colour, linewidth=1)
-            axes.set_title(title, loc="left")
-            axes.grid(alpha=0.25)
-            axes.spines[["top", "right"]].set_visible(False)
+            report.plain(axes, title)
             axes.legend(loc="upper right", fontsize=8)
         axes.set_xlabel("s")
 

@@ -14,7 +14,6 @@ from lcf_edge.calibrate.sources import Source
 from lcf_edge.config import Config
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
 _LARGEST_SIGMA_S = 0.004
@@ -64,23 +63,14 @@ def painter(alignment: Alignment) -> "Callable[[Figure], None]":
             axes.plot(alignment.times_s, alignment.gyro[:, row], color=report.RED, linewidth=1, label="gyro, aligned")
             axes.plot(alignment.times_s, alignment.camera[:, row], ".", color=report.BLUE, markersize=3, label="camera")
             axes.set_ylabel(f"{name}\nrad/s")
-            _plain(axes)
+            report.plain(axes, "rates about the camera's axes" if row == 0 else "")
             if row == 0:
                 axes.legend(loc="upper right", fontsize=8)
-                axes.set_title("rates about the camera's axes", loc="left")
         axes.set_xlabel("s")
         axes = figure.add_subplot(grid[:, 1])
         axes.plot(1000 * alignment.offsets_s, alignment.correlations, color=report.BLUE)
         axes.axvline(1000 * alignment.offset_s, color=report.RED, linewidth=1)
-        axes.set_title(
-            f"correlation, best {alignment.correlation:.3f} at {1000 * alignment.offset_s:.1f} ms", loc="left"
-        )
         axes.set_xlabel("camera time less IMU time, ms")
-        _plain(axes)
+        report.plain(axes, f"correlation, best {alignment.correlation:.3f} at {1000 * alignment.offset_s:.1f} ms")
 
     return paint
-
-
-def _plain(axes: "Axes") -> None:
-    axes.spines[["top", "right"]].set_visible(False)
-    axes.grid(alpha=0.25)

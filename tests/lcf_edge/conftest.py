@@ -1,13 +1,19 @@
-"""A rover for the tools that look at one: all that the daemon publishes, over real Zenoh, without a camera."""
+"""A rover for the tools that look at one: all that the daemon publishes, over real Zenoh, without a camera.
+
+And another implementation of ROS 2 messages, which knows ours.
+"""
 
 import threading
 import time
 from collections.abc import Callable, Iterator
 from functools import cached_property
+from importlib.resources import files
 
 import cv2
 import numpy as np
 import pytest
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+from rosbags.typesys.store import Typestore
 
 from lcf_edge.config import Config, Zenoh
 from lcf_edge.diagnostics import DeviceStatus, Level
@@ -108,3 +114,13 @@ def rover(endpoint: str) -> Iterator[Rover]:
     rover = Rover(endpoint)
     yield rover
     rover.leave()
+
+
+@pytest.fixture(scope="session")
+def ros() -> Typestore:
+    """An independent implementation of ROS 2 messages, which knows ours by their definitions alone."""
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    for name in ("Circle", "PsiRegion", "Scene"):
+        text = (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8")
+        store.register(get_types_from_msg(text, f"lcf_msgs/msg/{name}"))
+    return store

@@ -10,7 +10,6 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lcf_edge import cdr
@@ -29,15 +28,6 @@ DECODERS: dict[str, Callable[[bytes], Any]] = {
 
 FRAME_IDS = ["", "c", "cam", "camera", "camera_link", "Kamera größer"]  # all alignments behind a string
 STAMP_NS = 1_700_000_000_123_456_789
-
-
-@pytest.fixture(scope="module")
-def ros() -> Typestore:
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    for name in ("Circle", "PsiRegion", "Scene"):
-        text = (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8")
-        store.register(get_types_from_msg(text, f"lcf_msgs/msg/{name}"))
-    return store
 
 
 @pytest.fixture(scope="module")

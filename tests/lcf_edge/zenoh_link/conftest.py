@@ -11,14 +11,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import zenoh
-from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lcf_edge.config import Zenoh
@@ -131,16 +129,6 @@ def until_matched() -> Callable[[zenoh.Session, str], None]:
         publisher.undeclare()
 
     return wait
-
-
-@pytest.fixture(scope="session")
-def ros() -> Typestore:
-    """An independent implementation of ROS 2 messages, which knows ours by their definitions alone."""
-    store = get_typestore(Stores.ROS2_HUMBLE)
-    for name in ("Circle", "PsiRegion", "Scene"):
-        text = (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8")
-        store.register(get_types_from_msg(text, f"lcf_msgs/msg/{name}"))
-    return store
 
 
 @pytest.fixture(scope="session")

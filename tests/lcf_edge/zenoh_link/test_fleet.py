@@ -8,12 +8,14 @@ from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 import pytest
 import zenoh
 
 from lcf_edge import client
+from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Publish, Zenoh
-from lcf_edge.records import Scene
+from lcf_edge.records import CIRCLE, PSI_REGION, Scene
 from lcf_edge.zenoh_link import open_session
 from lcf_edge.zenoh_link.link import Link
 
@@ -87,3 +89,12 @@ def test_a_rover_starts_without_the_router(endpoint: str) -> None:
     config = configuration("rover_1", endpoint)
     link = Link(open_session(config.zenoh), config)
     link.close()
+
+
+def test_a_scene_is_as_large_as_the_document_says() -> None:
+    def size(circles: int, regions: int) -> int:
+        rows, psi = np.zeros(circles, CIRCLE), np.zeros(regions, PSI_REGION)
+        return len(encode_scene(Scene(1, 1, 640, 480, 1.0, rows, psi), Publish().frame_id))
+
+    (told,) = re.findall(r"A scene is (\d+) bytes and (\d+) more for each circle, (\d+) for each ψ region", DOCUMENT)
+    assert (size(0, 0), size(1, 0) - size(0, 0), size(0, 1) - size(0, 0)) == tuple(map(int, told))
