@@ -72,8 +72,10 @@ class Context:
         return " ".join(("lcf-edge doctor", *words)) + ("  # then in the configuration" if settings else "")
 
     def calibrate(self, what: str) -> str:
-        """The command that measures something and writes it into the configuration."""
-        return f"lcf-edge calibrate {what} -c {shlex.quote(str(self.path))} --write"
+        """The command that measures something and writes it into the configuration, which must be there."""
+        file = shlex.quote(str(self.path))
+        command = f"lcf-edge calibrate {what} -c {file} --write"
+        return command if self.path.is_file() else f"sudo install -D /dev/null {file} && sudo {command}"
 
 
 Check: TypeAlias = Callable[[Context], Iterator[Finding]]

@@ -1,7 +1,10 @@
 """What the filter was not told about the vehicle."""
 
+import shlex
 from collections.abc import Callable
+from pathlib import Path
 
+from lcf_edge.arguments import parser
 from lcf_edge.config import Camera, Config, Imu, Vehicle
 from lcf_edge.doctor import calibration
 from lcf_edge.doctor.finding import Context, Level
@@ -48,3 +51,23 @@ def test_the_accelerometer_alone_is_no_speed(machine: Machine) -> None:
     *_, speed = calibration.check(machine(config))
     assert speed.level is Level.WARN
     assert "drifts" in speed.text
+
+
+def test_the_remedy_can_be_typed_and_makes_the_file_that_it_writes_to(machine: Machine, tmp_path: Path) -> None:
+    file = tmp_path / "a rover.toml"
+    config = Config(imu=Imu(driver="mpu6050"))
+
+    context = machine(config, path=file)
+
+    def remedies() -> list[str]:
+        found = calibration.check(context)
+        return [finding.remedy for finding in found if "lcf-edge calibrate" in finding.remedy.partition("#")[0]]
+
+    without = remedies()
+    assert all(shlex.split(remedy)[:5] == ["sudo", "install", "-D", "/dev/null", str(file)] for remedy in without)
+    file.touch()
+    for remedy, before in zip(remedies(), without, strict=True):
+        program, *arguments = shlex.split(remedy.partition("#")[0])
+        assert program == "lcf-edge"
+        assert parser().parse_args(arguments).write
+        assert before.endswith(f"&& sudo {remedy}")
