@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench hil soak lint types clean help install install-program install-files uninstall
+.PHONY: demo test compile bench hil soak lint types clean help install install-program install-files uninstall
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -11,33 +11,50 @@ help:
 	@echo "make bench  measure detection quality and speed against other methods (tables in benchmarks/results/)"
 	@echo "make hil    as root: the installed daemon on a real kernel, in a virtual machine (docs/hil.md)"
 	@echo "make soak   the daemon at full speed with random faults: MINUTES=60 or FRAMES=200000"
+	@echo "make compile   the filter alone, after a change; demo, test and the others do it themselves"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
-# One stamp per set of dependencies, so that the demo does not install the test tools.
-$(VENV)/.run: pyproject.toml
+# What builds the program.
+$(BIN)/cython: pyproject.toml
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[plot,view,watch]"
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check "setuptools>=77" "Cython>=3.2"
 	touch $@
 
-$(VENV)/.dev: pyproject.toml
-	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --disable-pip-version-check -e ".[dev]"
+# The filter, compiled anew when one of its files has changed. Without a compiler it stays Python, and each time tries
+# again, since a compiler may have come.
+SAY_COMPILED := 'from lcf_edge.compilation import uncompiled; print("lcf-edge:", uncompiled() or "the filter is compiled")'
+DECLARATIONS := $(shell find lcf_edge -name '*.pxd')
+$(VENV)/.compiled: setup.py lcf_edge/_compiled.c $(DECLARATIONS) $(wildcard $(DECLARATIONS:.pxd=.py)) | $(BIN)/cython
+	$(BIN)/python setup.py --quiet build_ext --inplace
+	$(BIN)/python -c $(SAY_COMPILED)
+	if test -e lcf_edge/_compiled.abi3.so; then touch $@; fi
+
+compile: $(VENV)/.compiled
+
+# One stamp per set of dependencies, so that the demo does not install the test tools.
+INSTALL := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e
+$(VENV)/.run: pyproject.toml | $(VENV)/.compiled
+	$(INSTALL) ".[plot,view,watch]"
+	touch $@
+
+$(VENV)/.dev: pyproject.toml | $(VENV)/.compiled
+	$(INSTALL) ".[dev]"
 	touch $@ $(VENV)/.run
 
-demo: $(VENV)/.run
+demo: $(VENV)/.run $(VENV)/.compiled
 	$(BIN)/lcf-edge demo --out demo-out
 
-test: $(VENV)/.dev
+test: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest
 
-bench: $(VENV)/.dev
+bench: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m benchmarks.run $(BENCH)
 
-hil: $(VENV)/.dev
+hil: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest hil_mocks/vm -o timeout=600 -p no:cacheprovider --durations=5 $(HIL)
 
-soak: $(VENV)/.dev
+soak: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m hil_mocks.soak $(if $(FRAMES),--frames $(FRAMES),--minutes $(or $(MINUTES),10)) $(SOAK)
 
 lint: $(VENV)/.dev
@@ -48,7 +65,7 @@ types: $(VENV)/.dev
 	$(BIN)/mypy
 
 clean:
-	rm -rf $(VENV) demo-out dist .pytest_cache .mypy_cache .ruff_cache
+	rm -rf $(VENV) build dist demo-out lcf_edge/_compiled.*.so *.egg-info .pytest_cache .mypy_cache .ruff_cache
 
 # The daemon, as a service of the system (docs/install.md). DESTDIR=FOLDER: into an image; FILES_ONLY=1: all but the
 # program; PURGE=1: uninstall also removes configuration and recordings.
@@ -63,6 +80,10 @@ GROUPS := $(IMAGE)/etc/sysusers.d/lcf-edge.conf
 MODULES := $(IMAGE)/etc/modules-load.d/lcf-edge.conf
 RUNNING := test -z "$(IMAGE)" -a -d /run/systemd/system
 
+# Built in a copy, so that nothing of root's stays in the source.
+PACKED := lcf_edge drivers hil_mocks pyproject.toml setup.py README.md LICENSE $(wildcard build/compiled)
+COPIED := copy=$$(mktemp -d) && trap 'rm -rf "$$copy"' EXIT && cp -Rp --parents $(PACKED) "$$copy"
+
 install: $(if $(FILES_ONLY),,install-program) install-files
 	$(if $(IMAGE),,systemd-sysusers lcf-edge.conf)
 	if $(RUNNING); then \
@@ -75,7 +96,9 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 
 install-program:
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
-	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check ".[view,watch]"
+	umask 022; $(COPIED) && cd "$$copy" && \
+		"$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check ".[view,watch]"
+	"$(PROGRAM)/bin/python" -P -c $(SAY_COMPILED)
 	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
 	install -d "$(dir $(COMMAND))"
 	ln -sfn /opt/lcf-edge/bin/lcf-edge "$(COMMAND)"

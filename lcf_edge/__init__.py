@@ -5,3 +5,7 @@ Data flows one way: a source of frames, IMU samples and speed (a recording or dr
 """
 
 __version__ = "0.1.0"
+
+from lcf_edge.compilation import use_compiled
+
+use_compiled()

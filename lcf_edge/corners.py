@@ -6,16 +6,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.appearance import BORDER_PX, appearance
 from lcf_edge.config import Filter
 from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 
-BORDER_PX = 7  # the appearance samples must lie inside the picture
 FAST_FROM_PX = BORDER_PX - 3  # FAST itself leaves out 3 px
-RING_PX = (
-    (4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3),
-    (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
-)  # fmt: skip
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 THRESHOLDS = (13, 90)
 
@@ -34,8 +30,6 @@ class CornerDetector:
         self.threshold = settings.fast_threshold
         self._too_many: bool | None = None  # in the last frame
         self._fast = cv2.FastFeatureDetector.create(self.threshold, True, cv2.FAST_FEATURE_DETECTOR_TYPE_9_16)
-        ring = np.array(RING_PX)
-        self._ring = (ring[:, 1] * lens.width + ring[:, 0]).astype(np.int32)
 
     def detect(self, image: npt.NDArray[np.uint8]) -> tuple[Corners, int]:
         """Corners of a (height, width) picture, and how many were left out because the budget was full."""
@@ -56,16 +50,7 @@ class CornerDetector:
             keep = keep[strongest_spread(pixel[keep], strength, self._capacity)]
         if len(keep) < found:
             pixel, position = pixel.take(keep, axis=0), position.take(keep, axis=0)
-        return Corners(pixel, position, self._appearance(image, pixel)), evicted
-
-    def _appearance(self, image: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.uint8]:
-        """Grey samples around whole pixels, (n, 16); mean moved to 128, so that a change of light is no change."""
-        base = pixel[:, 1] * np.int32(self._lens.width) + pixel[:, 0]
-        looks: npt.NDArray[np.int16] = image.reshape(-1).take(base[:, None] + self._ring).astype(np.int16)
-        looks += np.int16(128) - (looks.sum(axis=1, keepdims=True, dtype=np.int16) >> 4)
-        np.maximum(looks, 0, out=looks)
-        np.minimum(looks, 255, out=looks)
-        return looks.astype(np.uint8)
+        return Corners(pixel, position, appearance(image, pixel)), evicted
 
     def _adapt(self, found: int) -> None:
         """Next frame's threshold.

@@ -1,5 +1,6 @@
 """What several tests drive with: a wall of clutter that comes nearer, something that crosses, any lens; a free port."""
 
+import os
 import socket
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -12,6 +13,7 @@ import pytest
 from hypothesis import settings
 
 from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge.compilation import extension
 from lcf_edge.lens import Lens
 
 # A shared machine may be slow at any moment; what failed once is printed, not kept in the tree.
@@ -24,6 +26,13 @@ Item = Frame | ImuSample | SpeedSample
 PINHOLE = Lens(320, 240, 250.0, 250.0, 159.5, 119.5)
 IMU_HZ = 100
 GRAVITY_MPS2 = 9.81
+
+
+def pytest_configure() -> None:
+    """No test runs uncompiled by mistake: an extension older than its sources is not used."""
+    compiled = extension()
+    if compiled.outdated or (compiled.reason and os.environ.get("LCF_EDGE_COMPILED") == "1"):
+        raise pytest.UsageError(f"the filter is not compiled: {compiled.reason}; {compiled.command}")
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,10 @@ PACKAGES = (
     "libnss-systemd",
     "kmod",
     "iproute2",
+    "gcc",
     "make",
     "python3",
+    "python3-dev",
     "python3-venv",
     "v4l-utils",
 )
@@ -43,7 +45,17 @@ LEFT_OUT = (
     "/lib/modules/*/kernel/sound/*",
 )
 BOOTS_WITH = ("virtio_pci", "virtio_blk", "ext4")
-SOURCES = ("lcf_edge", "drivers", "hil_mocks", "systemd", "pyproject.toml", "README.md", "LICENSE", "Makefile")
+SOURCES = (
+    "lcf_edge",
+    "drivers",
+    "hil_mocks",
+    "systemd",
+    "pyproject.toml",
+    "setup.py",
+    "README.md",
+    "LICENSE",
+    "Makefile",
+)
 TOOLS = {  # what brings them on Debian and its relatives
     "mmdebstrap": "mmdebstrap",
     "qemu-system-x86_64": "qemu-system-x86",

@@ -29,6 +29,7 @@ def run(
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # before NumPy: its threads would only cost memory
     import cv2
 
+    from lcf_edge.compilation import uncompiled
     from lcf_edge.daemon import log
     from lcf_edge.daemon.memory import check_budget
     from lcf_edge.daemon.service import Service
@@ -37,6 +38,8 @@ def run(
 
     cv2.setNumThreads(1)
     log.start(config.log.level)
+    if reason := uncompiled():
+        log.LOGGER.warning("%s", reason)
     check_budget(config)
     with ExitStack() as stack:
         session = open_session(config.zenoh)

@@ -10,6 +10,7 @@ from typing import Any
 
 import msgspec
 
+from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Config
 from lcf_edge.daemon.board import read_board
 from lcf_edge.daemon.clock import SystemTime
@@ -98,6 +99,7 @@ class Health:
         loop = self._loop
         notes = loop.degradation.notes if self._readers[0].away_since_ns is None else ()
         values = {
+            "filter": "uncompiled" if uncompiled() else "compiled",
             "latency_p50_ms": f"{1e3 * loop.latency.percentile_s(50):.2f}",
             "latency_p99_ms": f"{1e3 * loop.latency.percentile_s(99):.2f}",
             "detect_p50_ms": f"{1e3 * loop.detect.percentile_s(50):.2f}",

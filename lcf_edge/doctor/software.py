@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 
 from lcf_edge import __version__
+from lcf_edge.compilation import SLOWER, Compiled, extension
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 
 NEEDED: Mapping[str, tuple[tuple[int, int], tuple[int, int]]] = {
@@ -24,6 +25,7 @@ def check(_: Context) -> Iterator[Finding]:
     """Versions."""
     yield _computer(sys.maxsize > 2**32)
     yield from packages({name: _installed(name) for name in NEEDED})
+    yield compilation(extension())
     missing = [extra for extra, module in _MODULES.items() if find_spec(module) is None]
     if missing:
         yield ok(
@@ -42,6 +44,14 @@ def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
             yield (fail if numbers < least else warn)("software", text, f"pip install '{name}{wanted}'")
     told = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
     yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {told}")
+
+
+def compilation(compiled: Compiled) -> Finding:
+    """Whether the filter runs compiled."""
+    if not compiled.reason:
+        return ok("software", "the filter runs compiled")
+    text = f"the filter runs uncompiled, about {SLOWER} times slower: {compiled.reason}"
+    return warn("software", text, compiled.command)
 
 
 def _computer(is_64_bit: bool) -> Finding:

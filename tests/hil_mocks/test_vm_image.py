@@ -1,6 +1,7 @@
 """What the image of the virtual machine is made of, and what is said where it cannot be made."""
 
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -57,7 +58,7 @@ def test_a_step_that_fails_tells_its_last_words() -> None:
 def test_the_guest_gets_what_the_project_needs_and_what_builds_it() -> None:
     wanted = image._requirements()
     assert any(one.startswith("numpy") for one in wanted)
-    assert any(one.startswith("hatchling") for one in wanted)
+    assert {"setuptools", "Cython"} <= {re.split(r"\W", one)[0] for one in wanted}
 
 
 def test_the_cache_is_where_the_environment_says(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

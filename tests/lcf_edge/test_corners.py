@@ -10,8 +10,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from lcf_edge.appearance import BORDER_PX, RING_PX
 from lcf_edge.config import Filter
-from lcf_edge.corners import BORDER_PX, RING_PX, SPREAD_PX, THRESHOLDS, CornerDetector, strongest_spread
+from lcf_edge.corners import SPREAD_PX, THRESHOLDS, CornerDetector, strongest_spread
 from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 

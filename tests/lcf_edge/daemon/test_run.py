@@ -93,6 +93,18 @@ def test_sigint_ends_it_too_and_sighup_reads_again(start: Start, manager: Any, t
     assert said[-1] == "lcf-edge: stopping: SIGINT"
 
 
+def test_an_uncompiled_filter_is_told_once_at_the_start(
+    start: Start, manager: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("LCF_EDGE_PURE", "1")
+    daemon = start("camera.device=/dev/no-such-camera", drives=False)
+    manager.until("READY=1")
+    daemon.terminate()
+    _, said = ended(daemon)
+    assert said[0].startswith("lcf-edge: warning: the filter runs uncompiled, about 100 times slower: LCF_EDGE_PURE")
+    assert len([line for line in said if "uncompiled" in line]) == 1
+
+
 def test_after_sigkill_the_next_one_starts(start: Start, manager: Any, endpoint: str) -> None:
     first = start()
     next(iter(scenes(endpoint)))

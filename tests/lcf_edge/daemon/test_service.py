@@ -11,6 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from hil_mocks.playback import RecordedCamera
+from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Camera, Config, Imu, Memory, Record, to_toml
 from lcf_edge.daemon import health, service
 from lcf_edge.daemon.board import Board
@@ -177,6 +178,7 @@ def test_diagnostics_tell_of_each_part(config: Config, runs: Runs, link: Any) ->
     assert 0 < float(pipeline.values["latency_p50_ms"]) <= float(pipeline.values["latency_p99_ms"])
     assert pipeline.values["corners_fill"].endswith("/1500")
     assert pipeline.values["evicted"] == "0"
+    assert pipeline.values["filter"] == ("uncompiled" if uncompiled() else "compiled")
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
 
 

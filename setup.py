@@ -1,0 +1,123 @@
+"""Compile every module of lcf_edge that has a .pxd beside it into one extension; all else is in pyproject.toml.
+
+A .pxd that defines its functions itself (``cdef inline``) is a header: the .py beside it serves the uncompiled.
+Where nothing can be compiled the package is installed as it is, pure Python: right, and slow.
+``LCF_EDGE_COMPILED=1``: fail instead. ``LCF_EDGE_PURE=1``: compile nothing.
+"""
+
+import os
+import re
+import sys
+import sysconfig
+import zlib
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from logging import WARNING
+from pathlib import Path
+
+import Cython
+from Cython.Build import cythonize
+from setuptools import Extension, setup
+from setuptools.command.build_ext import build_ext
+from setuptools.errors import CCompilerError, ExecError, PlatformError
+
+PACKAGE = Path("lcf_edge")
+BOOTSTRAP = "lcf_edge/_compiled.c"
+EXTENSION = "lcf_edge._compiled"
+SHARED = "lcf_edge._memoryviews"  # Cython's code for them, once for all modules
+DIRECTIVES = {
+    "language_level": 3,
+    "boundscheck": False,
+    "wraparound": False,
+    "cdivision": True,
+    "initializedcheck": False,
+    "infer_types": True,
+    "annotation_typing": False,
+    "auto_pickle": False,
+}
+MACROS = [("Py_LIMITED_API", "0x030B0000"), ("CYTHON_LIMITED_API", "1")]  # Python 3.11 and later
+FLAGS = ["-O3", "-g0", "-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
+
+_OF_THIS_BUILD = zlib.crc32(Path(__file__).read_bytes() + Cython.__version__.encode())
+CACHE = Path("build/compiled", f"{_OF_THIS_BUILD:08x}")
+OBJECTS = CACHE / f"{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
+
+
+class BuildOneExtension(build_ext):
+    """Compiles in parallel, and only what has changed."""
+
+    def build_extensions(self) -> None:
+        """Compile and link; where there is no compiler or no Python.h, say so and leave it."""
+        try:
+            super().build_extensions()
+        except (CCompilerError, ExecError, PlatformError, OSError) as error:
+            if os.environ.get("LCF_EDGE_COMPILED") == "1":
+                raise
+            self.announce(
+                f"lcf-edge: not compiled, so the filter is slow: install gcc and python3-dev ({error})", WARNING
+            )
+            self.extensions = []
+            if wheel := self.distribution.command_obj.get("bdist_wheel"):
+                wheel.root_is_pure, wheel.py_limited_api = True, False
+
+    def build_extension(self, ext: Extension) -> None:
+        """Compile what is newer than its object file, and link."""
+        bootstrap, *modules = ext.sources
+        with ThreadPoolExecutor(os.cpu_count()) as pool:
+            ext.extra_objects = list(pool.map(lambda source: self._compiled(source, ext), modules))
+        ext.sources = [bootstrap]
+        self.force = True  # the check sums may have changed where no module did
+        super().build_extension(ext)
+
+    def _compiled(self, source: str, ext: Extension) -> str:
+        made = OBJECTS / Path(source).with_suffix(".o")
+        if not made.exists() or made.stat().st_mtime < Path(source).stat().st_mtime:
+            self.compiler.compile([source], str(OBJECTS), ext.define_macros, extra_postargs=ext.extra_compile_args)
+        return str(made)
+
+
+def extensions() -> list[Extension]:
+    """The one extension, or none. MODULES tells it what it holds, SOURCES which files that was made of."""
+    declarations = sorted(PACKAGE.rglob("*.pxd"))
+    beside = [path.with_suffix(".py") for path in declarations if path.with_suffix(".py").exists()]
+    modules = {".".join(path.with_suffix("").parts): path for path in beside if not is_header(path.with_suffix(".pxd"))}
+    if os.environ.get("LCF_EDGE_PURE") == "1" or not modules:
+        return []
+    stems = [path.stem for path in modules.values()]
+    if twice := {stem for stem in stems if stems.count(stem) > 1}:
+        raise SystemExit(f"setup.py: modules of one extension need names of their own: {', '.join(sorted(twice))}")
+    translated = cythonize(
+        [Extension(SHARED, []), *(Extension(name, [str(path)]) for name, path in modules.items())],
+        build_dir=str(CACHE),
+        compiler_directives=DIRECTIVES,
+        shared_utility_qualified_name=SHARED,
+        quiet=True,
+    )
+    sums = (f"{path.relative_to(PACKAGE)}:{zlib.crc32(path.read_bytes()):08x}" for path in (*declarations, *beside))
+    return [
+        Extension(
+            EXTENSION,
+            [BOOTSTRAP, *(source for each in translated for source in each.sources)],
+            define_macros=[*MACROS, ("SOURCES", quoted(sums)), ("MODULES", quoted((SHARED, *modules)))],
+            extra_compile_args=FLAGS,
+            extra_link_args=["-s"],
+            py_limited_api=True,
+        )
+    ]
+
+
+def is_header(declaration: Path) -> bool:
+    """Whether a .pxd has its functions' code itself."""
+    return re.search(r"^cdef inline ", declaration.read_text(encoding="utf-8"), re.MULTILINE) is not None
+
+
+def quoted(words: Iterable[str]) -> str:
+    """A string of C."""
+    return f'"{" ".join(words)}"'
+
+
+setup(
+    ext_modules=extensions(),
+    cmdclass={"build_ext": BuildOneExtension},
+    options={"bdist_wheel": {"py_limited_api": "cp311"}},
+)

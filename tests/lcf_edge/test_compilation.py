@@ -1,0 +1,137 @@
+"""The compiled extension: what it holds, that it gives the bytes of its Python, and when it is not used."""
+
+import ast
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from lcf_edge import compilation
+from lcf_edge.compilation import examined, extension, sources, uncompiled
+
+ROOT = Path(__file__).parents[2]
+PACKAGE = ROOT / "lcf_edge"
+
+STAY_PYTHON = {"appearance": {"appearance"}}
+"""Functions of compiled modules that are meant to stay Python: they allocate, and call the loops."""
+
+DECLARATIONS = {path for path in PACKAGE.rglob("*.pxd") if path.with_suffix(".py").exists()}
+PAIRS = {path for path in DECLARATIONS if not re.search(r"^cdef inline ", path.read_text("utf-8"), re.MULTILINE)}
+
+needs_extension = pytest.mark.skipif(bool(uncompiled()), reason=uncompiled())
+
+
+def in_another_process(code: str, **environment: str) -> str:
+    done = subprocess.run(
+        (sys.executable, "-c", code),
+        env={**os.environ, **environment},
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+        text=True,
+    )
+    return done.stdout
+
+
+# What is compiled
+
+
+@needs_extension
+def test_every_module_with_declarations_is_in_the_extension_and_comes_from_it() -> None:
+    names = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PAIRS}
+    assert extension().modules == {*names, "lcf_edge._memoryviews"}
+    assert {import_module(name).__file__ for name in names} == {extension().path}
+
+
+@pytest.mark.parametrize("declarations", sorted(PAIRS), ids=lambda path: path.stem)
+def test_no_function_of_a_compiled_module_silently_stays_python(declarations: Path) -> None:
+    declared = set(re.findall(r"^\s*(?:cdef|cpdef)\b[^(\n]*?(\w+)\(", declarations.read_text("utf-8"), re.MULTILINE))
+    written = {
+        node.name
+        for node in ast.walk(ast.parse(declarations.with_suffix(".py").read_text("utf-8")))
+        if isinstance(node, ast.FunctionDef) and not node.name.startswith("__")
+    }
+    assert written - declared == STAY_PYTHON.get(declarations.stem, set())
+    assert declared <= written
+
+
+# Compiled and not, it is the same
+
+
+_DIGEST = """
+import zlib, numpy as np
+from lcf_edge.appearance import appearance
+random = np.random.default_rng(3)
+image = random.integers(0, 256, (48, 64), np.uint8)
+pixel = np.stack((random.integers(7, 57, 40), random.integers(7, 41, 40)), axis=1).astype(np.int32)
+print(zlib.crc32(appearance(image, pixel).tobytes()))
+"""
+
+
+@needs_extension
+def test_uncompiled_gives_the_same_bytes() -> None:
+    assert in_another_process(_DIGEST) == in_another_process(_DIGEST, LCF_EDGE_PURE="1")
+
+
+def test_it_can_be_asked_to_run_uncompiled_and_says_so() -> None:
+    code = "from lcf_edge import appearance, compilation; print(appearance.__file__); print(compilation.uncompiled())"
+    file, told = in_another_process(code, LCF_EDGE_PURE="1").splitlines()
+    assert file == str(PACKAGE / "appearance.py")
+    assert told == (
+        f"the filter runs uncompiled, about {compilation.SLOWER} times slower: "
+        "LCF_EDGE_PURE is set; unset LCF_EDGE_PURE"
+    )
+
+
+# When it is not used
+
+
+def test_an_extension_of_other_sources_is_never_used() -> None:
+    made_of = "a.py:00000001 a.pxd:00000002"
+    same = {"a.py": "00000001", "a.pxd": "00000002"}
+    used = examined("_compiled.so", "lcf_edge.a", made_of, same)
+    assert (used.path, used.modules, used.reason) == ("_compiled.so", {"lcf_edge.a"}, "")
+    for other in ({**same, "a.py": "00000009"}, {**same, "b.pxd": "1"}, {"a.py": "00000001"}):
+        left = examined("_compiled.so", "lcf_edge.a", made_of, other)
+        assert (left.path, left.modules, left.outdated) == ("", frozenset(), True)
+        assert "changed since it was compiled" in left.reason
+        assert left.command.startswith("make compile")
+
+
+@needs_extension
+def test_a_changed_source_runs_as_it_stands(tmp_path: Path) -> None:
+    copy = tmp_path / "lcf_edge"
+    copy.mkdir()
+    for name in ("__init__.py", "compilation.py", Path(extension().path).name, *sources()):
+        (copy / name).parent.mkdir(parents=True, exist_ok=True)
+        (copy / name).write_bytes((PACKAGE / name).read_bytes())
+    code = (
+        f"import sys; sys.path.insert(0, {str(tmp_path)!r}); "
+        "import lcf_edge.appearance as module; from lcf_edge.compilation import uncompiled; "
+        "print(module.__file__, module.BORDER_PX, uncompiled())"
+    )
+    assert in_another_process(code) == f"{copy / Path(extension().path).name} 7 \n"
+    changed = copy / "appearance.py"
+    changed.write_text(changed.read_text("utf-8").replace("BORDER_PX = 7", "BORDER_PX = 8"), encoding="utf-8")
+    told = in_another_process(code)
+    assert told.startswith(f"{changed} 8 the filter runs uncompiled")
+    assert "appearance.py changed since it was compiled" in told
+
+
+def test_the_sources_are_declarations_and_the_modules_beside_them() -> None:
+    assert {"appearance.py", "appearance.pxd"} <= set(sources())
+    assert {name.rpartition(".")[2] for name in sources()} == {"py", "pxd"}
+
+
+# The build
+
+
+def test_make_installs_what_builds_it_as_the_project_asks_for() -> None:
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
+    makefile = (ROOT / "Makefile").read_text("utf-8")
+    assert [need for need in project["build-system"]["requires"] if f'"{need}"' not in makefile] == []
