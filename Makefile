@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test compile bench hil soak lint types clean help install install-program install-files uninstall
+.PHONY: demo test compile wheels bench hil soak lint types clean help install install-program install-files uninstall
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -12,6 +12,7 @@ help:
 	@echo "make hil    as root: the installed daemon on a real kernel, in a virtual machine (docs/hil.md)"
 	@echo "make soak   the daemon at full speed with random faults: MINUTES=60 or FRAMES=200000"
 	@echo "make compile   the filter alone, after a change; demo, test and the others do it themselves"
+	@echo "make wheels as root: wheels for x86-64 and 64-bit Arm, each tried, into dist/ (docs/install.md)"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
@@ -50,6 +51,11 @@ test: $(VENV)/.dev $(VENV)/.compiled
 
 bench: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m benchmarks.run $(BENCH)
+
+# As root. MACHINES=x86_64: one of the two.
+wheels: $(VENV)/.dev $(VENV)/.compiled
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e ".[release]"
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.wheels $(MACHINES)
 
 hil: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest hil_mocks/vm -o timeout=600 -p no:cacheprovider --durations=5 $(HIL)
@@ -96,8 +102,8 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 
 install-program:
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
-	umask 022; $(COPIED) && cd "$$copy" && \
-		"$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check ".[view,watch]"
+	umask 022; $(if $(WHEEL),,$(COPIED) && cd "$$copy" &&) \
+		"$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check "$(or $(wildcard $(WHEEL)),$(WHEEL),.)[view,watch]"
 	"$(PROGRAM)/bin/python" -P -c $(SAY_COMPILED)
 	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
 	install -d "$(dir $(COMMAND))"

@@ -47,6 +47,11 @@ def parser() -> argparse.ArgumentParser:
     demo.add_argument("--out", type=Path, default=Path("demo-out"), metavar="DIR", help="where to write (%(default)s)")
     demo.add_argument("--seconds", type=_number(1.0, 120.0), default=10.0, metavar="N", help="length of the drive (10)")
 
+    bench = commands.add_parser("bench", allow_abbrev=False, help="how fast the filter is on this computer")
+    bench.add_argument(
+        "--seconds", type=_number(1.0, 3600.0), default=20.0, metavar="N", help="how long to measure (%(default)g)"
+    )
+
     replay = commands.add_parser(
         "replay", allow_abbrev=False, parents=[settings], help="run the filter over a recording"
     )

@@ -148,6 +148,13 @@ def _demo(arguments: argparse.Namespace) -> None:
     demo(arguments.out, arguments.seconds, _tell)
 
 
+def _bench(arguments: argparse.Namespace) -> None:
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the daemon
+    from lcf_edge.commands.bench import bench  # noqa: PLC0415
+
+    bench(arguments.seconds, _tell)
+
+
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
     "demo": _demo,
     "replay": _replay,
@@ -158,6 +165,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
     "doctor": _doctor,
     "calibrate": _calibrate,
     "config": _config,
+    "bench": _bench,
 }
 
 

@@ -143,7 +143,7 @@ def _requirements() -> list[str]:
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
     extras = project["project"]["optional-dependencies"]
     installed = re.search(
-        r"\$\(PROGRAM\)/bin/python\" -m pip install .*\.\[([\w,]+)\]",
+        r"\$\(PROGRAM\)/bin/python\" -m pip install .*\[([\w,]+)\]\"",
         (PROJECT / "Makefile").read_text(encoding="utf-8"),
     )
     wanted = [need for extra in installed[1].split(",") for need in extras[extra]] if installed else []

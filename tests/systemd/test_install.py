@@ -89,6 +89,13 @@ def test_the_program_is_an_environment_of_its_own_with_a_command_on_the_path() -
     assert 'ln -sfn /opt/lcf-edge/bin/lcf-edge "/usr/local/bin/lcf-edge"' in plan
 
 
+def test_a_wheel_takes_the_place_of_the_source() -> None:
+    plan = make("install", "--dry-run", "WHEEL=dist/one.whl")
+    assert 'pip install --quiet --disable-pip-version-check "dist/one.whl[view,watch]"' in plan
+    assert "mktemp" not in plan
+    assert "mktemp" in make("install", "--dry-run")
+
+
 @pytest.mark.parametrize("destination", ["image", "/image/"])
 def test_an_image_knows_nothing_of_where_it_was_made_and_the_running_system_is_left_alone(destination: str) -> None:
     folder = "/image" if destination == "/image/" else f"{ROOT}/image"
@@ -125,4 +132,4 @@ def test_the_document_names_every_place_and_variable() -> None:
     told = (ROOT / "docs/install.md").read_text(encoding="utf-8")
     places = (*INSTALLED, "opt/lcf-edge", "usr/local/bin/lcf-edge")
     assert [place for place in places if f"`/{place}`" not in told] == []
-    assert [name for name in ("PYTHON", "DESTDIR", "FILES_ONLY", "PURGE") if f"{name}=" not in told] == []
+    assert [name for name in ("PYTHON", "DESTDIR", "WHEEL", "FILES_ONLY", "PURGE") if f"{name}=" not in told] == []

@@ -1,0 +1,1 @@
+"""What is released: wheels for two processors, built for both on either, and tried where nothing can be compiled."""

@@ -1,0 +1,114 @@
+"""Debian, unpacked from its packages but not installed: nothing of it has to run, so any processor's will do.
+
+Needs root for ``mmdebstrap``, as everything else of a release does. Unpacked roots are kept in the folder that
+``LCF_EDGE_RELEASE_CACHE`` names, or ``~/.cache/lcf-edge/release``.
+"""
+
+import hashlib
+import os
+import platform
+import shutil
+import subprocess
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lcf_edge.errors import LcfError
+
+STEP_S = 1800.0  # at most; emulated ones are slow
+_FOLDERS = ("bin", "lib", "lib64", "sbin")  # links into /usr that an installed Debian has
+
+
+class ReleaseError(LcfError):
+    """A step of a release failed."""
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """A processor, as Python names it, as Debian names it, and how to get there from another."""
+
+    name: str
+    debian: str
+    tools: Mapping[str, str]  # command: the Debian package that brings it
+
+    @property
+    def gcc(self) -> str:
+        """The compiler for it."""
+        return f"{self.name}-linux-gnu-gcc"
+
+    @property
+    def is_this(self) -> bool:
+        """Whether no emulation is needed."""
+        return platform.machine() == self.name
+
+
+MACHINES = {
+    "x86_64": Machine("x86_64", "amd64", {"x86_64-linux-gnu-gcc": "gcc-x86-64-linux-gnu"}),
+    "aarch64": Machine("aarch64", "arm64", {"aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu"}),
+}
+_TOOLS = {"mmdebstrap": "mmdebstrap", "arch-test": "arch-test"}
+_EMULATION = {"qemu-aarch64-static": "qemu-user-static", "update-binfmts": "binfmt-support"}
+
+
+def get_tools(machines: Sequence[Machine]) -> None:
+    """Install what is missing. Raises ``ReleaseError`` where that cannot be done."""
+    tools = dict(_TOOLS)
+    for machine in machines:
+        tools |= machine.tools
+    if not all(machine.is_this for machine in machines):
+        tools |= _EMULATION
+    missing = sorted({package for tool, package in tools.items() if shutil.which(tool) is None})
+    if os.geteuid() != 0:
+        wants = f"and {' '.join(missing)} " if missing else ""
+        raise ReleaseError(f"wheels need root {wants}(sudo make wheels)")
+    if missing:
+        run("apt-get", "update", "--quiet")
+        run("apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *missing)
+    if "update-binfmts" in tools:
+        _let_foreign_programs_run()
+
+
+def _let_foreign_programs_run() -> None:
+    if not Path("/proc/sys/fs/binfmt_misc/register").exists():
+        run("mount", "-t", "binfmt_misc", "binfmt_misc", "/proc/sys/fs/binfmt_misc")
+    run("update-binfmts", "--enable")
+
+
+def unpacked(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
+    """A folder with these packages and all that they need, as ``suite`` has them."""
+    named = hashlib.sha256(" ".join(packages).encode()).hexdigest()[:8]
+    cache = Path(os.environ.get("LCF_EDGE_RELEASE_CACHE") or Path.home() / ".cache/lcf-edge/release")
+    root = cache / f"{suite}-{machine.debian}-{named}"
+    if not root.exists():
+        unfinished = root.with_name("unfinished")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        unfinished.parent.mkdir(parents=True, exist_ok=True)
+        links = "; ".join(f'mkdir -p "$1/usr/{name}"; ln -s usr/{name} "$1/{name}"' for name in _FOLDERS)
+        options = ["--quiet", "--mode=root", "--variant=extract", "--format=directory", f"--setup-hook={links}"]
+        options += [f"--architectures={machine.debian}", f"--include={','.join(packages)}"]
+        run("mmdebstrap", *options, suite, str(unfinished))
+        shutil.rmtree(unfinished / "dev")  # nothing here is a device
+        (unfinished / "dev").mkdir()
+        unfinished.rename(root)
+    return root
+
+
+def run(*command: str, folder: Path | None = None, environment: Mapping[str, str] | None = None) -> str:
+    """Run one step; return what it said. Raises ``ReleaseError`` with the last lines of a step that failed."""
+    try:
+        done = subprocess.run(
+            command,
+            cwd=folder,
+            env=environment,
+            check=False,
+            stdin=subprocess.DEVNULL,
+            capture_output=True,
+            text=True,
+            timeout=STEP_S,
+        )
+    except (OSError, subprocess.TimeoutExpired) as error:
+        raise ReleaseError(f"{command[0]}: {error}") from error
+    if done.returncode:
+        last = " | ".join((done.stderr or done.stdout).strip().splitlines()[-5:])
+        raise ReleaseError(f"{' '.join(command[:4])}: exit status {done.returncode}: {last}")
+    return done.stdout
