@@ -64,14 +64,16 @@ def get_tools(machines: Sequence[Machine]) -> None:
     if missing:
         run("apt-get", "update", "--quiet")
         run("apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *missing)
-    if "update-binfmts" in tools:
-        _let_foreign_programs_run()
+    for machine in machines:
+        if not machine.is_this:
+            _let_run(machine)
 
 
-def _let_foreign_programs_run() -> None:
+def _let_run(machine: Machine) -> None:
+    """Let the kernel start programs of another processor."""
     if not Path("/proc/sys/fs/binfmt_misc/register").exists():
         run("mount", "-t", "binfmt_misc", "binfmt_misc", "/proc/sys/fs/binfmt_misc")
-    run("update-binfmts", "--enable")
+    run("update-binfmts", "--enable", f"qemu-{machine.name}")
 
 
 def unpacked(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
