@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from lcf_edge.arguments import parser
 from lcf_edge.errors import LcfError
+from lcf_edge.picture_limit import limit_opencv
 
 if TYPE_CHECKING:
     from lcf_edge.commands.calibrate import Task
@@ -23,6 +24,7 @@ if TYPE_CHECKING:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; answers with the exit status."""
+    limit_opencv()
     for closed in ("stdout", "stderr"):
         if getattr(sys, closed) is None:  # by the shell, as in >&-
             setattr(sys, closed, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
