@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 from lcf_edge.arguments import parser
 from lcf_edge.errors import LcfError
 from lcf_edge.picture_limit import limit_opencv
+from lcf_edge.printable import printable
 
 if TYPE_CHECKING:
     from lcf_edge.commands.calibrate import Task
@@ -164,8 +165,8 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
 
 
 def _say(text: str) -> None:
-    """One line on standard error."""
-    print(" ".join(text.split()), file=sys.stderr)
+    """One line on standard error, in which nothing is left that a terminal would obey."""
+    print(printable(" ".join(text.split()), 2000), file=sys.stderr)
 
 
 def _tell(*lines: str) -> None:
