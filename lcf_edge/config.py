@@ -256,14 +256,14 @@ class Config(Table, frozen=True):
     log: Log = Log()
 
 
-def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
+def load(path: Path | None = None, settings: Sequence[str] = (), *, filled: bool = False) -> Config:
     """Read a configuration.
 
     ``path``: a TOML file, or a recording of ``lcf-edge record``; None: ``DEFAULT_PATH`` when it exists, else the
-    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). Raises
-    ``ConfigError``.
+    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). ``filled``: a file
+    that is away or empty is refused, whichever it is. Raises ``ConfigError``.
     """
-    file = _read(path or DEFAULT_PATH, needed=path is not None)
+    file = _read(path or DEFAULT_PATH, needed=filled or path is not None, filled=filled)
     _typed(file, str(path or DEFAULT_PATH))
     over: dict[str, Any] = {}
     for setting in settings:
@@ -274,13 +274,23 @@ def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
     return config
 
 
-def _read(path: Path, *, needed: bool) -> dict[str, Any]:
+def is_filled(path: Path) -> bool:
+    """Whether there is a file, with anything but blanks in it."""
+    try:
+        return bool(_start_of(path).strip())
+    except OSError:
+        return False
+
+
+def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     try:
         data = _attached(path) if path.suffix.lower() == ".mcap" else _start_of(path)
     except OSError as error:
         if isinstance(error, FileNotFoundError) and not needed:
             return {}
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); name another file with -c") from error
+    if filled and not data.strip():
+        raise ConfigError(f"{path}: empty; for the defaults, write a comment into it")
     if len(data) > bounded_toml.LARGEST_BYTES:
         raise ConfigError(f"{path}: too large for a configuration; name another file with -c")
     try:
