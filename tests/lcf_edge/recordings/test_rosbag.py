@@ -1,6 +1,7 @@
 """MCAP recordings: ROS 2 messages as other programs write them, whole and damaged."""
 
 import struct
+import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -496,6 +497,51 @@ def test_the_chunk_that_was_cut_is_read_as_far_as_it_goes(
     recording, items = read(bag.path)
     assert 100 <= len(items) <= 150
     assert "damaged at byte" in recording.warnings[0]
+
+
+MIB = 2**20
+IMAGE = "sensor_msgs/msg/Image"
+
+
+@pytest.mark.parametrize(
+    ("topics", "bytes_each", "chunk_bytes"),
+    [(1, 120 * MIB, 2**28), (1, 250 * MIB, 2**28), (20, 15 * MIB, 1), (3, 40 * MIB, 1)],
+    ids=["one message", "a message too large", "many topics", "several messages"],
+)
+def test_a_small_file_takes_little_memory(bag: Bag, topics: int, bytes_each: int, chunk_bytes: int) -> None:
+    for number in range(topics):
+        bag.add(f"/image{number}", (IMAGE, bytes(bytes_each)))
+    bag.write(compression=CompressionType.ZSTD, chunk_size=chunk_bytes)
+    bag.messages.clear()
+    assert bag.path.stat().st_size < 30_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(RecordingError):
+            open_recording(bag.path, Config())
+        assert tracemalloc.get_traced_memory()[1] < 64 * MIB
+    finally:
+        tracemalloc.stop()
+
+
+def test_names_of_topics_are_kept_only_as_far_as_topics_are_called(bag: Bag, make: Messages) -> None:
+    for number in range(400):
+        bag.add(f"/{number}{'x' * 50_000}", make.image(START_NS, picture(1)))
+    bag.write(chunk_size=2**28)
+    tracemalloc.start()
+    try:
+        with pytest.raises(RecordingError):
+            open_recording(bag.path, Config())
+        assert tracemalloc.get_traced_memory()[1] < 64 * MIB
+    finally:
+        tracemalloc.stop()
+
+
+def test_dark_pictures_that_compress_well_are_read(bag: Bag, make: Messages, read: Read) -> None:
+    for index in range(10):
+        bag.add("/image", make.image(START_NS + index, np.zeros((1080, 1440), np.uint8)), START_NS + index)
+    recording, items = read(bag.write(compression=CompressionType.ZSTD, chunk_size=4 * MIB))
+    assert len(items) == 10
+    assert recording.skipped == {}
 
 
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
