@@ -61,9 +61,12 @@ def strict() -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
-def peak_mib() -> float:
-    """The most memory that this process ever had."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / _KIB_A_MIB
+def peak_mib(*, afresh: bool = False) -> float:
+    """The most memory that this process had resident, ever or since it was last measured ``afresh`` (proc(5))."""
+    if afresh:
+        Path("/proc/self/clear_refs").write_text("5", encoding="ascii")
+    status = Path("/proc/self/status").read_text(encoding="utf-8")
+    return int(status.partition("VmHWM:")[2].split()[0]) / _KIB_A_MIB
 
 
 def tried(take: Take, data: bytes) -> str:
@@ -119,7 +122,7 @@ def hunt(target: Target, seconds: float, seed: int, findings: Path, current: Pat
     with tempfile.TemporaryDirectory(dir=MEMORY) as scratch, target.opened(Path(scratch)) as take, strict():
         for data in seeds:
             outcomes[tried(take, data)] += 1
-        begun_mib, end_s = peak_mib(), time.monotonic() + seconds
+        begun_mib, end_s = peak_mib(afresh=True), time.monotonic() + seconds
         while time.monotonic() < end_s:
             data = mutator.draw()
             current.write_bytes(data)

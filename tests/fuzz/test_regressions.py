@@ -1,10 +1,13 @@
 """What once broke a parser does not again, good inputs are taken, and the attack finds what there is to find."""
 
+import shutil
+import sys
 from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
+from tests.fuzz import __main__ as command
 from tests.fuzz.hunt import hunt, peak_mib, strict, tried
 from tests.fuzz.mutation import CORPUS_BYTES, LARGEST_BYTES, Mutator
 from tests.fuzz.targets import TARGETS, Take
@@ -23,7 +26,7 @@ def test_the_inputs_that_others_are_made_of_are_taken(name: str, tmp_path: Path)
 @pytest.mark.parametrize("path", INPUTS, ids=str)
 def test_what_once_broke_a_parser_does_not_again(path: Path, tmp_path: Path) -> None:
     with TARGETS[path.parts[0]].opened(tmp_path) as take, strict():
-        before_mib = peak_mib()
+        before_mib = peak_mib(afresh=True)
         assert tried(take, (REGRESSIONS / path).read_bytes())
         assert peak_mib() - before_mib < TARGETS[path.parts[0]].grows_mib
 
@@ -83,3 +86,22 @@ def test_inputs_are_bounded_and_so_is_what_they_are_made_of(mutator: Mutator) ->
 def test_the_same_seed_draws_the_same_inputs(mutator: Mutator) -> None:
     again = Mutator([b"[camera]\nfps = 10\n"], (b"token",), 7)
     assert [mutator.draw() for _ in range(100)] == [again.draw() for _ in range(100)]
+
+
+def test_the_command_attacks_the_parsers_that_are_named_and_leaves_nothing(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    options = ("--seconds", "0.3", "--engine", "mutation", "--findings", str(tmp_path / "findings"))
+    monkeypatch.setattr(sys, "argv", ["fuzz", "speeds", "messages_of_ros", *options])
+    assert command.main() == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == ["speeds", "messages_of_ros"]
+    assert all(int(line.split()[1]) > 10 for line in lines)
+    assert not (tmp_path / "findings").exists()
+
+
+def test_a_process_that_ends_is_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sys, "executable", shutil.which("false"))
+    ((what, where),) = command.hunted("speeds", 0.1, 0, tmp_path).items()
+    assert what.startswith("the process ended with 1")
+    assert Path(where).exists()
