@@ -105,8 +105,6 @@ class Server:
     async def _updates(self, request: web.Request) -> web.StreamResponse:
         if len(self._sockets) >= MOST_BROWSERS:
             raise web.HTTPServiceUnavailable(text=f"{MOST_BROWSERS} browsers look already\n")
-        if not request.headers.get("Sec-WebSocket-Key", "").isascii():  # aiohttp would fail on it
-            raise web.HTTPBadRequest(text="Sec-WebSocket-Key is malformed\n")
         browser = web.WebSocketResponse(max_msg_size=64, compress=False, timeout=1.0)
         await browser.prepare(request)
         self._sockets[browser] = request

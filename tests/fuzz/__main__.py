@@ -46,7 +46,7 @@ def covered(name: str, seconds: float, seed: int, findings: Path) -> dict[str, s
     kept_as = next(
         (line.rpartition("Test unit written to ")[2] for line in lines if "Test unit written to" in line), ""
     )
-    what = next((line for line in lines if "Error" in line or "Warning" in line), f"status {done.returncode}")
+    what = next((line for line in lines if "Error:" in line or "ERROR:" in line), f"status {done.returncode}")
     return {what.strip(): kept_as}
 
 

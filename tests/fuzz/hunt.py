@@ -46,16 +46,22 @@ class Report:
 
 @contextmanager
 def strict() -> Iterator[None]:
-    """Warnings are errors, and nothing takes longer than ``HANG_S``."""
+    """Warnings are errors."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        yield
+
+
+@contextmanager
+def alarmed() -> Iterator[None]:
+    """What ``tried`` waits for too long raises ``HangError``."""
 
     def hang(*_: object) -> None:
         raise HangError
 
     before = signal.signal(signal.SIGALRM, hang)
     try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")
-            yield
+        yield
     finally:
         signal.setitimer(signal.ITIMER_REAL, 0)
         signal.signal(signal.SIGALRM, before)
@@ -119,7 +125,7 @@ def hunt(target: Target, seconds: float, seed: int, findings: Path, current: Pat
     seeds = list(target.seeds())
     mutator = Mutator(seeds, target.tokens, seed)
     outcomes: Counter[str] = Counter()
-    with tempfile.TemporaryDirectory(dir=MEMORY) as scratch, target.opened(Path(scratch)) as take, strict():
+    with tempfile.TemporaryDirectory(dir=MEMORY) as scratch, target.opened(Path(scratch)) as take, strict(), alarmed():
         for data in seeds:
             outcomes[tried(take, data)] += 1
         begun_mib, end_s = peak_mib(afresh=True), time.monotonic() + seconds

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from tests.fuzz import __main__ as command
-from tests.fuzz.hunt import hunt, peak_mib, strict, tried
+from tests.fuzz.hunt import alarmed, hunt, peak_mib, strict, tried
 from tests.fuzz.mutation import CORPUS_BYTES, LARGEST_BYTES, Mutator
 from tests.fuzz.targets import TARGETS, Take
 
@@ -19,13 +19,13 @@ LARGEST_REGRESSION_BYTES = 16_384
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_the_inputs_that_others_are_made_of_are_taken(name: str, tmp_path: Path) -> None:
-    with TARGETS[name].opened(tmp_path) as take, strict():
+    with TARGETS[name].opened(tmp_path) as take, strict(), alarmed():
         assert all(tried(take, data) for data in TARGETS[name].seeds())
 
 
 @pytest.mark.parametrize("path", INPUTS, ids=str)
 def test_what_once_broke_a_parser_does_not_again(path: Path, tmp_path: Path) -> None:
-    with TARGETS[path.parts[0]].opened(tmp_path) as take, strict():
+    with TARGETS[path.parts[0]].opened(tmp_path) as take, strict(), alarmed():
         before_mib = peak_mib(afresh=True)
         assert tried(take, (REGRESSIONS / path).read_bytes())
         assert peak_mib() - before_mib < TARGETS[path.parts[0]].grows_mib
