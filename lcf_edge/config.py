@@ -27,12 +27,11 @@ _TOLD = 300  # of anything else that somebody wrote
 # that was not reckoned with.
 Metres = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
 Pixels = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
-Gate = Annotated[float, msgspec.Meta(ge=0.001, le=400)]  # px; the pairs in reach grow with its square
+Gate = Annotated[float, msgspec.Meta(ge=0.001, le=60)]  # px; the pairs in reach grow with its square
 Seconds = Annotated[float, msgspec.Meta(ge=0.001, le=3600)]
 Radians = Annotated[float, msgspec.Meta(ge=0.001, le=3.15)]
 Ratio = Annotated[float, msgspec.Meta(ge=0.001, le=1_000_000)]
 Trust = Annotated[float, msgspec.Meta(ge=0, le=1000)]
-Deviation = Annotated[float, msgspec.Meta(ge=0, le=1000)]  # 1 sigma, of anything
 Share = Annotated[float, msgspec.Meta(ge=0.001, le=1)]
 Mebibytes = Annotated[float, msgspec.Meta(ge=0.001, le=1e9)]
 Count = Annotated[int, msgspec.Meta(ge=1, le=32767)]  # rows are told apart by 16 bits
@@ -108,7 +107,7 @@ class Imu(Table, frozen=True):
         list[Annotated[float, msgspec.Meta(ge=-2, le=2)]]
     ] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity
     time_offset_s: Annotated[float, msgspec.Meta(ge=-4e9, le=4e9)] = 0.0  # camera time = IMU time + offset
-    gyro_noise_radps: Deviation = 0.005  # 1 sigma of what is left after the bias
+    gyro_noise_radps: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.005  # 1 sigma of what is left after the bias
 
 
 class Vehicle(Table, frozen=True):
@@ -133,9 +132,11 @@ class Filter(Table, frozen=True):
     tr_max: Trust = 5.0
     delta_px: Gate = 1.5  # δ, corner noise off the flow line
     delta_rebel_px: Gate = 2.5  # δ over the chain of key frames
-    bl0_px: Annotated[float, msgspec.Meta(ge=0.001, le=100)] = 12.0  # BL at birth
-    leap_px: Gate = 40.0  # farthest that a landmark may move between its first two frames
-    bl_min_px: Annotated[float, msgspec.Meta(ge=0.001, le=100)] = 3.0
+    bl0_px: Gate = 12.0  # BL at birth
+    leap_px: Annotated[float, msgspec.Meta(ge=0.001, le=200)] = (
+        40.0  # farthest that a landmark may move between its first two frames
+    )
+    bl_min_px: Gate = 3.0
     bs_px: Pixels = 64.0  # BS_λ, largest radius of a circle
     scene_depth_m: Metres = 4.0  # depth of a new landmark that no circle knows
     appearance_max: Annotated[float, msgspec.Meta(ge=0.001, le=255)] = (
@@ -160,7 +161,7 @@ class Filter(Table, frozen=True):
     rebel_share: Share = 0.15  # of the edges in a rebel circle must be rebels
     rebel_link_px: Pixels = 40.0  # rebels farther apart are not of one circle
     edge_noise_px: Gate = 0.4  # 1 sigma of an edge's position
-    focus_sigma_px: Deviation = 6.0  # uncertainty of O
+    focus_sigma_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = 6.0  # uncertainty of O
     ground_margin: Share = 0.2  # share by which the ground may be misjudged
     pitch_sigma_rad: Annotated[float, msgspec.Meta(ge=0, le=1.5)] = 0.008
     psi_life_s: Seconds = 0.3  # ψ expires and the region is looked at again
