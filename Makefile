@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test compile wheels bench hil soak lint types clean help install install-program install-files uninstall
+.PHONY: demo test compile wheels bench hil soak lint types clean help install install-program install-files uninstall fuzz
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -13,6 +13,7 @@ help:
 	@echo "make soak   the daemon at full speed with random faults: MINUTES=60 or FRAMES=200000"
 	@echo "make compile   the filter alone, after a change; demo, test and the others do it themselves"
 	@echo "make wheels as root: wheels for x86-64 and 64-bit Arm, each tried, into dist/ (docs/install.md)"
+	@echo "make fuzz   attack every parser: SECONDS=60 for each (docs/fuzzing.md)"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
@@ -62,6 +63,9 @@ hil: $(VENV)/.dev $(VENV)/.compiled
 
 soak: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m hil_mocks.soak $(if $(FRAMES),--frames $(FRAMES),--minutes $(or $(MINUTES),10)) $(SOAK)
+
+fuzz: $(VENV)/.dev $(VENV)/.compiled
+	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),10) $(FUZZ)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .

@@ -273,7 +273,7 @@ def decode_scene(payload: bytes | memoryview) -> Scene:
     """``lcf_msgs/msg/Scene``; circles and ψ are read-only views of a little-endian payload.
 
     Sizes, timing and notes, which are not sent, have their defaults. Raises ``CdrError``, also for a kind or a
-    cause that the message does not know.
+    cause that the message does not know, and for a signalling NaN, of which NumPy would complain.
     """
     reader = _Reader(payload)
     header = reader.header()
@@ -282,7 +282,19 @@ def decode_scene(payload: bytes | memoryview) -> Scene:
     for name, known in (("kind", Kind), ("cause", Cause)):
         if not np.isin(circles[name], [*known]).all():
             raise CdrError(f"CDR: the {name} of a circle is none that is known")
+    if _signals(circles) or _signals(psi):
+        raise CdrError("CDR: a signalling NaN")
     return Scene(header.stamp_ns, seq, width, height, speed, circles, psi)
+
+
+def _signals(rows: npt.NDArray[np.void]) -> bool:
+    """Whether a float32 field holds a signalling NaN: not a number, and its highest fraction bit is not set."""
+    for name in rows.dtype.names or ():
+        if rows.dtype[name] == np.float32:
+            bits = rows[name].view(np.uint32)
+            if ((bits & 0x7FC00000 == 0x7F800000) & (bits & 0x003FFFFF != 0)).any():
+                return True
+    return False
 
 
 class _Writer:

@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING
 
 from lcf_edge.arguments import parser
 from lcf_edge.errors import LcfError
+from lcf_edge.picture_limit import limit_opencv
+from lcf_edge.printable import printable
 
 if TYPE_CHECKING:
     from lcf_edge.commands.calibrate import Task
@@ -23,6 +25,7 @@ if TYPE_CHECKING:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one command; answers with the exit status."""
+    limit_opencv()
     for closed in ("stdout", "stderr"):
         if getattr(sys, closed) is None:  # by the shell, as in >&-
             setattr(sys, closed, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
@@ -170,8 +173,8 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
 
 
 def _say(text: str) -> None:
-    """One line on standard error."""
-    print(" ".join(text.split()), file=sys.stderr)
+    """One line on standard error, in which nothing is left that a terminal would obey."""
+    print(printable(" ".join(text.split()), 2000), file=sys.stderr)
 
 
 def _tell(*lines: str) -> None:

@@ -5,7 +5,6 @@ is checked whole: an unknown key, a wrong type or an impossible value is a ``Con
 """
 
 import math
-import tomllib
 from collections.abc import Iterator, Sequence
 from difflib import SequenceMatcher
 from pathlib import Path
@@ -13,14 +12,28 @@ from typing import Annotated, Any, Literal
 
 import msgspec
 
+from lcf_edge import bounded_toml
 from lcf_edge.errors import ConfigError
+from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.printable import printable
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
-LARGEST_FILE_BYTES = 2**20
+SMALLEST_HEIGHT_M = 0.001
 
-Positive = Annotated[float, msgspec.Meta(gt=0)]
-NotNegative = Annotated[float, msgspec.Meta(ge=0)]
-Share = Annotated[float, msgspec.Meta(gt=0, le=1)]
+_SHOWN = 60  # characters of a key that is not known
+_TOLD = 300  # of anything else that somebody wrote
+
+# Every number has bounds far beyond what is sensible, within which nothing overflows, divides by zero or takes memory
+# that was not reckoned with.
+Metres = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
+Pixels = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
+Gate = Annotated[float, msgspec.Meta(ge=0.001, le=60)]  # px; the pairs in reach grow with its square
+Seconds = Annotated[float, msgspec.Meta(ge=0.001, le=3600)]
+Radians = Annotated[float, msgspec.Meta(ge=0.001, le=3.15)]
+Ratio = Annotated[float, msgspec.Meta(ge=0.001, le=1_000_000)]
+Trust = Annotated[float, msgspec.Meta(ge=0, le=1000)]
+Share = Annotated[float, msgspec.Meta(ge=0.001, le=1)]
+Mebibytes = Annotated[float, msgspec.Meta(ge=0.001, le=1e9)]
 Count = Annotated[int, msgspec.Meta(ge=1, le=32767)]  # rows are told apart by 16 bits
 Side = Annotated[int, msgspec.Meta(ge=1, le=16384)]
 Tilt = Annotated[float, msgspec.Meta(gt=-1.5, lt=1.5)]
@@ -60,14 +73,18 @@ class Camera(Table, frozen=True):
     height: Side = 480
     fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # asked of the camera; of pictures without stamps
     format: Literal["auto", "GREY", "YUYV", "UYVY", "NV12", "MJPG"] = "auto"
-    exposure_s: Positive | None = None  # not given: the camera's own automatic
-    gain: int | None = None  # in the camera's own units; not given: the camera's own automatic
+    exposure_s: Annotated[float, msgspec.Meta(ge=1e-6, le=100)] | None = None  # not given: the camera's own automatic
+    gain: Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)] | None = (
+        None  # in the camera's own units; not given: the camera's own automatic
+    )
     power_line_hz: Literal[0, 50, 60] | None = None  # against flicker; 0: off
-    intrinsics: list[float] = []  # fx, fy, cx, cy in px; empty: the recording's, else by the field of view
+    intrinsics: list[
+        Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
+    ] = []  # fx, fy, cx, cy in px; empty: the recording's, else by the field of view
     horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else tells
     distortion_model: Literal["none", "radial-tangential", "equidistant"] = "none"
-    distortion: list[float] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
-    height_m: NotNegative = 0.3  # above the ground; 0: unknown, no ground test
+    distortion: list[Annotated[float, msgspec.Meta(ge=-100, le=100)]] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
+    height_m: Annotated[float, msgspec.Meta(ge=0, le=10_000)] = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: Tilt = 0.0  # positive: looks up
     yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
 
@@ -86,19 +103,21 @@ class Imu(Table, frozen=True):
     rate_hz: Annotated[float, msgspec.Meta(ge=10, le=1000)] = 200.0
     gyro_range_dps: Literal[250, 500, 1000, 2000] = 500
     accel_range_g: Literal[2, 4, 8, 16] = 4
-    axes: list[list[float]] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity
+    axes: list[
+        list[Annotated[float, msgspec.Meta(ge=-2, le=2)]]
+    ] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity
     time_offset_s: Annotated[float, msgspec.Meta(ge=-4e9, le=4e9)] = 0.0  # camera time = IMU time + offset
-    gyro_noise_radps: NotNegative = 0.005  # 1 sigma of what is left after the bias
+    gyro_noise_radps: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.005  # 1 sigma of what is left after the bias
 
 
 class Vehicle(Table, frozen=True):
     """What the vehicle is."""
 
-    half_width_m: Positive = 0.3
-    height_m: Positive = 2.0  # what passes above this is no threat
-    horizon_s: Positive = 4.0  # contact later than this is no threat yet
+    half_width_m: Metres = 0.3
+    height_m: Metres = 2.0  # what passes above this is no threat
+    horizon_s: Seconds = 4.0  # contact later than this is no threat yet
     speed_source: Literal["auto", "odometry", "zenoh", "imu", "constant", "none"] = "auto"
-    speed_mps: float | None = None  # the constant
+    speed_mps: Annotated[float, msgspec.Meta(ge=-70, le=70)] | None = None  # the constant
 
 
 class Filter(Table, frozen=True):
@@ -108,36 +127,44 @@ class Filter(Table, frozen=True):
     fast_threshold: Annotated[int, msgspec.Meta(ge=1, le=254)] = 25
     fast_adaptive: bool = True  # the threshold follows the scene so that about `corners_target` are found
     corners_target: Count = 700
-    tr_cr: NotNegative = 2.0
-    tr_s: NotNegative = 3.0
-    tr_max: NotNegative = 5.0
-    delta_px: Positive = 1.5  # δ, corner noise off the flow line
-    delta_rebel_px: Positive = 2.5  # δ over the chain of key frames
-    bl0_px: Positive = 12.0  # BL at birth
-    leap_px: Positive = 40.0  # farthest that a landmark may move between its first two frames
-    bl_min_px: Positive = 3.0
-    bs_px: Positive = 64.0  # BS_λ, largest radius of a circle
-    scene_depth_m: Positive = 4.0  # depth of a new landmark that no circle knows
-    appearance_max: Positive = 28.0  # mean absolute grey difference that still is the same corner
-    appearance_share: Positive = 0.5  # and as a share of the corner's own contrast
-    key_interval_s: Positive = 0.05  # least time between key frames of α
-    key_motion_px: NotNegative = 1.0  # a key frame waits for this median motion, two intervals at most
-    eps_beta_rad: Positive = 0.349  # ε_β, 20°
-    eps_v: Positive = 10.0  # ε_V
-    eps_beta_rebel_rad: Positive = 0.873  # 50°
-    eps_v_rebel: Positive = 40.0
-    eps_beta_circle_rebel_rad: Positive = 0.175  # 10°
-    eps_v_circle_rebel: Positive = 1000.0
+    tr_cr: Trust = 2.0
+    tr_s: Trust = 3.0
+    tr_max: Trust = 5.0
+    delta_px: Gate = 1.5  # δ, corner noise off the flow line
+    delta_rebel_px: Gate = 2.5  # δ over the chain of key frames
+    bl0_px: Gate = 12.0  # BL at birth
+    leap_px: Annotated[float, msgspec.Meta(ge=0.001, le=200)] = (
+        40.0  # farthest that a landmark may move between its first two frames
+    )
+    bl_min_px: Gate = 3.0
+    bs_px: Pixels = 64.0  # BS_λ, largest radius of a circle
+    scene_depth_m: Metres = 4.0  # depth of a new landmark that no circle knows
+    appearance_max: Annotated[float, msgspec.Meta(ge=0.001, le=255)] = (
+        28.0  # mean absolute grey difference that still is the same corner
+    )
+    appearance_share: Annotated[float, msgspec.Meta(ge=0.001, le=100)] = (
+        0.5  # and as a share of the corner's own contrast
+    )
+    key_interval_s: Seconds = 0.05  # least time between key frames of α
+    key_motion_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = (
+        1.0  # a key frame waits for this median motion, two intervals at most
+    )
+    eps_beta_rad: Radians = 0.349  # ε_β, 20°
+    eps_v: Ratio = 10.0  # ε_V
+    eps_beta_rebel_rad: Radians = 0.873  # 50°
+    eps_v_rebel: Ratio = 40.0
+    eps_beta_circle_rebel_rad: Radians = 0.175  # 10°
+    eps_v_circle_rebel: Ratio = 1000.0
     involvement: Share = 0.5
     circle_support: Count = 4  # edges that make a normal circle
     rebel_support: Count = 3  # edges that make a rebel circle
     rebel_share: Share = 0.15  # of the edges in a rebel circle must be rebels
-    rebel_link_px: Positive = 40.0  # rebels farther apart are not of one circle
-    edge_noise_px: Positive = 0.4  # 1 sigma of an edge's position
-    focus_sigma_px: NotNegative = 6.0  # uncertainty of O
+    rebel_link_px: Pixels = 40.0  # rebels farther apart are not of one circle
+    edge_noise_px: Gate = 0.4  # 1 sigma of an edge's position
+    focus_sigma_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = 6.0  # uncertainty of O
     ground_margin: Share = 0.2  # share by which the ground may be misjudged
-    pitch_sigma_rad: NotNegative = 0.008
-    psi_life_s: Positive = 0.3  # ψ expires and the region is looked at again
+    pitch_sigma_rad: Annotated[float, msgspec.Meta(ge=0, le=1.5)] = 0.008
+    psi_life_s: Seconds = 0.3  # ψ expires and the region is looked at again
 
 
 PAPER = Filter(
@@ -158,7 +185,7 @@ ROVER = Filter()
 class Memory(Table, frozen=True):
     """Capacities of the tables; nothing grows beyond them."""
 
-    budget_mib: Positive = 96.0
+    budget_mib: Mebibytes = 96.0
     corners: Count = 1500
     edges_normal: Count = 1500
     edges_rebel: Count = 300
@@ -198,14 +225,16 @@ class Record(Table, frozen=True):
     folder: str = "/var/lib/lcf-edge"
     format: Literal["jpeg", "png"] = "jpeg"  # png: without loss, some five times as large
     jpeg_quality: Annotated[int, msgspec.Meta(ge=1, le=100)] = 80
-    ttc_s: Positive = 1.5  # a rebel circle that is met sooner is a threat
+    ttc_s: Seconds = 1.5  # a rebel circle that is met sooner is a threat
     before_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 2.0  # that are saved of what came before a threat
     after_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 5.0
-    buffer_mib: Annotated[float, msgspec.Meta(ge=1)] = 2.0  # of memory: what waits for the disk, or for a threat
+    buffer_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = (
+        2.0  # of memory: what waits for the disk, or for a threat
+    )
     file_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = 512.0  # then the next file begins,
     file_s: Annotated[float, msgspec.Meta(gt=0, le=1800)] = 900.0  # or after this: its index lies in memory
-    total_mib: Positive = 4096.0  # of all files in the folder; the oldest give way
-    free_mib: NotNegative = 512.0  # that are left free on the disk
+    total_mib: Mebibytes = 4096.0  # of all files in the folder; the oldest give way
+    free_mib: Annotated[float, msgspec.Meta(ge=0, le=1e9)] = 512.0  # that are left free on the disk
 
 
 class Log(Table, frozen=True):
@@ -228,14 +257,14 @@ class Config(Table, frozen=True):
     log: Log = Log()
 
 
-def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
+def load(path: Path | None = None, settings: Sequence[str] = (), *, filled: bool = False) -> Config:
     """Read a configuration.
 
     ``path``: a TOML file, or a recording of ``lcf-edge record``; None: ``DEFAULT_PATH`` when it exists, else the
-    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). Raises
-    ``ConfigError``.
+    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). ``filled``: a file
+    that is away or empty is refused, whichever it is. Raises ``ConfigError``.
     """
-    file = _read(path or DEFAULT_PATH, needed=path is not None)
+    file = _read(path or DEFAULT_PATH, needed=filled or path is not None, filled=filled)
     _typed(file, str(path or DEFAULT_PATH))
     over: dict[str, Any] = {}
     for setting in settings:
@@ -246,24 +275,34 @@ def load(path: Path | None = None, settings: Sequence[str] = ()) -> Config:
     return config
 
 
-def _read(path: Path, *, needed: bool) -> dict[str, Any]:
+def is_filled(path: Path) -> bool:
+    """Whether there is a file, with anything but blanks in it."""
+    try:
+        return bool(_start_of(path).strip())
+    except OSError:
+        return False
+
+
+def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     try:
         data = _attached(path) if path.suffix.lower() == ".mcap" else _start_of(path)
     except OSError as error:
         if isinstance(error, FileNotFoundError) and not needed:
             return {}
         raise ConfigError(f"{path}: cannot be read ({error.strerror}); name another file with -c") from error
-    if len(data) > LARGEST_FILE_BYTES:
+    if filled and not data.strip():
+        raise ConfigError(f"{path}: empty; for the defaults, write a comment into it")
+    if len(data) > bounded_toml.LARGEST_BYTES:
         raise ConfigError(f"{path}: too large for a configuration; name another file with -c")
     try:
-        return tomllib.loads(data.decode())
-    except (ValueError, RecursionError) as error:  # also numbers of thousands of digits, endless nesting
-        raise ConfigError(f"{path}: not valid TOML: {error}") from error
+        return bounded_toml.parse(data.decode())
+    except ValueError as error:
+        raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _TOLD)}") from error
 
 
 def _start_of(path: Path) -> bytes:
     with path.open("rb") as file:
-        return file.read(LARGEST_FILE_BYTES + 1)
+        return file.read(bounded_toml.LARGEST_BYTES + 1)
 
 
 def _attached(path: Path) -> bytes:
@@ -279,10 +318,10 @@ def _apply(tree: dict[str, Any], setting: str) -> None:
     if not setting.isprintable():
         raise ConfigError(f"--set {setting!a}: characters that cannot be printed; leave them out")
     try:
-        value = tomllib.loads(f"value = {text}")["value"]
-    except (ValueError, RecursionError):
+        value = bounded_toml.parse(f"value = {text}")["value"]
+    except ValueError:
         value = text.strip()
-    *tables, name = key.strip().split(".")
+    *tables, name = key.strip().split(".", bounded_toml.DEEPEST)
     for table in tables:
         tree = tree.setdefault(table, {})
         if not isinstance(tree, dict):
@@ -301,14 +340,15 @@ def _typed(tree: dict[str, Any], origin: str) -> Config:
     except msgspec.ValidationError as error:
         what, _, where = str(error).partition(" - at ")
         key = where.strip("`").removeprefix("$.")
-        raise ConfigError(f"{origin}: {key or 'configuration'}: {what}") from error
+        raise ConfigError(f"{origin}: {key or 'configuration'}: {printable(what, _TOLD)}") from error
 
 
 def _refuse_unknown(tree: dict[str, Any], table: type[msgspec.Struct], prefix: str, origin: str) -> None:
     known = {field.name: field.type for field in msgspec.structs.fields(table)}
     for name, value in tree.items():
         if name not in known:
-            raise ConfigError(f"{origin}: unknown key {prefix}{name}{_hint(name, prefix)}")
+            shown = printable(name, _SHOWN)
+            raise ConfigError(f"{origin}: unknown key {prefix}{shown}{_hint(shown, prefix)}")
         if isinstance(value, dict) and isinstance(known[name], type) and issubclass(known[name], Table):
             _refuse_unknown(value, known[name], f"{name}.", origin)
 
@@ -343,6 +383,10 @@ def _check(config: Config, origin: str) -> None:
     ):
         if driver == "recording" and not recording:
             raise ConfigError(f"{origin}: {table}.recording: needed with {table}.driver=recording; name a recording")
+    if camera.width * camera.height > MAX_PIXELS:
+        raise ConfigError(f"{origin}: camera.width: more than {MAX_PIXELS} pixels; lower camera.width or camera.height")
+    if 0 < camera.height_m < SMALLEST_HEIGHT_M:
+        raise ConfigError(f"{origin}: camera.height_m: 0 (unknown), or {SMALLEST_HEIGHT_M} at least")
     _check_lens(camera, origin)
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
@@ -396,5 +440,10 @@ def to_toml(config: Config) -> str:
 
 
 def _to_toml(value: Any) -> str:
-    """JSON of what a key can hold is TOML, but for one character."""
-    return msgspec.json.encode(value).decode().replace("\x7f", "\\u007f")
+    """JSON of what a key can hold is TOML; what a terminal might obey, and TOML forbids in part, is escaped."""
+    text = msgspec.json.encode(value).decode()
+    return "".join(letter if letter.isprintable() else _escaped(letter) for letter in text)
+
+
+def _escaped(letter: str) -> str:
+    return f"\\u{ord(letter):04x}" if ord(letter) < 2**16 else f"\\U{ord(letter):08x}"

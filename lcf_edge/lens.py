@@ -16,12 +16,18 @@ import numpy.typing as npt
 
 from lcf_edge.config import Camera
 from lcf_edge.errors import ConfigError
+from lcf_edge.picture_limit import MAX_PIXELS
 
 Points = npt.NDArray[np.float32]
 """(n, 2) positions x, y in px, pixel centres at whole numbers."""
 
 _Floats = npt.NDArray[np.float64]
 
+WIDEST, NARROWEST = 200, 1000  # sides of the picture in a focal length, focal lengths in a side
+FARTHEST_MIDDLE = 10  # in sides
+LARGEST_COEFFICIENT = 100.0
+
+_SMALLEST_COEFFICIENT = 1e-12  # what is less bends nothing, and has no root
 _LARGEST_ANGLE_RAD = np.radians(85.0)  # off the optical axis: a plane picture holds no more
 _SMALLEST_SLOPE = 0.1  # beyond, 1 px of corner noise would become 10 px; the fold, where it is 0, is near
 _NEWTON_STEPS = 3  # always as many: a point's answer must not depend on the others
@@ -55,6 +61,15 @@ class Lens:
             raise ConfigError("lens: intrinsics and distortion must be finite numbers")
         if min(self.fx, self.fy) <= 0:
             raise ConfigError("lens: focal lengths must be positive")
+        if min(self.width, self.height) < 1 or self.width * self.height > MAX_PIXELS:
+            raise ConfigError(f"lens: {self.width}x{self.height} is no size of a picture")
+        side = max(self.width, self.height)
+        if not side / WIDEST <= min(self.fx, self.fy) <= max(self.fx, self.fy) <= side * NARROWEST:
+            raise ConfigError(f"lens: focal lengths must be {side / WIDEST:g} to {side * NARROWEST} px")
+        if max(abs(self.cx), abs(self.cy)) > side * FARTHEST_MIDDLE:
+            raise ConfigError(f"lens: its middle must be within {side * FARTHEST_MIDDLE} px")
+        if any(abs(k) > LARGEST_COEFFICIENT for k in self.coefficients):
+            raise ConfigError(f"lens: distortion coefficients must be within {LARGEST_COEFFICIENT:g}")
 
     @classmethod
     def from_config(cls, camera: Camera, width: int, height: int) -> "Lens":
@@ -67,7 +82,7 @@ class Lens:
         if camera.intrinsics:
             fx, fy, cx, cy = camera.intrinsics
             return cls(camera.width, camera.height, fx, fy, cx, cy, model, coefficients).scaled(width, height)
-        unit = cls(width, height, 1.0, 1.0, 0.0, 0.0, model, coefficients)
+        unit = cls(1, 1, 1.0, 1.0, 0.0, 0.0, model, coefficients)
         edge = unit.distort(np.array([[np.tan(camera.horizontal_fov_rad / 2), 0.0]], np.float32))[0, 0]
         if not edge > 0:
             raise ConfigError("camera.horizontal_fov_rad: wider than the distortion model reaches")
@@ -170,6 +185,7 @@ class Lens:
         """Largest r (radial-tangential) or θ (equidistant) that the model maps usefully."""
         slope = [(2 * i + 1) * k for i, k in enumerate(self._radial)]  # of ρ, as a polynomial of r² or θ²
         slope[0] -= _SMALLEST_SLOPE
+        slope = [k if abs(k) >= _SMALLEST_COEFFICIENT else 0.0 for k in slope]
         roots = np.roots(slope[::-1])
         folds = np.sqrt(roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)])
         return float(min(self._ray(np.tan(_LARGEST_ANGLE_RAD)), *folds, np.inf))

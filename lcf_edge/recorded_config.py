@@ -12,7 +12,7 @@ from lcf_edge.errors import ConfigError
 IN_RECORDING = "lcf-edge.toml"
 """Name of the attachment."""
 
-_LARGEST_BYTES = 2**24
+_LARGEST_BYTES = 2**20  # of a record; a chunk may be larger, but ours lies before the first
 
 
 def attached_configuration(path: Path) -> bytes:

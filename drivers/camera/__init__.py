@@ -2,5 +2,5 @@
 
 ``v4l2`` is the driver. It rests on ``v4l2_ioctl`` (the kernel's interface), ``v4l2_errors`` (what its error numbers
 mean to a user), ``find`` (which node is meant), ``offers`` (sizes and rates), ``controls`` (exposure, gain, power line)
-and ``luminance`` (from the bytes of a buffer to grey).
+``luminance`` (from the bytes of a buffer to grey) and ``jpeg`` (how large a picture in one of its formats is).
 """

@@ -11,6 +11,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from drivers.camera.jpeg import jpeg_header
 from drivers.errors import DriverError
 
 Grey = npt.NDArray[np.uint8]
@@ -50,12 +51,12 @@ def _decode(jpeg: bytes, width: int, height: int) -> Grey:
     """The size comes from the header first: a few bytes can decode to gigabytes."""
     if not jpeg:
         raise FrameError("short")
-    header = _header(jpeg)
-    if header is None:
+    header = jpeg_header(jpeg)
+    if header is None or not header.one_pass:
         raise FrameError("corrupt")
-    if header[:2] != (width, height):
+    if (header.width, header.height) != (width, height):
         raise FrameError("wrong size")
-    end = _MARKER.search(jpeg, header[2])  # the decoder would fill up what is missing and call it a picture
+    end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill up what is missing and call it a picture
     if end is None or end.group() != b"\xff\xd9":
         raise FrameError("corrupt")
     try:
@@ -65,17 +66,3 @@ def _decode(jpeg: bytes, width: int, height: int) -> Grey:
     if image is None or image.shape != (height, width):
         raise FrameError("corrupt")
     return np.asarray(image, np.uint8)
-
-
-def _header(jpeg: bytes) -> tuple[int, int, int] | None:
-    """Width, height, and where the entropy-coded data begin; None: these are not a JPEG's segments."""
-    size = None
-    at = 2 if jpeg.startswith(b"\xff\xd8") else len(jpeg)
-    while at + 4 <= len(jpeg) and jpeg[at] == 0xFF:
-        marker, length = jpeg[at + 1], int.from_bytes(jpeg[at + 2 : at + 4])
-        if 0xC0 <= marker <= 0xCF and marker not in {0xC4, 0xC8, 0xCC}:  # start of frame
-            size = int.from_bytes(jpeg[at + 7 : at + 9]), int.from_bytes(jpeg[at + 5 : at + 7])
-        at += 2 + length
-        if marker == 0xDA:  # start of scan
-            return (*size, at) if size else None
-    return None

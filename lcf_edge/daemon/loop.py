@@ -9,6 +9,8 @@ from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock, SystemTime
@@ -29,6 +31,8 @@ if TYPE_CHECKING:  # most daemons record nothing
 
 FRAME_WAIT_S = 0.25  # then the loop turns without one
 IMU_WAIT_S = 4e-3  # for the sample after a frame; the last one is held beyond
+TRIALS = 4  # pictures for a new pipeline
+CLUTTER_PX = 16
 IMU_SILENT_NS = 50_000_000  # an IMU that is this late is away, and not waited for
 
 
@@ -57,6 +61,17 @@ def known_lens(config: Config, width: int, height: int) -> Lens | None:
         recorded = open_recording(Path(camera.recording), config).lens
         return recorded and recorded.scaled(width, height)
     return None
+
+
+def try_out(pipeline: Pipeline, width: int, height: int) -> None:
+    """Let a pipeline take some pictures of clutter that moves, as the next ones might be."""
+    across, down = -(-width // CLUTTER_PX) + TRIALS, -(-height // CLUTTER_PX)
+    clutter = np.random.default_rng(0).integers(0, 256, (down, across), np.uint8)
+    picture = clutter.repeat(CLUTTER_PX, axis=0).repeat(CLUTTER_PX, axis=1)
+    for seq in range(TRIALS):
+        left = seq * CLUTTER_PX // 2
+        pipeline.process(Frame(seq * 50_000_000, seq, np.ascontiguousarray(picture[:height, left : left + width])))
+        pipeline.view()
 
 
 class Loop(threading.Thread):
@@ -105,9 +120,14 @@ class Loop(threading.Thread):
         return self._refused_before + Counter(dict(pipeline.refused) if pipeline else {})
 
     def rebuild(self, config: Config) -> None:
-        """From the next frame on, a new pipeline with empty tables. Raises ``LcfError``, then the old one goes on."""
+        """From the next frame on, a new pipeline with empty tables, once another like it has taken pictures.
+
+        Whatever it raises, the old one goes on. Raises ``LcfError``.
+        """
         height, width = self._shape or (config.camera.height, config.camera.width)
-        self._next = config, Pipeline(config, lens_for(config, width, height))
+        lens = lens_for(config, width, height)
+        try_out(Pipeline(config, lens), width, height)
+        self._next = config, Pipeline(config, lens)
 
     def run(self) -> None:
         """Turn until stopped."""

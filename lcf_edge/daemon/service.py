@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from lcf_edge.config import DEFAULT_PATH, Config, load
+from lcf_edge.config import DEFAULT_PATH, Config, is_filled, load
 from lcf_edge.daemon import log
 from lcf_edge.daemon.clock import StoppableClock, SystemTime
 from lcf_edge.daemon.devices import readers
@@ -65,6 +65,7 @@ class Service:
         self._config = config
         self._path, self._settings = path, settings
         self._signature = signature(path or DEFAULT_PATH)
+        self._filled = is_filled(path or DEFAULT_PATH)
         self._link = link
         self._notifier = notifier or Notifier()
         self._to_do: queue.SimpleQueue[Callable[[], None]] = queue.SimpleQueue()
@@ -196,11 +197,15 @@ class Service:
 
     def _reload(self) -> None:
         self._notifier.reloading()
-        self._signature = signature(self._path or DEFAULT_PATH)
+        path = self._path or DEFAULT_PATH
+        self._signature = signature(path)
+        self._filled = self._filled or is_filled(path)
         try:
-            self._take(load(self._path, self._settings))
+            self._take(load(self._path, self._settings, filled=self._filled))  # an editor may have emptied it just now
         except LcfError as error:
             LOGGER.error("reload: %s; the old configuration stays", error)
+        except Exception as error:  # noqa: BLE001  # a mistake in the program: what runs must go on all the same
+            LOGGER.error("reload: internal error: %r; please report it; the old configuration stays", error)
         if self._ready:
             self._notifier.ready()
 

@@ -1,11 +1,11 @@
 """Whether there is a configuration that can be used, and where it comes from."""
 
-import tomllib
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import msgspec
 
+from lcf_edge import bounded_toml
 from lcf_edge.config import DEFAULT_PATH, Config, load
 from lcf_edge.doctor.finding import Context, Finding, edit, fail, ok
 from lcf_edge.errors import ConfigError
@@ -39,6 +39,6 @@ def _given(path: Path, settings: Sequence[str], config: Config) -> frozenset[str
     if path.suffix.lower() == ".mcap":
         tables = msgspec.to_builtins(config)
     else:
-        tables = tomllib.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+        tables = bounded_toml.parse(path.read_text(encoding="utf-8")) if path.exists() else {}
     in_file = {f"{table}.{key}" for table, keys in tables.items() for key in keys}
     return frozenset(in_file | {setting.partition("=")[0].strip() for setting in settings})

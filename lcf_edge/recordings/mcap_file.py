@@ -23,10 +23,16 @@ from mcap.opcode import Opcode
 from lcf_edge.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
-MAX_RECORD_BYTES = 256 * 2**20  # also of a chunk that is unpacked
+MAX_RECORD_BYTES = 128 * 2**20  # of a message, or a chunk, also unpacked: a colour picture of 8K fits
+MAX_RATIO = 256  # of an unpacked chunk to a packed one; beyond, it may take
+MAX_DENSE_BYTES = 16 * 2**20
+MAX_OTHER_BYTES = 2**20  # of a record that describes messages
+MAX_NAME = 1024  # bytes of a topic, its type and its encoding together
+MAX_TOPICS = 4096
 
 _READ = frozenset((Opcode.SCHEMA, Opcode.CHANNEL, Opcode.MESSAGE, Opcode.CHUNK, Opcode.STATISTICS))
 _HEAD = struct.Struct("<BQ")  # opcode, bytes of the body
+_MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _FOOTER = struct.Struct("<BQQQI8s")
 
 
@@ -54,7 +60,7 @@ class _DamageError(Exception):
 class _Record(NamedTuple):
     offset: int
     opcode: int
-    body: bytes
+    body: bytes | memoryview
     whole: bool
 
 
@@ -103,7 +109,8 @@ class McapFile:
 
     def _chunk(self, record: _Record, skip: Callable[[str, str], None]) -> Iterator[Message]:
         try:
-            for inner in _records(io.BytesIO(_unpacked(record))):
+            data = _unpacked(record)
+            for inner in _records(io.BytesIO(data), memoryview(data)):
                 if message := self._channels.take(inner):
                     yield message
         except _DamageError as damage:
@@ -143,15 +150,20 @@ class _Channels:
         """Learn from a record; answers with the message, if it is one."""
         if record.opcode == Opcode.SCHEMA:
             schema = _parse(mcap.records.Schema.read, record)
-            self.schemas[schema.id] = schema.name
+            self.schemas[schema.id] = _named(record, schema.name)
         elif record.opcode == Opcode.CHANNEL:
             channel = _parse(mcap.records.Channel.read, record)
+            _named(record, channel.topic, channel.message_encoding)
+            if len(self.topics) >= MAX_TOPICS and channel.id not in self.topics:
+                raise _DamageError(f"byte {record.offset}: more than {MAX_TOPICS} topics")
             schema_name = self.schemas.get(channel.schema_id, "")
             self.topics[channel.id] = Topic(channel.topic, schema_name, channel.message_encoding)
         elif record.opcode == Opcode.MESSAGE:
-            message = _parse(lambda stream: mcap.records.Message.read(stream, len(record.body)), record)
-            if topic := self.topics.get(message.channel_id):
-                return Message(topic, message.log_time, message.data)
+            if len(record.body) < _MESSAGE.size:
+                raise _DamageError(f"byte {record.offset}: a record is nonsense")
+            number, _, log_time_ns, _ = _MESSAGE.unpack_from(record.body)
+            if topic := self.topics.get(number):
+                return Message(topic, log_time_ns, bytes(record.body[_MESSAGE.size :]))
         return None
 
     def named(self, counts: dict[int, int]) -> Counter[Topic]:
@@ -162,9 +174,17 @@ class _Channels:
         return total
 
 
-def _records(stream: BinaryIO) -> Iterator[_Record]:
+def _named(record: _Record, *names: str) -> str:
+    """The first of ``names``, which are kept. Raises ``_DamageError``."""
+    if sum(map(len, names)) > MAX_NAME:
+        raise _DamageError(f"byte {record.offset}: a name of thousands of letters")
+    return names[0]
+
+
+def _records(stream: BinaryIO, view: memoryview | None = None) -> Iterator[_Record]:
     """Records from where ``stream`` is. Of those that are not used here the body is passed over, of a chunk
-    that is cut off the front part comes. Raises ``_DamageError``.
+    that is cut off the front part comes. ``view``: of the stream's memory, for bodies that are not copied. Raises
+    ``_DamageError``.
     """
     at = stream.tell()
     end = stream.seek(0, io.SEEK_END)
@@ -177,10 +197,15 @@ def _records(stream: BinaryIO) -> Iterator[_Record]:
         there = min(length, end - at - _HEAD.size)
         if opcode == 0:
             raise _DamageError(f"byte {at}: no record")
-        if opcode in _READ and there > MAX_RECORD_BYTES:
+        most = MAX_RECORD_BYTES if opcode in {Opcode.MESSAGE, Opcode.CHUNK} else MAX_OTHER_BYTES
+        if opcode in _READ and there > most:
             raise _DamageError(f"byte {at}: a record of {length} bytes")
         if there == length or opcode == Opcode.CHUNK:
-            yield _Record(at, opcode, stream.read(there) if opcode in _READ else b"", there == length)
+            start = at + _HEAD.size
+            body: bytes | memoryview = b""
+            if opcode in _READ:
+                body = stream.read(there) if view is None else view[start : start + there]
+            yield _Record(at, opcode, body, there == length)
         if opcode == Opcode.FOOTER:
             return
         if there < length:
@@ -194,6 +219,8 @@ def _unpacked(record: _Record) -> bytes:
     size = chunk.uncompressed_size
     if size > MAX_RECORD_BYTES:
         raise _DamageError(f"{size} bytes unpacked")
+    if size > max(MAX_DENSE_BYTES, MAX_RATIO * len(chunk.data)):
+        raise _DamageError(f"{len(chunk.data)} bytes that claim to unpack to {size}")
     try:
         if not size or not chunk.compression:
             data = chunk.data

@@ -13,6 +13,7 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
 from lcf_edge.lens import Lens
+from lcf_edge.printable import printable
 from lcf_edge.recordings.decoding import Grey, PictureError
 
 WARNINGS_OF_A_KIND = 5  # further skips for the same reason are only counted
@@ -81,7 +82,7 @@ class Recording(ABC):
             raise RecordingError(f"{self.path}: not one picture could be read{why}; record it again")
 
     def _warn(self, text: str) -> None:
-        text = "".join(c if c.isprintable() else "?" for c in text)  # names in a file may hold anything
+        text = printable(text, 1000)  # names in a file may hold anything
         if text not in self.warnings:
             self.warnings.append(text)
 

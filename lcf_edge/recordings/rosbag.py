@@ -27,6 +27,7 @@ CAMERA_INFO = "sensor_msgs/msg/CameraInfo"
 SCHEMAS = frozenset((IMAGE, COMPRESSED_IMAGE, IMU, ODOMETRY, TWIST_STAMPED, CAMERA_INFO))
 
 SURVEY_BYTES = 64 * 2**20  # of messages, in which every topic of a file without summary must show up
+HEAD_BYTES = 4096  # of a topic's first message: its header, or a whole CameraInfo
 
 
 class _MessageError(LcfError):
@@ -100,22 +101,23 @@ class RosBag(Recording):
         return chain.from_iterable(file.messages(self._warn, self._skip) for file in self._files)
 
     def _survey(self) -> dict[Topic, bytes]:
-        """The first message of every topic that can be used, in the order in which they appear."""
+        """How the first message of every topic that can be used begins, in the order in which they appear."""
         expected: set[Topic] | None = set()
         for file in self._files:
             if file.counts is None or expected is None:
                 expected = None  # no summary tells what is to come
             else:
                 expected |= {topic for topic, count in file.counts.items() if count and _is_read(topic)}
-        firsts: dict[Topic, bytes] = {}
+        firsts: dict[Topic, bytes | None] = {}
         seen_bytes = 0
         for message in self._messages():
-            if _is_read(message.topic):
-                firsts.setdefault(message.topic, message.data)
+            if _is_read(message.topic) and message.topic not in firsts:
+                usable = _is_usable(message.topic, message.data)
+                firsts[message.topic] = message.data[:HEAD_BYTES] if usable else None
             seen_bytes += len(message.data)
             if seen_bytes > SURVEY_BYTES or (expected is not None and firsts.keys() >= expected):
                 break
-        return {topic: payload for topic, payload in firsts.items() if _is_usable(topic, payload)}
+        return {topic: head for topic, head in firsts.items() if head is not None}
 
     def _choose(self, kind: str, *schemas: str) -> Topic | None:
         """The first topic of the first of ``schemas`` that occurs."""

@@ -50,6 +50,8 @@ class Guard:
 
     def _refusal(self, request: web.Request) -> web.Response | None:
         """The answer to who may not look."""
+        if not all(value.isascii() for name, value in request.headers.items() if name != "Cookie"):
+            return web.Response(status=400, text="a header that is not ASCII\n")  # aiohttp would fail on some of them
         if self.token is None and not is_loopback(_name(request.host)):
             return web.Response(status=403, text=f"{request.host} is not this machine; use http://127.0.0.1\n")
         if request.headers.get("Origin", f"//{request.host}").partition("//")[2] != request.host:

@@ -48,9 +48,11 @@ def test_the_commands_run(place: Path, monkeypatch: pytest.MonkeyPatch, endpoint
     "command", [command for command in COMMANDS if not command.startswith(("lcf-edge ", "python "))]
 )
 def test_what_else_is_typed_is_a_target_of_make(command: str) -> None:
-    make, target = shlex.split(command)
-    done = subprocess.run([make, "--dry-run", target], cwd=ROOT, check=True, capture_output=True, text=True)
-    assert {"demo": "lcf-edge demo --out demo-out", "test": "-m pytest"}[target] in done.stdout
+    make, target, *variables = shlex.split(command)
+    done = subprocess.run([make, "--dry-run", target, *variables], cwd=ROOT, check=True, capture_output=True, text=True)
+    runs = {"demo": "lcf-edge demo --out demo-out", "test": "-m pytest", "fuzz": "-m tests.fuzz"}[target]
+    assert runs in done.stdout
+    assert all(variable.partition("=")[2] in done.stdout for variable in variables)
 
 
 @pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith("python ")])

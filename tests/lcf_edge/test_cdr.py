@@ -270,6 +270,23 @@ def test_a_circle_of_an_unknown_kind_is_refused(field: str, value: int) -> None:
         cdr.decode_scene(cdr.encode_scene(sent, "camera"))
 
 
+@pytest.mark.parametrize("bits", [0x7F800001, 0x7FBFFFFF, 0xFFA00000])
+@pytest.mark.parametrize(("rows", "field"), [("circles", "x"), ("circles", "lateral"), ("psi", "trust")])
+def test_a_signalling_nan_is_refused_for_numpy_would_complain_of_it(rows: str, field: str, bits: int) -> None:
+    sent = scene(3, 2)
+    getattr(sent, rows)[field].view(np.uint32)[1] = bits
+    with pytest.raises(cdr.CdrError, match="signalling NaN"):
+        cdr.decode_scene(cdr.encode_scene(sent, "camera"))
+
+
+def test_numbers_that_are_none_otherwise_are_taken() -> None:
+    sent = scene(3, 2)
+    sent.circles["range"] = (np.nan, np.inf, -np.inf)
+    sent.circles["lateral"].view(np.uint32)[:] = (0x7FFFFFFF, 0xFFC00001, 0x00000001)
+    got = cdr.decode_scene(cdr.encode_scene(sent, "camera"))
+    np.testing.assert_array_equal(got.circles["range"], sent.circles["range"])
+
+
 def test_a_count_beyond_the_payload_takes_no_memory() -> None:
     header = b"\0\1\0\0" + struct.pack("<iII", 0, 0, 1) + b"\0"
     claim = header + b"\0" * 3 + struct.pack("<QIIf", 0, 1, 1, 0.0) + struct.pack("<I", 0xFFFFFFFF)

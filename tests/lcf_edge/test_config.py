@@ -1,6 +1,7 @@
 """Configuration: what is accepted, what is refused and how, and that it survives being written down."""
 
 import math
+import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -131,14 +132,53 @@ def test_a_setting_below_a_value_is_refused() -> None:
         ("[camera]\nintrinsics = " + "[" * 20_000, "not valid TOML"),
         ("[vehicle]\nhorizon_s = " + "9" * 10_000, "not valid TOML"),
         ("# endless\n" * 200_000, "too large"),
+        ("a." * 20_000 + "a = 1\n", "not valid TOML: nested too deeply"),
+        ('"a".' * 10_000 + "a = 1\n", "not valid TOML: nested too deeply"),
+        ("[" + "a." * 20_000 + "a]\n", "not valid TOML: nested too deeply"),
+        ("[camera]\ndevice = {" + "a." * 20_000 + "a = 1}\n", "not valid TOML: nested too deeply"),
+        ('odd = [""".""""", "x"]\n' + "a." * 20_000 + "a = 1\n", "not valid TOML: nested too deeply"),
     ],
-    ids=["syntax", "twice", "not utf-8", "nested without end", "thousands of digits", "too large"],
-)
+    ids=[
+        "syntax", "twice", "not utf-8", "nested without end", "thousands of digits", "too large",
+        "dots", "quoted dots", "dots of a table", "dots within a value", "dots behind odd strings",
+    ],
+)  # fmt: skip
 def test_a_file_that_is_no_toml_is_named(file: Callable[[str | bytes], Path], content: str | bytes, told: str) -> None:
     path = file(content)
     text = refused(path)
     assert text.startswith(f"{path}: ")
     assert told in text
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        "a." * 20_000 + "a = 1",
+        "".join(f"key{number} = 1\n" for number in range(5500)),
+        "".join(f"[key{number}.a.b]\n" for number in range(4000)),
+        "[camera]\nintrinsics = [" + "{}," * 20_000 + "]",
+        "[camera]\nintrinsics = {" + ",".join(f"a{number}.b.c.d={{}}" for number in range(3500)) + "}",
+    ],
+    ids=["dots", "keys", "tables", "list", "inline"],
+)
+def test_what_a_file_may_hold_takes_little_memory(file: Callable[[str], Path], content: str) -> None:
+    path = file(content)
+    tracemalloc.start()
+    try:
+        refused(path)
+        assert tracemalloc.get_traced_memory()[1] < 24 * 2**20
+    finally:
+        tracemalloc.stop()
+
+
+def test_dots_and_brackets_in_texts_and_comments_count_for_nothing(file: Callable[[str], Path]) -> None:
+    path = file(
+        "# a.b.c.d.e.f [[[[[[[\n"
+        '[publish]\nrobot = "a.b.c.d.e.f [[[[[[ \\" #"  # and [[[[[[[ a.b.c.d.e.f.g\n'
+        "frame_id = 'a.b.c.d.e.f.g [[[[[['\n"
+        'prefix = """\na.b.c.d.e.f " [[[[[["""\n'
+    )
+    assert load(path).publish.frame_id == "a.b.c.d.e.f.g [[[[[["
 
 
 def test_a_folder_and_a_missing_file_are_named(tmp_path: Path) -> None:
@@ -174,6 +214,15 @@ def test_an_unknown_key_names_the_closest_valid_one(file: Callable[[str], Path],
 
 def test_nothing_is_suggested_for_what_resembles_nothing() -> None:
     assert refused(None, "vehicle.qqq=1") == "--set: unknown key vehicle.qqq"
+
+
+def test_an_unknown_key_is_shown_short_and_obeyed_by_no_terminal(file: Callable[[str], Path]) -> None:
+    told = refused(file('"\\u001b]0;evil\\u0007\\u009b31m' + "k" * 5000 + '" = 1\n'))
+    assert len(told) < 300
+    assert told.isprintable()
+    told = refused(file("[publish]\nrobot = 7\n[camera]\nformat = '" + "\u009b31m" * 1000 + "'\n"))
+    assert len(told) < 600
+    assert told.isprintable()
 
 
 @pytest.mark.parametrize(
@@ -355,8 +404,8 @@ def tables(table: type[Table], **given_here: st.SearchStrategy[Any]) -> st.Searc
     return st.builds(table, **(every | given_here))
 
 
-def numbers(count: int, low: float = -1e6) -> st.SearchStrategy[list[float]]:
-    return st.lists(st.floats(low, 1e6), min_size=count, max_size=count)
+def numbers(count: int, low: float = -100, high: float = 100) -> st.SearchStrategy[list[float]]:
+    return st.lists(st.floats(low, high), min_size=count, max_size=count)
 
 
 LENSES = st.one_of(
@@ -369,8 +418,10 @@ CAMERAS = LENSES.flatmap(
         Camera,
         distortion_model=st.just(lens[0]),
         distortion=st.just(lens[1]),
-        intrinsics=st.just([]) | numbers(4, low=1e-3),
+        intrinsics=st.just([]) | numbers(4, 1e-3, 1e6),
         recording=st.text(min_size=1),
+        height=st.integers(1, 2048),
+        height_m=st.just(0.0) | st.floats(0.001, 10_000),
     )
 )
 AXES = st.sampled_from(([], [[0, 1, 0], [0, 0, 1], [1, 0, 0]], [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]))
@@ -394,6 +445,15 @@ def test_written_as_toml_it_is_read_back_the_same(config: Config, tmp_path_facto
     path = tmp_path_factory.getbasetemp() / "round_trip.toml"
     path.write_text(to_toml(config), encoding="utf-8", newline="\n")
     assert load(path) == config
+
+
+def test_what_a_terminal_would_obey_is_written_escaped(file: Callable[[str], Path]) -> None:
+    path = file('[publish]\nrobot = "\\u001b[31m\\u009b31m\u202e\U000e0001\\u007f ψ"\n')
+    config = load(path)
+    text = to_toml(config)
+    assert all(line.isprintable() for line in text.splitlines())
+    assert "ψ" in text
+    assert load(file(text)) == config
 
 
 def test_every_key_is_written() -> None:

@@ -86,6 +86,24 @@ def test_a_jpeg_that_claims_a_huge_size_takes_no_memory() -> None:
         read("MJPG", JPEG[: at + 5] + b"\xff\xff\xff\xff" + JPEG[at + 9 :])
 
 
+def test_a_jpeg_with_a_huge_size_behind_a_fill_byte_takes_no_memory() -> None:
+    """Who takes the fill byte for a marker lands behind the comment, at the header of the wanted size."""
+    at = JPEG.index(b"\xff\xc0")
+    end = at + 2 + int.from_bytes(JPEG[at + 2 : at + 4])
+    huge = b"\xff" + JPEG[at : at + 5] + b"\x7d\x00\x7d\x00" + JPEG[at + 9 : end]
+    comment = 2 + int.from_bytes(huge[2:4]) - len(huge)
+    behind = b"\xff\xfe" + (comment - 2 + end - at).to_bytes(2) + bytes(comment - 4) + JPEG[at:end]
+    with pytest.raises(FrameError, match="wrong size"):
+        read("MJPG", JPEG[:at] + huge + behind + JPEG[end:])
+
+
+def test_a_progressive_jpeg_is_refused() -> None:
+    """No camera sends one, and its decoder keeps the whole picture several times."""
+    jpeg = cv2.imencode(".jpg", IMAGE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    with pytest.raises(FrameError, match="corrupt"):
+        read("MJPG", jpeg)
+
+
 @given(st.binary(max_size=400), st.integers(0, len(JPEG)), st.sampled_from(PIXEL_FORMATS))
 def test_any_bytes_are_a_picture_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
     try:

@@ -12,14 +12,15 @@ from mcap.reader import make_reader
 
 from hil_mocks.playback import RecordedCamera
 from lcf_edge.compilation import uncompiled
-from lcf_edge.config import Camera, Config, Imu, Memory, Record, to_toml
-from lcf_edge.daemon import health, service
+from lcf_edge.config import Camera, Config, Imu, Memory, Record, Vehicle, load, to_toml
+from lcf_edge.daemon import health, loop, service
 from lcf_edge.daemon.board import Board
 from lcf_edge.daemon.loop import Loop
 from lcf_edge.daemon.notify import Notifier
 from lcf_edge.daemon.service import InternalError, Service
 from lcf_edge.diagnostics import Level
 from lcf_edge.errors import ConfigError
+from lcf_edge.pipeline import Pipeline
 
 PATIENCE_S = 20.0
 TICK_S = 0.1
@@ -290,6 +291,109 @@ def test_a_broken_file_changes_nothing(
     (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
     assert message.endswith("; the old configuration stays")
     assert str(path) in message
+
+
+@pytest.mark.parametrize("content", ["", " \n\n", None], ids=["emptied", "blank", "removed"])
+def test_a_file_that_is_emptied_changes_nothing(
+    config: Config,
+    runs: Runs,
+    manager: Any,
+    tmp_path: Path,
+    caplog: pytest.LogCaptureFixture,
+    content: str | None,
+) -> None:
+    path = written(tmp_path, config)
+    begun = runs.start(config, path)
+    manager.until("READY=1")
+    if content is None:
+        path.unlink()
+    else:
+        path.write_text(content)
+    begun.reload()
+    manager.until("RELOADING=1")
+    manager.until("READY=1")
+    (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
+    assert message.endswith("; the old configuration stays")
+    assert str(path) in message
+    assert begun._config == config
+
+
+def test_a_file_of_the_machine_that_is_emptied_changes_nothing_but_one_that_never_was_is_not_missed(
+    config: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lcf_edge.config.DEFAULT_PATH", tmp_path / "config.toml")
+    assert load() == Config()
+    for content in ("", None):
+        with pytest.raises(ConfigError, match=r"config\.toml: (empty|cannot be read)"):
+            load(filled=True)
+        if content is not None:
+            (tmp_path / "config.toml").write_text(content)
+    written(tmp_path, config)
+    assert load(filled=True) == config
+
+
+REMAINS = {
+    "gain": "[camera]\ngain = " + "9" * 400,
+    "distortion": "[camera]\ndistortion_model = 'radial-tangential'\ndistortion = [0.1, 1e-320, 0, 1e-320]",
+    "leap_px": "[filter]\nleap_px = 1e12",
+    "bl0_px": "[filter]\nbl0_px = 1e12",
+    "bs_px": "[filter]\nbs_px = 1e160",
+    "exposure_s": "[camera]\nexposure_s = 1e308",
+    "dots": "a." * 20_000 + "a = 1",
+    "bytes": "\x00",
+}
+
+
+@pytest.mark.parametrize("name", REMAINS)
+def test_a_reload_with_what_cannot_be_leaves_the_pipeline_running(
+    config: Config, runs: Runs, link: Any, manager: Any, tmp_path: Path, name: str
+) -> None:
+    path = written(tmp_path, config)
+    begun = runs.start(config, path)
+    manager.until("READY=1")
+    path.write_text(REMAINS[name] + "\n")
+    begun.reload()
+    manager.until("RELOADING=1")
+    manager.until("READY=1")
+    scenes = len(link.scenes)
+    link.wait_for(lambda: len(link.scenes) > scenes + 5)
+
+
+@pytest.mark.parametrize("broken", ["__init__", "process"])
+def test_a_pipeline_that_fails_does_not_take_the_place_of_the_old_one(
+    config: Config,
+    runs: Runs,
+    link: Any,
+    manager: Any,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    broken: str,
+) -> None:
+    """However it fails: of a mistake in the program it is told in one line."""
+    path = written(tmp_path, config)
+    begun = runs.start(config, path)
+    manager.until("READY=1")
+
+    class Broken(Pipeline):
+        pass
+
+    def fail(*_: object) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    setattr(Broken, broken, fail)
+    monkeypatch.setattr(loop, "Pipeline", Broken)
+    written(tmp_path, msgspec.structs.replace(config, vehicle=Vehicle(half_width_m=0.7)))
+    begun.reload()
+    manager.until("RELOADING=1")
+    manager.until("READY=1")
+    scenes = len(link.scenes)
+    link.wait_for(lambda: len(link.scenes) > scenes + 5)
+    (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
+    assert message == (
+        "reload: internal error: ZeroDivisionError('division by zero'); please report it; the old configuration stays"
+    )
+    assert begun._config == config
 
 
 def test_a_reload_gives_back_what_was_given_up(

@@ -1,6 +1,9 @@
 """Decoding: sizes are known before memory is taken, damage is found before it is shown as a picture."""
 
+import resource
 import struct
+import subprocess
+import sys
 import zlib
 
 import cv2
@@ -10,7 +13,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.cdr import Header, Image
-from lcf_edge.recordings.decoding import MAX_PIXELS, PictureError, decode_picture, raw_picture
+from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.recordings.decoding import PictureError, decode_picture, raw_picture
 
 PICTURE = np.random.default_rng(3).integers(0, 256, (30, 41), np.uint8)
 SUFFIXES = [".png", ".jpg", ".bmp", ".pgm", ".tif"]
@@ -55,6 +59,140 @@ def _huge(suffix: str) -> bytes:
 def test_an_absurd_size_is_refused_by_its_header(suffix: str) -> None:
     with pytest.raises(PictureError, match="too large"):
         decode_picture(_huge(suffix))
+
+
+# Headers that could be read in two ways: a small picture for the check, a large one for the decoder.
+
+SIDE = 20_000
+
+
+def with_a_size(jpeg: bytes, side: int) -> tuple[bytes, bytes, bytes]:
+    """A JPEG whose frame header claims ``side`` x ``side``: what is before it, the header, what is behind."""
+    at = jpeg.index(b"\xff\xc0")
+    end = at + 2 + int.from_bytes(jpeg[at + 2 : at + 4])
+    header = bytearray(jpeg[at:end])
+    header[5:9] = struct.pack(">HH", side, side)
+    return jpeg[:at], bytes(header), jpeg[end:]
+
+
+def hidden_behind(prefix: bytes) -> bytes:
+    """A JPEG with ``prefix`` before its large frame header: who takes it for a segment lands at a small one."""
+    before, large, behind = with_a_size(encoded(".jpg"), SIDE)
+    _, small, _ = with_a_size(encoded(".jpg"), 16)
+    lead = prefix + large
+    passed_over = 2 + int.from_bytes(lead[2:4])
+    comment = passed_over - len(lead)  # the decoder passes over the small header with it
+    return (
+        before + lead + b"\xff\xfe" + struct.pack(">H", comment - 2 + len(small)) + bytes(comment - 4) + small + behind
+    )
+
+
+def tiff(*tags: tuple[int, int, int, int]) -> bytes:
+    """A TIFF of one directory and no data; (tag, type, count, value)."""
+    entries = b"".join(struct.pack("<HHII", *tag) for tag in tags)
+    return b"II*\0" + struct.pack("<IH", 8, len(tags)) + entries + bytes(100)
+
+
+WIDTH_TAG, HEIGHT_TAG, SAMPLES_TAG, ROWS_TAG, TILE_WIDTH_TAG, TILE_HEIGHT_TAG = 256, 257, 277, 278, 322, 323
+SMALL = ((WIDTH_TAG, 4, 1, 16), (HEIGHT_TAG, 4, 1, 16))
+
+
+@pytest.mark.parametrize(
+    ("content", "reason"),
+    [
+        (hidden_behind(b"\xff"), "too large"),
+        (hidden_behind(b"\xff\xd0"), "damaged"),
+        (tiff((WIDTH_TAG, 4, 1, SIDE), (HEIGHT_TAG, 4, 1, SIDE), *SMALL), "damaged"),
+        (tiff((WIDTH_TAG, 16, 1, 16), (HEIGHT_TAG, 4, 1, 16)), "damaged"),
+        (tiff((WIDTH_TAG, 4, 2, 16), (HEIGHT_TAG, 4, 1, 16)), "damaged"),
+        (tiff(*SMALL, (ROWS_TAG, 4, 1, 2**30)), "too large"),
+        (tiff(*SMALL, (TILE_WIDTH_TAG, 4, 1, SIDE), (TILE_HEIGHT_TAG, 4, 1, SIDE)), "too large"),
+        (tiff(*SMALL, (ROWS_TAG, 4, 1, 16), (SAMPLES_TAG, 4, 1, 2**24)), "too large"),
+        (b"P5 #x\r20000 20000 255\n16 16\n255\n" + bytes(1000), "too large"),
+        (b"BM" + bytes(12) + struct.pack("<IHHHH", 12, SIDE, SIDE, 1, 8) + bytes(1000), "of unknown format"),
+    ],
+    ids=[
+        "JPEG, fill byte",
+        "JPEG, marker without a length",
+        "TIFF, tags twice",
+        "TIFF, tag of another type",
+        "TIFF, two widths",
+        "TIFF, rows of a strip",
+        "TIFF, tile",
+        "TIFF, samples",
+        "PGM, comment until a carriage return",
+        "BMP, old header",
+    ],
+)
+def test_the_size_is_that_which_the_decoder_will_see(content: bytes, reason: str) -> None:
+    with pytest.raises(PictureError, match=f"^{reason}$"):
+        decode_picture(content)
+
+
+def test_a_progressive_jpeg_is_refused_by_what_its_decoder_keeps() -> None:
+    side = 4400
+    assert side**2 < MAX_PIXELS < 3 * side**2
+    grey = np.zeros((side, side), np.uint8)
+    progressive = [
+        cv2.IMWRITE_JPEG_PROGRESSIVE,
+        1,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
+        cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
+    ]
+    assert decode_picture(cv2.imencode(".jpg", grey, progressive)[1].tobytes()).shape == (side, side)
+    with pytest.raises(PictureError, match=r"^too large$"):
+        decode_picture(cv2.imencode(".jpg", cv2.merge([grey] * 3), progressive)[1].tobytes())
+
+
+def test_a_jpeg_of_endless_scans_is_refused() -> None:
+    jpeg = cv2.imencode(".jpg", PICTURE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    assert decode_picture(jpeg).shape == PICTURE.shape
+    at = jpeg.rindex(b"\xff\xda")
+    with pytest.raises(PictureError, match=r"^damaged$"):
+        decode_picture(jpeg[:at] + jpeg[at:-2] * 200 + jpeg[-2:])
+
+
+def chunk(kind: bytes, data: bytes) -> bytes:
+    return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+
+
+@pytest.mark.parametrize(
+    "extra",
+    [
+        b"".join(chunk(b"zTXt", b"key%d\0\0" % number + zlib.compress(bytes(7_900_000))) for number in range(20)),
+        chunk(b"iCCP", b"profile\0\0" + zlib.compress(bytes(1000))),
+        chunk(b"acTL", struct.pack(">II", 5, 0))
+        + chunk(b"fcTL", struct.pack(">5I2H2B", 0, SIDE, SIDE, 0, 0, 1, 9, 0, 0)),
+    ],
+    ids=["texts that unpack to megabytes", "a profile that makes the decoder complain", "an animation"],
+)
+def test_of_a_png_only_the_picture_is_decoded(extra: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+    png = encoded(".png")
+    before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    np.testing.assert_array_equal(decode_picture(png[:33] + extra + png[33:]), PICTURE)
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 8 * 1024
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_png_whose_header_comes_twice_is_damaged() -> None:
+    png = encoded(".png")
+    with pytest.raises(PictureError, match=r"^damaged$"):
+        decode_picture(png[:33] + chunk(b"IHDR", struct.pack(">II5B", SIDE, SIDE, 8, 0, 0, 0, 0)) + png[33:])
+
+
+def test_the_decoder_has_the_limit_too_in_the_whole_program() -> None:
+    """The second line, where a header is read in another way after all."""
+    pgm = f"P5 {MAX_PIXELS // 4096 + 1} 4096 255\n"
+    script = (
+        "from lcf_edge.command_line import main; main(['config'])\n"
+        "import cv2, numpy as np\n"
+        "try: print(cv2.imdecode(np.frombuffer(bytes.fromhex(%r), np.uint8), 0))\n"
+        "except cv2.error as error: print('PIXELS' in str(error))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script % pgm.encode().hex()], capture_output=True, text=True, check=True
+    )
+    assert done.stdout.splitlines()[-1] == "True"
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -1,6 +1,7 @@
 """MCAP recordings: ROS 2 messages as other programs write them, whole and damaged."""
 
 import struct
+import tracemalloc
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -21,6 +22,7 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config, Imu
 from lcf_edge.errors import RecordingError
 from lcf_edge.lens import Lens
+from lcf_edge.pipeline import run
 from lcf_edge.recordings import open_recording
 
 Read = Callable[..., tuple[Any, list[Any]]]
@@ -98,19 +100,24 @@ class Messages:
         return self._make("geometry_msgs/msg/TwistStamped", stamp_ns, "base_link", twist=self._twist(speed))
 
     def camera_info(
-        self, model: str = "plumb_bob", d: tuple[float, ...] = (), focal: float = 50.0
+        self,
+        model: str = "plumb_bob",
+        d: tuple[float, ...] = (),
+        focal: float = 50.0,
+        k: tuple[float, ...] = (),
+        size: tuple[int, int] = (64, 48),
     ) -> tuple[str, bytes]:
         roi = self.ros.types["sensor_msgs/msg/RegionOfInterest"](
             x_offset=0, y_offset=0, height=0, width=0, do_rectify=False
         )
-        k = np.array([focal, 0, 31.5, 0, focal + bool(focal), 23.5, 0, 0, 1])
+        matrix = np.array(k or [focal, 0, 31.5, 0, focal + bool(focal), 23.5, 0, 0, 1], float)
         rest = {"r": np.zeros(9), "p": np.zeros(12), "binning_x": 0, "binning_y": 0, "roi": roi}
         fields = {
-            "height": 48,
-            "width": 64,
+            "height": size[1],
+            "width": size[0],
             "distortion_model": model,
             "d": np.array(d, float),
-            "k": k,
+            "k": matrix,
         } | rest
         return self._make("sensor_msgs/msg/CameraInfo", START_NS, "camera_optical_frame", **fields)
 
@@ -351,6 +358,56 @@ def test_lens(bag: Bag, make: Messages, model: str, d: tuple[float, ...], expect
         assert (recording.lens.model, recording.lens.coefficients) == expected
 
 
+@pytest.mark.parametrize(
+    "info",
+    [
+        {"k": (50, 0, 31.5, 0, 0, 23.5, 0, 0, 1)},
+        {"k": (1e-320, 0, 31.5, 0, 1e-320, 23.5, 0, 0, 1)},
+        {"k": (-50, 0, 31.5, 0, 50, 23.5, 0, 0, 1)},
+        {"k": (np.nan, 0, 31.5, 0, 50, 23.5, 0, 0, 1)},
+        {"k": (np.inf, 0, 31.5, 0, 50, 23.5, 0, 0, 1)},
+        {"k": (50, 0, 1e300, 0, 50, 23.5, 0, 0, 1)},
+        {"k": (1e300, 0, 31.5, 0, 1e300, 23.5, 0, 0, 1)},
+        {"d": (0.1, 1e300, 0, 0)},
+        {"d": (0.1, 1e200, 1e200, 1e200, 1e200)},
+        {"d": (np.nan, 0, 0, 0)},
+        {"size": (0, 48)},
+        {"size": (0, 0)},
+        {"size": (2**32 - 1, 2**32 - 1)},
+        {"model": "plumb_bob\x1b[31m" + "x" * 5000, "d": (0.1, 0.2, 0.3, 0.4)},
+    ],
+    ids=lambda info: str(info)[:40],
+)
+def test_a_lens_that_cannot_be_is_told_in_one_line_and_not_used(
+    bag: Bag, make: Messages, read: Read, info: dict[str, Any]
+) -> None:
+    bag.add("/camera/camera_info", make.camera_info(**info))
+    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    recording, frames = read(bag.write())
+    assert recording.lens is None
+    assert len(frames) == 1
+    assert [len(list(run(recording, Config()))), recording.warnings == [], "not used" in recording.warnings[0]] == [
+        1,
+        0,
+        1,
+    ]
+    assert recording.warnings[0].isprintable()
+    assert len(recording.warnings[0]) < 600
+
+
+@pytest.mark.parametrize(
+    "info",
+    [{"d": (0.1, 1e-320, 0, 1e-320)}, {"d": (0.1, 0.2, 0.3, 1e-300, 1e-310)}, {"d": (-100.0, 100.0, 1.0, 1.0)}],
+    ids=str,
+)
+def test_an_odd_lens_is_used_without_a_failure(bag: Bag, make: Messages, info: dict[str, Any]) -> None:
+    bag.add("/camera/camera_info", make.camera_info(**info))
+    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    recording = open_recording(bag.write(), Config())
+    assert recording.lens
+    assert len(list(run(recording, Config()))) == 1
+
+
 def test_an_uncalibrated_camera_has_no_lens(bag: Bag, make: Messages) -> None:
     bag.add("/camera/camera_info", make.camera_info(focal=0.0))
     bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
@@ -440,6 +497,51 @@ def test_the_chunk_that_was_cut_is_read_as_far_as_it_goes(
     recording, items = read(bag.path)
     assert 100 <= len(items) <= 150
     assert "damaged at byte" in recording.warnings[0]
+
+
+MIB = 2**20
+IMAGE = "sensor_msgs/msg/Image"
+
+
+@pytest.mark.parametrize(
+    ("topics", "bytes_each", "chunk_bytes"),
+    [(1, 120 * MIB, 2**28), (1, 250 * MIB, 2**28), (20, 15 * MIB, 1), (3, 40 * MIB, 1)],
+    ids=["one message", "a message too large", "many topics", "several messages"],
+)
+def test_a_small_file_takes_little_memory(bag: Bag, topics: int, bytes_each: int, chunk_bytes: int) -> None:
+    for number in range(topics):
+        bag.add(f"/image{number}", (IMAGE, bytes(bytes_each)))
+    bag.write(compression=CompressionType.ZSTD, chunk_size=chunk_bytes)
+    bag.messages.clear()
+    assert bag.path.stat().st_size < 30_000
+    tracemalloc.start()
+    try:
+        with pytest.raises(RecordingError):
+            open_recording(bag.path, Config())
+        assert tracemalloc.get_traced_memory()[1] < 64 * MIB
+    finally:
+        tracemalloc.stop()
+
+
+def test_names_of_topics_are_kept_only_as_far_as_topics_are_called(bag: Bag, make: Messages) -> None:
+    for number in range(400):
+        bag.add(f"/{number}{'x' * 50_000}", make.image(START_NS, picture(1)))
+    bag.write(chunk_size=2**28)
+    tracemalloc.start()
+    try:
+        with pytest.raises(RecordingError):
+            open_recording(bag.path, Config())
+        assert tracemalloc.get_traced_memory()[1] < 64 * MIB
+    finally:
+        tracemalloc.stop()
+
+
+def test_dark_pictures_that_compress_well_are_read(bag: Bag, make: Messages, read: Read) -> None:
+    for index in range(10):
+        bag.add("/image", make.image(START_NS + index, np.zeros((1080, 1440), np.uint8)), START_NS + index)
+    recording, items = read(bag.write(compression=CompressionType.ZSTD, chunk_size=4 * MIB))
+    assert len(items) == 10
+    assert recording.skipped == {}
 
 
 @pytest.mark.parametrize("compression", [CompressionType.NONE, CompressionType.LZ4, CompressionType.ZSTD])
