@@ -22,7 +22,7 @@ def start(level: str, stream: TextIO | None = None, environment: Mapping[str, st
     stream = stream or sys.stderr
     handler = logging.StreamHandler(stream)
     handler.setFormatter(_Line(journal=_is_journal(stream, environment)))
-    handler.addFilter(_NoFlood())
+    handler.addFilter(NoFlood())
     logging.raiseExceptions = False  # a log that cannot be written is nobody's error
     LOGGER.handlers[:] = [handler]
     LOGGER.propagate = False
@@ -59,7 +59,7 @@ class _Line(logging.Formatter):
         )
 
 
-class _NoFlood(logging.Filter):
+class NoFlood(logging.Filter):
     """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that tells how many were not written.
 
     Lines are of one kind when they have one message before its arguments are put in.

@@ -57,7 +57,7 @@ def test_standard_error_that_was_redirected_is_not_journald(tmp_path: Path) -> N
 def test_a_flood_is_cut_and_counted() -> None:
     now_s = 0.0
     stream = io.StringIO()
-    flood = log._NoFlood(lambda: now_s)
+    flood = log.NoFlood(lambda: now_s)
     log.start("info", stream, {})
     LOGGER.handlers[0].filters[:] = [flood]
     for number in range(100):
@@ -72,7 +72,7 @@ def test_a_flood_is_cut_and_counted() -> None:
 
 
 def test_kinds_without_end_take_no_memory_without_end() -> None:
-    flood: Any = log._NoFlood(lambda: 0.0)
+    flood: Any = log.NoFlood(lambda: 0.0)
     for number in range(5 * log.KINDS):
         assert flood.filter(logging.LogRecord("lcf_edge", logging.INFO, "", 0, f"kind {number}", (), None))
     assert len(flood._kinds) <= log.KINDS
