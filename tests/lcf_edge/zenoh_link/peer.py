@@ -55,8 +55,19 @@ class Peer:
         """Whether or not somebody subscribed."""
         self.session.put(key, bytes.fromhex(payload), congestion_control=zenoh.CongestionControl.BLOCK)
 
-    def get(self, key: str) -> list[dict[str, Any]]:
-        replies = self.session.get(key, timeout=PATIENCE_S, target=zenoh.QueryTarget.ALL)
+    def delete(self, key: str) -> None:
+        self.session.delete(key, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def answer(self, key: str, payload: str) -> None:
+        """Answer whatever is asked there."""
+        self.kept.append(self.session.declare_queryable(key, lambda query: query.reply(key, bytes.fromhex(payload))))
+
+    def announce(self, key: str) -> None:
+        """Declare a liveliness token."""
+        self.kept.append(self.session.liveliness().declare_token(key))
+
+    def get(self, key: str, timeout_s: float = PATIENCE_S) -> list[dict[str, Any]]:
+        replies = self.session.get(key, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
         return [
             described(reply.ok) if reply.ok else {"error": reply.err.payload.to_string()} for reply in list(replies)
         ]

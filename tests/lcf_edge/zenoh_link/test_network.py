@@ -5,7 +5,7 @@ import shlex
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +75,7 @@ def party(start: Any, folder: Path, endpoint: str) -> Callable[[str], Any]:
             "transport__link__tls__connect_private_key": str(folder / f"{name}.key"),
             "transport__link__tls__enable_mtls": True,
         }
-        return start(mode="peer", listen__endpoints=[], connect__endpoints=[where], **(tls | settings))
+        return start(**({"mode": "peer", "listen__endpoints": [], "connect__endpoints": [where]} | tls | settings))
 
     return connect
 
@@ -141,3 +141,79 @@ def test_whom_no_rule_names_does_nothing(
     assert len(planner.receive("lcf/scene")) == 1
     assert other.receive("lcf/scene", timeout_s=SILENCE_S) == []
     assert not any(name.startswith("speed") for name in link.counts)
+
+
+# Every cell of the table in the document: who, on which key, does what.
+
+KEYS = ("lcf/scene", "lcf/preview/compressed", "lcf/diagnostics", "lcf/query/config", "lcf/@alive/rover", "lcf/speed")
+WHAT_IT_CALLS = {"receives", "asks", "sees", "sends"}
+ROVER, ACTOR = b"of the rover", b"of the actor"
+
+
+def documented(who: str) -> set[tuple[str, str]]:
+    """What the table of the document allows somebody: key, action."""
+    rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in DOCUMENT.splitlines() if "|" in line]
+    head = next(row for row in rows if row[0] == "key")
+    allowed = {(row[0], row[head.index(who)]) for row in rows if row[0] in KEYS and len(row) == len(head)}
+    assert {key for key, _ in allowed} == set(KEYS)
+    assert {action for _, action in allowed} <= {*WHAT_IT_CALLS, "-"}
+    return {cell for cell in allowed if cell[1] != "-"}
+
+
+@pytest.fixture
+def everything(rover: zenoh.Session) -> Iterator[list[tuple[str, str]]]:
+    """What reaches the rover on whatever key; it publishes, answers and is alive on each."""
+    came: list[tuple[str, str]] = []
+    listening = [
+        rover.declare_subscriber(key, lambda _, key=key: came.append((key, "sends")))  # type: ignore[misc]
+        for key in KEYS
+    ]
+    answering = [
+        rover.declare_queryable(key, lambda query, key=key: query.reply(key, ROVER))  # type: ignore[misc]
+        for key in KEYS
+    ]
+    alive = [rover.liveliness().declare_token(key) for key in KEYS]
+    yield came
+    for one in (*listening, *answering, *alive):
+        one.undeclare()  # type: ignore[no-untyped-call]
+
+
+def payloads(samples: Iterable[Any]) -> set[bytes]:
+    return {sample.payload for sample in samples if not isinstance(sample, str)}
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+@pytest.mark.parametrize("who", ["planner", "wheels", "anybody else"])
+def test_each_does_what_the_table_says_and_nothing_else(
+    rover: zenoh.Session, everything: list[tuple[str, str]], party: Any, who: str, mode: str
+) -> None:
+    """A client sends whether or not it has heard that somebody wants it, so the rover itself must refuse."""
+    actor = party({"anybody else": "guest"}.get(who, who), mode=mode)
+    witness = party("planner")
+    for key in KEYS:
+        witness.subscribe(key)
+        actor.subscribe(key)
+        actor.ask("answer", key=key, payload=ACTOR.hex())
+        actor.ask("announce", key=key + "/of-the-actor")
+    witness.get("lcf/query/config", SILENCE_S)  # what is asked is answered after what was declared
+    actor.get("lcf/query/config", SILENCE_S)
+    for key in KEYS:
+        rover.put(key, ROVER, congestion_control=zenoh.CongestionControl.BLOCK)
+    done = {(key, "asks") for key in KEYS if ROVER in payloads(actor.get(key, SILENCE_S))}
+    done |= {(key, "sees") for key in KEYS if key in actor.tokens(key)}
+    done |= {(key, "receives") for key in KEYS if ROVER in payloads(actor.receive(key, 1, SILENCE_S))}
+    everything.clear()  # of the rover itself
+    for key in KEYS:
+        actor.ask("put_blindly", key=key, payload=ACTOR.hex())
+        actor.ask("delete", key=key)
+    actor.get("lcf/query/config", SILENCE_S)
+    done |= set(everything)
+    assert done == documented(who)
+    # Nothing of the actor's reaches the rover's questions, or another planner.
+    answers = [one.ok.payload.to_bytes() for one in rover.get("lcf/**", timeout=SILENCE_S) if one.ok]
+    tokens = [str(one.ok.key_expr) for one in rover.liveliness().get("lcf/**", timeout=SILENCE_S) if one.ok]
+    assert set(answers) == {ROVER}
+    assert not [token for token in tokens if token.endswith("of-the-actor")]
+    assert witness.tokens("lcf/@alive/**") == ["lcf/@alive/rover"]
+    assert payloads(one for key in KEYS for one in witness.get(key, SILENCE_S)) == {ROVER}
+    assert payloads(one for key in KEYS for one in witness.receive(key, 9, SILENCE_S)) == {ROVER}
