@@ -18,6 +18,9 @@ from lcf_edge.zenoh_link.session import reason
 ATTACHMENT = struct.Struct("<qqB16s")
 """Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
 
+LATEST_NS = 2**63 - 1
+"""The last moment, in April 2262, that an attachment can tell; a clock that is beyond it stands still there."""
+
 
 @dataclass(frozen=True, slots=True)
 class Topic:
@@ -92,7 +95,7 @@ class MessagePublisher:
     def put(self, payload: bytes) -> None:
         """Send one message; never raises, never waits."""
         number = self.counts["sent"] + 1
-        attachment = ATTACHMENT.pack(number, time.time_ns(), len(self._gid), self._gid)
+        attachment = ATTACHMENT.pack(number, min(time.time_ns(), LATEST_NS), len(self._gid), self._gid)
         try:
             for publisher in self._publishers:
                 publisher.put(payload, attachment=attachment)
