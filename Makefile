@@ -58,6 +58,7 @@ COMMAND := $(IMAGE)/usr/local/bin/lcf-edge
 CONFIGURATION := $(IMAGE)/etc/lcf-edge
 STATE := $(IMAGE)/var/lib
 UNIT := $(IMAGE)/etc/systemd/system/lcf-edge.service
+GATE_UNIT := $(IMAGE)/etc/systemd/system/lcf-edge-gate.service
 UDEV_RULES := $(IMAGE)/etc/udev/rules.d/70-lcf-edge.rules
 GROUPS := $(IMAGE)/etc/sysusers.d/lcf-edge.conf
 MODULES := $(IMAGE)/etc/modules-load.d/lcf-edge.conf
@@ -82,6 +83,7 @@ install-program:
 
 install-files:
 	install -D -m 644 systemd/lcf-edge.service "$(UNIT)"
+	install -D -m 644 systemd/lcf-edge-gate.service "$(GATE_UNIT)"
 	install -D -m 644 systemd/70-lcf-edge.rules "$(UDEV_RULES)"
 	install -D -m 644 systemd/lcf-edge.sysusers "$(GROUPS)"
 	install -D -m 644 systemd/lcf-edge.modules "$(MODULES)"
@@ -93,6 +95,7 @@ install-files:
 uninstall:
 	if $(RUNNING) && test -e "$(UNIT)"; then systemctl disable --now lcf-edge; fi
 	rm -rf "$(PROGRAM)"
-	rm -f "$(COMMAND)" "$(UNIT)" "$(UDEV_RULES)" "$(GROUPS)" "$(MODULES)"
+	if $(RUNNING) && test -e "$(GATE_UNIT)"; then systemctl disable --now lcf-edge-gate; fi
+	rm -f "$(COMMAND)" "$(UNIT)" "$(GATE_UNIT)" "$(UDEV_RULES)" "$(GROUPS)" "$(MODULES)"
 	if $(RUNNING); then systemctl daemon-reload; udevadm control --reload; fi
-	$(if $(PURGE),rm -rf "$(CONFIGURATION)" "$(UNIT).d" "$(STATE)/private/lcf-edge" "$(STATE)/lcf-edge")
+	$(if $(PURGE),rm -rf "$(CONFIGURATION)" "$(UNIT).d" "$(GATE_UNIT).d" "$(STATE)/private/lcf-edge" "$(STATE)/lcf-edge")

@@ -8,6 +8,7 @@ import json
 import queue
 import sys
 import threading
+import time
 from typing import Any
 
 import zenoh
@@ -23,6 +24,16 @@ class Peer:
         self.session = zenoh.open(config)
         self.samples: dict[str, queue.Queue[zenoh.Sample]] = {}
         self.kept: list[Any] = []
+
+    def connected(self, timeout_s: float = PATIENCE_S) -> bool:
+        """Whether somebody is there in time; Zenoh tells of it to nobody who asks later."""
+        deadline_s = time.monotonic() + timeout_s
+        info: Any = self.session.info
+        while not (list(info.peers_zid()) or list(info.routers_zid())):
+            if time.monotonic() > deadline_s:
+                return False
+            time.sleep(0.005)
+        return True
 
     def subscribe(self, key: str) -> None:
         self.samples[key] = queue.Queue()
