@@ -39,7 +39,7 @@ def run(
     log.start(config.log.level)
     check_budget(config)
     with ExitStack() as stack:
-        session = open_session(config.zenoh)
+        session = open_session(config.zenoh, config.publish)
         stack.callback(close_session, session)
         link = Link(session, config)
         stack.pop_all()  # from here on the service closes it

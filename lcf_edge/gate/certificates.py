@@ -2,6 +2,7 @@
 
 import ssl
 from pathlib import Path
+from typing import Any
 
 from lcf_edge.errors import LcfError
 
@@ -30,8 +31,8 @@ class Certificates:
 
 def common_name(connection: ssl.SSLObject) -> str:
     """Of the certificate that the other side has shown; empty: it has none."""
-    subject = (connection.getpeercert() or {}).get("subject", ())
-    return next((str(value) for part in subject for name, value in part if name == "commonName"), "")
+    certificate: dict[str, Any] = connection.getpeercert() or {}
+    return next((value for part in certificate.get("subject", ()) for name, value in part if name == "commonName"), "")
 
 
 def _client(certificate: Path, authority: Path) -> ssl.SSLContext:
