@@ -1,7 +1,7 @@
 """What a daemon that listens on this machine alone takes in from others: what it needs, and nothing else.
 
 Every local process can connect. It may read all that the daemon publishes, ask it, and tell the speed; it cannot send
-scenes, answers or tokens to others through the daemon, nor fill its memory with declarations or large messages.
+scenes, answers or tokens to others through the daemon, nor fill its memory with large messages.
 """
 
 import json

@@ -14,6 +14,7 @@ from typing import Any
 import zenoh
 
 PATIENCE_S = 20.0
+PRIORITIES = (zenoh.Priority.REAL_TIME, zenoh.Priority.INTERACTIVE_HIGH, zenoh.Priority.DATA, zenoh.Priority.BACKGROUND)
 
 
 class Peer:
@@ -76,6 +77,12 @@ class Peer:
     def announce(self, key: str) -> None:
         """Declare a liveliness token."""
         self.kept.append(self.session.liveliness().declare_token(key))
+
+    def put_large(self, key: str, size: int, count: int) -> None:
+        """Whether or not somebody subscribed, at each priority."""
+        for number in range(count):
+            priority = PRIORITIES[number % len(PRIORITIES)]
+            self.session.put(key, bytes(size), congestion_control=zenoh.CongestionControl.BLOCK, priority=priority)
 
     def get(self, key: str, timeout_s: float = PATIENCE_S) -> list[dict[str, Any]]:
         replies = self.session.get(key, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
