@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test bench hil soak lint types clean help install install-program install-files uninstall
+.PHONY: demo test bench hil soak siege lint types clean help install install-program install-files uninstall
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -11,6 +11,7 @@ help:
 	@echo "make bench  measure detection quality and speed against other methods (tables in benchmarks/results/)"
 	@echo "make hil    as root: the installed daemon on a real kernel, in a virtual machine (docs/hil.md)"
 	@echo "make soak   the daemon at full speed with random faults: MINUTES=60 or FRAMES=200000"
+	@echo "make siege  the daemon, its gate and its page under attack, on loopback: SECONDS=60"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
@@ -39,6 +40,9 @@ hil: $(VENV)/.dev
 
 soak: $(VENV)/.dev
 	$(BIN)/python -m hil_mocks.soak $(if $(FRAMES),--frames $(FRAMES),--minutes $(or $(MINUTES),10)) $(SOAK)
+
+siege: $(VENV)/.dev
+	$(BIN)/python -m hil_mocks.siege $(if $(SECONDS),--seconds $(SECONDS)) $(SIEGE)
 
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
@@ -76,7 +80,8 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 
 install-program:
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
-	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check ".[view,watch]"
+	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
+	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps .
 	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
 	install -d "$(dir $(COMMAND))"
 	ln -sfn /opt/lcf-edge/bin/lcf-edge "$(COMMAND)"
