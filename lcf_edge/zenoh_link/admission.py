@@ -33,11 +33,13 @@ def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
     """
     wanted = {"transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES)}
     if options.mode == "peer" and not options.connect and not options.config_file and not publish.ros2:
-        wanted["access_control"] = json.dumps(_access_control(publish.prefix))
+        wanted["access_control"] = json.dumps(access_control(publish.prefix))
     return wanted
 
 
-def _access_control(prefix: str) -> dict[str, Any]:
+def access_control(prefix: str) -> dict[str, Any]:
+    """Zenoh's rules for everybody: reading, asking, and the speed."""
+
     def taken_in(name: str, messages: list[str], *keys: str) -> dict[str, Any]:
         return {
             "id": name,
