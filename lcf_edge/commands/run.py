@@ -36,6 +36,7 @@ def run(
     from lcf_edge.zenoh_link.session import close_session, open_session
 
     cv2.setNumThreads(1)
+    log.take_over_standard_error()
     log.start(config.log.level)
     check_budget(config)
     with ExitStack() as stack:

@@ -11,6 +11,7 @@ from typing import Any
 import zenoh
 
 from lcf_edge import config
+from lcf_edge.cdr import CdrError
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.ros2 import Endpoint, Ros2Node, gid_of
 from lcf_edge.zenoh_link.session import reason
@@ -30,6 +31,7 @@ class Topic:
     message: str  # "lcf_msgs/msg/Scene"
     priority: zenoh.Priority
     express: bool = False
+    largest_bytes: int = 2**17  # of what is taken for one; a scene has some 60 a circle
 
     def key(self, prefix: str) -> str:
         """The key of its samples."""
@@ -39,6 +41,12 @@ class Topic:
     def encoding(self) -> str:
         """The encoding of its samples."""
         return f"application/cdr;{self.message}"
+
+    def payload(self, sample: zenoh.Sample) -> bytes:
+        """Of one that came. Raises ``CdrError`` for what is larger than any of this topic."""
+        if len(sample.payload) > self.largest_bytes:
+            raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
+        return sample.payload.to_bytes()
 
 
 class MessagePublisher:

@@ -3,6 +3,8 @@
 import io
 import logging
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -83,3 +85,30 @@ def test_a_log_that_cannot_be_written_is_nobodys_error() -> None:
     log.start("info", stream, {})
     stream.close()
     LOGGER.info("lost")
+
+
+NOISY = """
+import os, sys, threading
+from lcf_edge.daemon import log
+log.take_over_standard_error()
+log.start("info")
+for _ in range(1000):
+    os.write(2, b"Corrupt JPEG data: \x1b[31m premature end\\n")
+log.LOGGER.info("end")
+sys.stderr.write("by Python\\n")
+os.close(2)  # its reader ends with it
+for thread in threading.enumerate():
+    if thread.name == "standard error":
+        thread.join()
+"""
+
+
+def test_what_a_library_writes_by_itself_is_limited_too() -> None:
+    done = subprocess.run((sys.executable, "-c", NOISY), check=True, capture_output=True, text=True)
+    lines = done.stderr.splitlines()
+    assert "by Python" in lines
+    assert "lcf-edge: end" in lines
+    told = [line for line in lines if line.startswith("lcf-edge: warning: library: Corrupt JPEG data")]
+    assert 1 <= len(told) <= log.AT_ONCE
+    assert len(lines) == len(told) + 2
+    assert "\x1b" not in done.stderr
