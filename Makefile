@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test compile wheels bench hil soak lint types clean help install install-program install-files uninstall fuzz
+.PHONY: demo test compile wheels bench hil soak lint types clean help install install-program install-files uninstall fuzz siege
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -14,6 +14,7 @@ help:
 	@echo "make compile   the filter alone, after a change; demo, test and the others do it themselves"
 	@echo "make wheels as root: wheels for x86-64 and 64-bit Arm, each tried, into dist/ (docs/install.md)"
 	@echo "make fuzz   attack every parser: SECONDS=60 for each (docs/fuzzing.md)"
+	@echo "make siege  the daemon, its gate and its page under attack, on loopback: SECONDS=60"
 	@echo "make lint   ruff;  make types   mypy, strict;  make clean   remove .venv and what was built"
 	@echo "make install    as root: the daemon, into /opt/lcf-edge and /etc (docs/install.md);  make uninstall"
 
@@ -67,6 +68,9 @@ soak: $(VENV)/.dev $(VENV)/.compiled
 fuzz: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m tests.fuzz --seconds $(or $(SECONDS),10) $(FUZZ)
 
+siege: $(VENV)/.dev $(VENV)/.compiled
+	$(BIN)/python -m hil_mocks.siege $(if $(SECONDS),--seconds $(SECONDS)) $(SIEGE)
+
 lint: $(VENV)/.dev
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
@@ -85,6 +89,7 @@ COMMAND := $(IMAGE)/usr/local/bin/lcf-edge
 CONFIGURATION := $(IMAGE)/etc/lcf-edge
 STATE := $(IMAGE)/var/lib
 UNIT := $(IMAGE)/etc/systemd/system/lcf-edge.service
+GATE_UNIT := $(IMAGE)/etc/systemd/system/lcf-edge-gate.service
 UDEV_RULES := $(IMAGE)/etc/udev/rules.d/70-lcf-edge.rules
 GROUPS := $(IMAGE)/etc/sysusers.d/lcf-edge.conf
 MODULES := $(IMAGE)/etc/modules-load.d/lcf-edge.conf
@@ -106,8 +111,9 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 
 install-program:
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
+	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock
 	umask 022; $(if $(WHEEL),,$(COPIED) && cd "$$copy" &&) \
-		"$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check "$(or $(wildcard $(WHEEL)),$(WHEEL),.)[view,watch]"
+		"$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check --no-deps "$(or $(wildcard $(WHEEL)),$(WHEEL),.)"
 	"$(PROGRAM)/bin/python" -P -c $(SAY_COMPILED)
 	$(if $(IMAGE),grep -rlIF "$(IMAGE)" "$(PROGRAM)/bin" "$(PROGRAM)/pyvenv.cfg" | xargs sed -i "s|$(IMAGE)/|/|g")
 	install -d "$(dir $(COMMAND))"
@@ -115,6 +121,7 @@ install-program:
 
 install-files:
 	install -D -m 644 systemd/lcf-edge.service "$(UNIT)"
+	install -D -m 644 systemd/lcf-edge-gate.service "$(GATE_UNIT)"
 	install -D -m 644 systemd/70-lcf-edge.rules "$(UDEV_RULES)"
 	install -D -m 644 systemd/lcf-edge.sysusers "$(GROUPS)"
 	install -D -m 644 systemd/lcf-edge.modules "$(MODULES)"
@@ -126,6 +133,7 @@ install-files:
 uninstall:
 	if $(RUNNING) && test -e "$(UNIT)"; then systemctl disable --now lcf-edge; fi
 	rm -rf "$(PROGRAM)"
-	rm -f "$(COMMAND)" "$(UNIT)" "$(UDEV_RULES)" "$(GROUPS)" "$(MODULES)"
+	if $(RUNNING) && test -e "$(GATE_UNIT)"; then systemctl disable --now lcf-edge-gate; fi
+	rm -f "$(COMMAND)" "$(UNIT)" "$(GATE_UNIT)" "$(UDEV_RULES)" "$(GROUPS)" "$(MODULES)"
 	if $(RUNNING); then systemctl daemon-reload; udevadm control --reload; fi
-	$(if $(PURGE),rm -rf "$(CONFIGURATION)" "$(UNIT).d" "$(STATE)/private/lcf-edge" "$(STATE)/lcf-edge")
+	$(if $(PURGE),rm -rf "$(CONFIGURATION)" "$(UNIT).d" "$(GATE_UNIT).d" "$(STATE)/private/lcf-edge" "$(STATE)/lcf-edge")

@@ -162,17 +162,18 @@ class _Recorded(Generic[Record]):
         wait_s = (due_ns - self._clock.monotonic_ns()) / 1e9
         self._clock.sleep_s(min(wait_s, LONGEST_WAIT_S))
         now_ns = self._clock.monotonic_ns()
-        records = []
+        records: deque[Record] = deque(maxlen=_HELD[self.kind])  # after a pause of the process many are due
         while (due_ns := self._due_ns()) <= now_ns:
             assert self._next is not None
             if self._random.random() < self.faults.drop:
                 self.counts["dropped"] += 1
             else:
+                self.counts["overtaken"] += len(records) == records.maxlen
                 records.append(self._next[1])
             self._next = None
             if now_ns - due_ns < _ON_TIME_NS:
                 break  # the next is not due, and to ask for it is to decode it while this one waits
-        return records
+        return list(records)
 
     def close(self) -> None:
         """Let the recording go."""

@@ -96,6 +96,16 @@ def parser() -> argparse.ArgumentParser:
     )
     watch.add_argument("--json", action="store_true", help="one JSON line a scene instead, for pipes")
 
+    gate = commands.add_parser(
+        "gate", allow_abbrev=False, help="before the daemon's TLS port: keeps strangers away from it"
+    )
+    gate.add_argument("--tls", type=Path, required=True, metavar="DIR", help="certificates, as docs/network.md says")
+    gate.add_argument("--listen", default="0.0.0.0", metavar="HOST", help="where parties connect (%(default)s)")
+    gate.add_argument("--port", type=_whole(0, 65535), default=7447, metavar="N", help="(%(default)s)")
+    gate.add_argument(
+        "--to", type=_whole(1, 65535), default=7448, metavar="N", help="the daemon's port on 127.0.0.1 (%(default)s)"
+    )
+
     view = commands.add_parser(
         "view",
         allow_abbrev=False,

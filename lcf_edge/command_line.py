@@ -92,6 +92,12 @@ def _watch(arguments: argparse.Namespace) -> None:
     watch(_source(arguments), _tell)
 
 
+def _gate(arguments: argparse.Namespace) -> None:
+    from lcf_edge.commands.gate import gate  # noqa: PLC0415
+
+    gate(arguments.tls, arguments.listen, arguments.port, arguments.to, _tell)
+
+
 def _view(arguments: argparse.Namespace) -> None:
     from lcf_edge.commands.view import view  # noqa: PLC0415
 
@@ -164,6 +170,7 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
     "run": _run,
     "record": _record,
     "watch": _watch,
+    "gate": _gate,
     "view": _view,
     "doctor": _doctor,
     "calibrate": _calibrate,

@@ -37,12 +37,13 @@ def run(
     from lcf_edge.zenoh_link.session import close_session, open_session
 
     cv2.setNumThreads(1)
+    log.take_over_standard_error()
     log.start(config.log.level)
     if reason := uncompiled():
         log.LOGGER.warning("%s", reason)
     check_budget(config)
     with ExitStack() as stack:
-        session = open_session(config.zenoh)
+        session = open_session(config.zenoh, config.publish)
         stack.callback(close_session, session)
         link = Link(session, config)
         stack.pop_all()  # from here on the service closes it

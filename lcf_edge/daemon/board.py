@@ -22,16 +22,23 @@ class Board:
 
 def read_board(sys: Path = Path("/sys")) -> Board:
     """What ``sys`` tells now; what cannot be read is left out."""
-    zones = (_number(zone / "temp") for zone in sorted(sys.glob("class/thermal/thermal_zone*")))
+    zones = (_number(zone / "temp") for zone in _found(sys, "class/thermal/thermal_zone*"))
     temperatures_c = [millidegrees / 1000 for millidegrees in zones if millidegrees is not None]
     slowed = [
         _text(device / "type")
-        for device in sorted(sys.glob("class/thermal/cooling_device*"))
+        for device in _found(sys, "class/thermal/cooling_device*")
         if _text(device / "type").lower().startswith(_CPU_COOLING) and (_number(device / "cur_state") or 0) > 0
     ]
     throttled = _number(sys / "devices/platform/soc/soc:firmware/get_throttled", base=16) or 0
     slowed += [name for bit, name in _PI_THROTTLED.items() if throttled & bit]
     return Board(max(temperatures_c, default=None), tuple(slowed))
+
+
+def _found(sys: Path, pattern: str) -> list[Path]:
+    try:
+        return sorted(sys.glob(pattern))
+    except OSError:  # no descriptor is left
+        return []
 
 
 def _text(file: Path) -> str:

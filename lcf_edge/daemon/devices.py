@@ -1,5 +1,6 @@
 """A reader for each device of the configuration."""
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
 from drivers.clock import Clock
@@ -8,20 +9,27 @@ from drivers.errors import WrongDeviceError
 from drivers.records import ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock
+from lcf_edge.daemon.descriptors import Reserve
 from lcf_edge.daemon.loop import Mail
 from lcf_edge.daemon.reader import Reader
 from lcf_edge.devices import open_camera, open_imu, open_speed
 
 
-def readers(config: Config, mail: Mail, clock: StoppableClock) -> list[Reader[Any]]:
+def readers(config: Config, mail: Mail, clock: StoppableClock, reserve: Reserve) -> list[Reader[Any]]:
     """Of the camera, which comes first, of the IMU if there is one, of a stand-in recording's odometry; not started."""
-    wanted: list[Reader[Any]] = [
-        Reader("camera", lambda at: open_camera(config, at), lambda frames: mail.frames.put(frames[-1]), clock)
-    ]
+
+    def reader(name: str, open_device: Callable[[Config, Clock], Any], put: Callable[[Sequence[Any]], object]) -> Any:
+        def opened(at: Clock) -> Any:
+            with reserve.lent():
+                return open_device(config, at)
+
+        return Reader(name, opened, put, clock)
+
+    wanted = [reader("camera", open_camera, lambda frames: mail.frames.put(frames[-1]))]
     if config.imu.driver != "none":
-        wanted.append(Reader("imu", lambda at: _imu(config, at), mail.imu.put, clock))
+        wanted.append(reader("imu", _imu, mail.imu.put))
     if config.camera.driver == "recording" and config.vehicle.speed_source in {"auto", "odometry"}:
-        wanted.append(Reader("speed", lambda at: _speed(config, at), mail.speeds.put, clock))
+        wanted.append(reader("speed", _speed, mail.speeds.put))
     return wanted
 
 

@@ -8,13 +8,14 @@ from collections import Counter
 import msgspec
 
 from lcf_edge.cdr import CdrError
-from lcf_edge.config import Config, to_toml
+from lcf_edge.config import Config
 from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.recorder.destination import MIB, Destination, Named, free_mib
 from lcf_edge.recorder.messages import PICTURES, Message
 from lcf_edge.recorder.recording_file import CHUNK_BYTES, RecordingFile
+from lcf_edge.shown_config import shown
 
 SYNC_S = 0.5
 """So much of a recording a power cut costs, and what the disk takes to write it."""
@@ -122,7 +123,7 @@ class DiskWriter(threading.Thread):
         config = self.config
         if isinstance(self._destination, Named):
             config = msgspec.structs.replace(config, record=msgspec.structs.replace(config.record, when="never"))
-        return to_toml(config)
+        return shown(config)
 
     def _sync(self) -> None:
         """Have on the disk what is due."""

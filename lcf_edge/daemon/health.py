@@ -4,7 +4,6 @@ import math
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,8 @@ import msgspec
 from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Config
 from lcf_edge.daemon.board import read_board
-from lcf_edge.daemon.clock import SystemTime
+from lcf_edge.daemon.clock import SystemTime, utc
+from lcf_edge.daemon.descriptors import Reserve
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.loop import Loop, Mail
 from lcf_edge.daemon.memory import MemoryWatch
@@ -36,6 +36,7 @@ class Health:
         loop: Loop,
         link: Link,
         system_time: SystemTime,
+        reserve: Reserve,
         sys: Path = Path("/sys"),
     ) -> None:
         self._readers = readers
@@ -43,6 +44,7 @@ class Health:
         self._loop = loop
         self._link = link
         self._system_time = system_time
+        self._reserve = reserve
         self._sys = sys
         self._turned_s = time.monotonic()
 
@@ -92,8 +94,7 @@ class Health:
         return {"camera": mail.frames.overtaken, "imu": mail.imu.overtaken, "speed": mail.speeds.overtaken}[name]
 
     def _iso(self, monotonic_ns: int) -> str:
-        moment = datetime.fromtimestamp(self._system_time.system_ns(monotonic_ns) / 1e9, UTC)
-        return moment.strftime("%Y-%m-%dT%H:%M:%SZ")
+        return f"{utc(self._system_time.system_ns(monotonic_ns)):%Y-%m-%dT%H:%M:%SZ}"
 
     def _pipeline(self, config: Config) -> DeviceStatus:
         loop = self._loop
@@ -124,8 +125,11 @@ class Health:
         return DeviceStatus("board", Level.OK, "runs at full speed", values)
 
     def _published(self) -> DeviceStatus:
-        counts: Mapping[str, int] = dict(self._link.counts)
-        return DeviceStatus("link", Level.OK, "open", {name: str(count) for name, count in sorted(counts.items())})
+        counts: Mapping[str, int] = {**self._link.counts, "descriptor shortages": self._reserve.shortages}
+        values = {name: str(count) for name, count in sorted(counts.items())}
+        if self._reserve.short:
+            return DeviceStatus("link", Level.WARN, "connections use up all file descriptors", values)
+        return DeviceStatus("link", Level.OK, "open", values)
 
 
 def _memory(memory: MemoryWatch) -> DeviceStatus:

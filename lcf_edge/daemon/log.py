@@ -1,17 +1,22 @@
 """Logs: one line an event on standard error, as journald or a terminal likes it, never a flood."""
 
+import faulthandler
 import logging
 import os
 import sys
+import threading
 import time
 from collections.abc import Callable, Mapping
 from typing import TextIO
+
+from lcf_edge.printable import printable
 
 LOGGER = logging.getLogger("lcf_edge")
 
 AT_ONCE = 5  # lines of one kind, then
 EACH_S = 10.0  # one more in this time
 KINDS = 256  # that are remembered
+LONGEST_LINE = 500  # of a library's
 
 _PRIORITIES = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3}
 _LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
@@ -22,11 +27,33 @@ def start(level: str, stream: TextIO | None = None, environment: Mapping[str, st
     stream = stream or sys.stderr
     handler = logging.StreamHandler(stream)
     handler.setFormatter(_Line(journal=_is_journal(stream, environment)))
-    handler.addFilter(_NoFlood())
+    handler.addFilter(NoFlood())
     logging.raiseExceptions = False  # a log that cannot be written is nobody's error
     LOGGER.handlers[:] = [handler]
     LOGGER.propagate = False
     set_level(level)
+
+
+def take_over_standard_error() -> None:
+    """Log what libraries write to standard error by themselves, line by line, as a libjpeg does of every bad picture.
+
+    Python's own messages, also those of a crash (``PYTHONFAULTHANDLER``), go where they went before.
+    """
+    ours = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1)
+    reading, writing = os.pipe()
+    os.dup2(writing, 2)
+    os.close(writing)
+    sys.stderr = ours
+    if faulthandler.is_enabled():
+        faulthandler.enable(ours)
+    threading.Thread(target=_log_lines, args=(reading,), name="standard error", daemon=True).start()
+
+
+def _log_lines(reading: int) -> None:
+    with os.fdopen(reading, encoding="utf-8", errors="backslashreplace") as lines:
+        while line := lines.readline(LONGEST_LINE):
+            if line.strip():
+                LOGGER.warning("library: %s", printable(line.strip()))
 
 
 def set_level(level: str) -> None:
@@ -59,7 +86,7 @@ class _Line(logging.Formatter):
         )
 
 
-class _NoFlood(logging.Filter):
+class NoFlood(logging.Filter):
     """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that tells how many were not written.
 
     Lines are of one kind when they have one message before its arguments are put in.

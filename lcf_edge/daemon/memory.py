@@ -1,6 +1,7 @@
 """The memory budget of the whole process: checked at the start, watched, and kept by shedding."""
 
 import os
+import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -26,9 +27,16 @@ RECORDER_MIB = 6.0
 _CORNER_BYTES = 1500  # of one corner's way through detection and matching
 
 
-def resident_mib(statm: Path = _STATM) -> float:
-    """Resident memory of this process, MiB."""
-    return int(statm.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE") / _MIB
+class ResidentMemory:
+    """Measures the resident memory of this process, MiB; needs no more than the one descriptor that it holds."""
+
+    def __init__(self, statm: Path = _STATM) -> None:
+        self._file = os.open(statm, os.O_RDONLY | os.O_CLOEXEC)
+        self._close = weakref.finalize(self, os.close, self._file)
+
+    def __call__(self) -> float:
+        """Measure."""
+        return int(os.pread(self._file, 128, 0).split()[1]) * os.sysconf("SC_PAGE_SIZE") / _MIB
 
 
 def needs_mib(config: Config) -> dict[str, float]:

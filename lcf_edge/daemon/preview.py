@@ -55,8 +55,10 @@ class Previewer(threading.Thread):
         self._offered.close()
 
     def _draw(self, frame: Frame, outcome: Outcome) -> None:
-        from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
-
+        try:
+            from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
+        except OSError:  # no descriptor is left; the next one may find one
+            return
         picture = draw(frame.image, outcome)
         height, width = picture.shape[:2]
         if width > WIDEST_PX:

@@ -18,12 +18,13 @@ import msgspec
 from lcf_edge.config import DEFAULT_PATH, Config, is_filled, load
 from lcf_edge.daemon import log
 from lcf_edge.daemon.clock import StoppableClock, SystemTime
+from lcf_edge.daemon.descriptors import Reserve
 from lcf_edge.daemon.devices import readers
 from lcf_edge.daemon.health import Health
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.loop import Loop, Mail, known_lens
-from lcf_edge.daemon.memory import MemoryWatch, Shedding, check_budget, resident_mib
+from lcf_edge.daemon.memory import MemoryWatch, ResidentMemory, Shedding, check_budget
 from lcf_edge.daemon.notify import Notifier
 from lcf_edge.daemon.preview import Previewer
 from lcf_edge.daemon.reload import changed, merged, signature, wants_pipeline, wants_restart
@@ -72,7 +73,9 @@ class Service:
         self._clock = StoppableClock()
         self._system_time = SystemTime()
         self._mail = Mail()
-        self._readers = readers(config, self._mail, self._clock)
+        self._reserve = Reserve()
+        self._resident_mib = ResidentMemory()
+        self._readers = readers(config, self._mail, self._clock, self._reserve)
         self._previewer = Previewer(link, self._clock)
         self.recorder = _recorder(config, destination, self._system_time)
         self._loop = Loop(
@@ -86,7 +89,7 @@ class Service:
             self.recorder,
         )
         self._memory = self._watched()
-        self._health = Health(self._readers, self._mail, self._loop, link, self._system_time)
+        self._health = Health(self._readers, self._mail, self._loop, link, self._system_time, self._reserve)
         self._ready = False
         self._seconds = seconds
         self._ends_at_s = math.inf
@@ -163,6 +166,7 @@ class Service:
 
     def _tick(self) -> None:
         self._memory.check()
+        self._check_descriptors()
         self._check_ready()
         if self._loop.turns != self._turns:  # the watchdog lives on the pipeline's progress
             self._turns = self._loop.turns
@@ -177,6 +181,12 @@ class Service:
         now = signature(self._path or DEFAULT_PATH)
         if now != self._signature:
             self._reload()
+
+    def _check_descriptors(self) -> None:
+        was_short = self._reserve.short
+        self._reserve.check()
+        if self._reserve.short and not was_short:
+            LOGGER.warning("link: connections use up all file descriptors but the reserved; docs/network.md: Strangers")
 
     def _check_ready(self) -> None:
         """Frames flow, or it has been told why not."""
@@ -201,7 +211,8 @@ class Service:
         self._signature = signature(path)
         self._filled = self._filled or is_filled(path)
         try:
-            self._take(load(self._path, self._settings, filled=self._filled))  # an editor may have emptied it just now
+            with self._reserve.lent():
+                self._take(load(self._path, self._settings, filled=self._filled))  # an editor may have just emptied it
         except LcfError as error:
             LOGGER.error("reload: %s; the old configuration stays", error)
         except Exception as error:  # noqa: BLE001  # a mistake in the program: what runs must go on all the same
@@ -232,7 +243,7 @@ class Service:
         if self.recorder is not None:
             order.append(Shedding("most of the recording buffer", self.recorder.shed))
         order.append(Shedding("half of the corners", self._shed_corners))
-        return MemoryWatch(self._config.memory.budget_mib, order, resident_mib)
+        return MemoryWatch(self._config.memory.budget_mib, order, self._resident_mib)
 
     def _shed_preview(self) -> None:
         self._previewer.off = True
@@ -276,6 +287,7 @@ class Service:
         if self.recorder is not None and not self.recorder.join(begun_s + RECORDED_WITHIN_S - time.monotonic()):
             LOGGER.warning("recorder: the disk does not take the last messages in time; left behind")
         self._notifier.close()
+        self._reserve.close()
 
 
 def _recorder(config: Config, destination: "Destination | None", system_time: SystemTime) -> "Recorder | None":

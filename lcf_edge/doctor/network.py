@@ -2,6 +2,7 @@
 
 import json
 import shlex
+import stat
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -16,6 +17,7 @@ from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.session import opened_session
 
 _LOOPBACK = 'zenoh.listen=["tcp/127.0.0.1:7447"]'
+_KEYS = ("listen_private_key", "connect_private_key")
 _NEXT_PORT = 'zenoh.listen=["tcp/127.0.0.1:7457"]'
 
 
@@ -29,6 +31,7 @@ def check(context: Context) -> Iterator[Finding]:
     else:
         yield _opens(context.config.zenoh)
     yield from exposed(context, options)
+    yield from keys(options)
     for endpoint in options.connect:
         yield _connects(endpoint)
 
@@ -51,9 +54,29 @@ def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
             edit(Path(options.config_file or "/etc/lcf-edge/zenoh.json5")),
         )
     elif outside:
-        yield ok("network", f"{', '.join(outside)}: open to the network, for those with a certificate")
+        yield warn(
+            "network",
+            f"{', '.join(outside)}: for those with a certificate, but strangers can keep them out; "
+            "let lcf-edge gate listen there (docs/network.md)",
+            "sudo systemctl enable --now lcf-edge-gate",
+        )
     else:
         yield ok("network", "only this computer can reach it")
+
+
+def keys(options: Zenoh) -> Iterator[Finding]:
+    """Whether others can read the private keys that the file names, or write the file."""
+    settings = _settings(options)
+    named = [json.loads(settings.get_json(f"transport/link/tls/{key}")) for key in _KEYS]
+    for path, forbidden in [(Path(name), 0o077) for name in named if name] + [(Path(options.config_file), 0o022)]:
+        try:
+            mode = path.stat().st_mode
+        except OSError:  # what is missing is told where it is opened
+            continue
+        if stat.S_ISREG(mode) and mode & forbidden:
+            what = "read" if forbidden == 0o077 else "write"
+            text = f"{path}: mode {stat.S_IMODE(mode):o}, others can {what} it"
+            yield warn("network", text, f"sudo chmod {'600' if what == 'read' else 'go-w'} {shlex.quote(str(path))}")
 
 
 def _wants_certificates(options: Zenoh) -> bool:

@@ -160,8 +160,8 @@ class Monitor:
 
     def _subscribe(self, topic: Topic, take: Callable[[bytes, zenoh.Sample], None]) -> Any:
         def receive(sample: zenoh.Sample) -> None:
-            payload = sample.payload.to_bytes()
             with self._unless_broken():
+                payload = topic.payload(sample)
                 take(payload, sample)
                 if self._history is not None:
                     self._history.add(Message(topic.name, time.time_ns(), payload))

@@ -4,15 +4,15 @@ import re
 import shutil
 import stat
 from contextlib import suppress
-from datetime import UTC, datetime
 from itertools import count
 from pathlib import Path
 from typing import Protocol
 
 from lcf_edge.config import Record
+from lcf_edge.daemon.clock import utc
 
 MIB = 2**20
-_OURS = re.compile(r"lcf-edge-(\d{6,18})-\d{8}T\d{6}Z\.mcap", re.ASCII)
+_OURS = re.compile(r"lcf-edge-(\d{6,200})-\d{8}T\d{6}Z\.mcap", re.ASCII)
 
 
 class Destination(Protocol):
@@ -50,8 +50,7 @@ class Folder:
             path.unlink(missing_ok=True)
             taken_bytes -= size_bytes
             self.removed += 1
-        begun = datetime.fromtimestamp(system_ns / 1e9, UTC)
-        return self.folder / f"lcf-edge-{number:06}-{begun:%Y%m%dT%H%M%SZ}.mcap"
+        return self.folder / f"lcf-edge-{number:06}-{utc(system_ns):%Y%m%dT%H%M%SZ}.mcap"
 
     def _files(self) -> list[tuple[int, Path, int]]:
         """Number, path and size (bytes) of our files; a link or a folder with such a name is none of ours."""

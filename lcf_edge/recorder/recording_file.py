@@ -61,14 +61,14 @@ class RecordingFile:
 
     def attach(self, config_text: str, now_ns: int) -> None:
         """Put a configuration into the file; the first is the one with which it began."""
-        stamp_ns = now_ns + self._offset_ns
+        stamp_ns = _written(now_ns + self._offset_ns)
         self._writer.add_attachment(stamp_ns, stamp_ns, IN_RECORDING, "application/toml", config_text.encode())
 
     def add(self, message: Message) -> None:
         """Append a message. Raises ``CdrError`` when its stamp is none."""
         stamp_ns = message.stamp_ns + self._offset_ns
         payload = restamped(message.payload, stamp_ns)
-        self._writer.add_message(self._channels[message.topic], max(stamp_ns, 0), payload, max(stamp_ns, 0))
+        self._writer.add_message(self._channels[message.topic], _written(stamp_ns), payload, _written(stamp_ns))
         self._in_chunk_bytes += len(payload)
 
     def sync(self) -> None:
@@ -102,6 +102,11 @@ class RecordingFile:
         """Close it as it is."""
         with suppress(OSError):  # the disk is gone; the number of the file is given back even so
             os.close(self._file)
+
+
+def _written(stamp_ns: int) -> int:
+    """A stamp as MCAP can have it, until the year 2554."""
+    return min(max(stamp_ns, 0), 2**64 - 1)
 
 
 class _Pending:

@@ -13,16 +13,19 @@ import socket
 import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
-from datetime import UTC, datetime
+from functools import partial
 from importlib.resources import files
 
 from aiohttp import WSMsgType, web
 from aiohttp.http_exceptions import HttpProcessingError
 
+from lcf_edge.daemon.clock import utc
+from lcf_edge.daemon.log import NoFlood
 from lcf_edge.errors import LcfError
 from lcf_edge.live.history import History
 from lcf_edge.live.monitor import Monitor
 from lcf_edge.live.source import Source
+from lcf_edge.view.doorkeeper import BACKLOG, LOGGER, REQUEST_WITHIN_S, Doorkeeper
 from lcf_edge.view.guard import TOKEN, Guard
 from lcf_edge.view.saving import mcap_parts
 from lcf_edge.view.update import Audience
@@ -47,25 +50,47 @@ PAGE = {
 
 async def serve(source: Source, host: str, port: int, tell: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM; ``tell`` hears the address. Raises ``PublishError``, ``LcfError``."""
-    logging.getLogger("aiohttp").addHandler(_OneLine())
+    handler = _OneLine()
+    handler.addFilter(NoFlood())
+    for logger in (logging.getLogger("aiohttp"), logging.getLogger("asyncio"), LOGGER):
+        logger.handlers[:] = [handler]
+        logger.propagate = False
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
     guard = Guard(host)
     server = Server(source)
-    runner = web.AppRunner(server.application(guard), access_log=None, handle_signals=False, shutdown_timeout=1.0)
+    door = Doorkeeper()
+    runner = web.AppRunner(
+        server.application(guard, door),
+        access_log=None,
+        handle_signals=False,
+        shutdown_timeout=1.0,
+        keepalive_timeout=REQUEST_WITHIN_S,
+        lingering_time=REQUEST_WITHIN_S,
+    )
+    listening: asyncio.Server | None = None
     try:
         await runner.setup()
-        try:
-            await web.TCPSite(runner, host, port).start()
-        except (OSError, OverflowError) as error:
-            raise LcfError(_cannot_listen(error, host, port)) from error
-        tell(f"open {_address(host, runner.addresses[0][1], guard.token)} (Ctrl-C ends)")
+        listening = await _listen(runner, door, host, port)
+        tell(f"open {_address(host, listening.sockets[0].getsockname()[1], guard.token)} (Ctrl-C ends)")
         await ended.wait()
     finally:
+        if listening is not None:
+            listening.close()
         await runner.cleanup()
         server.close()
+
+
+async def _listen(runner: web.AppRunner, door: Doorkeeper, host: str, port: int) -> asyncio.Server:
+    """Raises ``LcfError``."""
+    assert runner.server is not None
+    protocol = partial(door.protocol, runner.server)
+    try:
+        return await asyncio.get_running_loop().create_server(protocol, host, port, backlog=BACKLOG)
+    except (OSError, OverflowError) as error:
+        raise LcfError(_cannot_listen(error, host, port)) from error
 
 
 class Server:
@@ -81,9 +106,9 @@ class Server:
         self._wanting = asyncio.Lock()
         self._monitor = Monitor(source, history=self._history, changed=self._changed)
 
-    def application(self, guard: Guard) -> web.Application:
+    def application(self, guard: Guard, door: Doorkeeper) -> web.Application:
         """All that it answers."""
-        application = web.Application()
+        application = web.Application(middlewares=[door.busy])
         guard.protect(application)
         for name, kind in PAGE.items():
             path = "/" if name == "index.html" else f"/{name}"
@@ -150,20 +175,20 @@ class Server:
         messages = self._history.messages(now_ns)
         if not messages:
             raise web.HTTPNotFound(text="nothing came in the last seconds: there is nothing to save\n")
-        name = f"lcf-edge-{datetime.fromtimestamp(now_ns / 1e9, UTC):%Y%m%dT%H%M%SZ}.mcap"
+        name = f"lcf-edge-{utc(now_ns):%Y%m%dT%H%M%SZ}.mcap"
         response = web.StreamResponse(
             headers={
                 "Content-Disposition": f'attachment; filename="{name}"',
                 "Content-Type": "application/octet-stream",
             }
         )
-        await response.prepare(request)
         try:
+            await response.prepare(request)
             for part in mcap_parts(messages, self._source.prefix):
                 async with asyncio.timeout(SILENCE_S):
                     await response.write(part)
             await response.write_eof()
-        except TimeoutError:  # it takes nothing any more
+        except (TimeoutError, ConnectionError):  # it takes nothing any more, or has gone
             _abort(request)
         return response
 

@@ -8,10 +8,11 @@ import zenoh
 
 from drivers.records import SpeedSample
 from lcf_edge.cdr import CdrError
-from lcf_edge.config import Config, to_toml
+from lcf_edge.config import Config
 from lcf_edge.diagnostics import DeviceStatus
 from lcf_edge.errors import PublishError
 from lcf_edge.records import Scene
+from lcf_edge.shown_config import shown
 from lcf_edge.zenoh_link.diagnostics import DiagnosticsPublisher
 from lcf_edge.zenoh_link.preview import PreviewPublisher
 from lcf_edge.zenoh_link.queryables import Queryables
@@ -35,7 +36,7 @@ class Link:
 
     def __init__(self, session: zenoh.Session, config: Config) -> None:
         self._session = session
-        self._config_text = to_toml(config)
+        self._config_text = shown(config)
         self._unfit: Counter[str] = Counter(scene=0, preview=0, diagnostics=0)
         publish = config.publish
         try:
@@ -92,7 +93,7 @@ class Link:
 
     def show_config(self, config: Config) -> None:
         """What ``query/config`` answers from now on."""
-        self._config_text = to_toml(config)
+        self._config_text = shown(config)
 
     def close(self) -> None:
         """Listen and answer no more, then close the session; 1.2 s at most, may be called twice."""

@@ -8,8 +8,14 @@ from lcf_edge import config
 from lcf_edge.cdr import encode_compressed_image
 from lcf_edge.zenoh_link.publisher import MessagePublisher, Topic
 from lcf_edge.zenoh_link.ros2 import Ros2Node
+from lcf_edge.zenoh_link.session import LARGEST_MESSAGE_BYTES
 
-PREVIEW = Topic("preview/compressed", "sensor_msgs/msg/CompressedImage", zenoh.Priority.BACKGROUND)
+PREVIEW = Topic(
+    "preview/compressed",
+    "sensor_msgs/msg/CompressedImage",
+    zenoh.Priority.BACKGROUND,
+    largest_bytes=LARGEST_MESSAGE_BYTES,
+)
 
 
 class PreviewPublisher:

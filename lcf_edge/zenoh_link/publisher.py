@@ -11,12 +11,16 @@ from typing import Any
 import zenoh
 
 from lcf_edge import config
+from lcf_edge.cdr import CdrError
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.ros2 import Endpoint, Ros2Node, gid_of
 from lcf_edge.zenoh_link.session import reason
 
 ATTACHMENT = struct.Struct("<qqB16s")
 """Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
+
+LATEST_NS = 2**63 - 1
+"""The last moment, in April 2262, that an attachment can tell; a clock that is beyond it stands still there."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +31,7 @@ class Topic:
     message: str  # "lcf_msgs/msg/Scene"
     priority: zenoh.Priority
     express: bool = False
+    largest_bytes: int = 2**17  # of what is taken for one; a scene has some 60 a circle
 
     def key(self, prefix: str) -> str:
         """The key of its samples."""
@@ -36,6 +41,12 @@ class Topic:
     def encoding(self) -> str:
         """The encoding of its samples."""
         return f"application/cdr;{self.message}"
+
+    def payload(self, sample: zenoh.Sample) -> bytes:
+        """Of one that came. Raises ``CdrError`` for what is larger than any of this topic."""
+        if len(sample.payload) > self.largest_bytes:
+            raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
+        return sample.payload.to_bytes()
 
 
 class MessagePublisher:
@@ -92,7 +103,7 @@ class MessagePublisher:
     def put(self, payload: bytes) -> None:
         """Send one message; never raises, never waits."""
         number = self.counts["sent"] + 1
-        attachment = ATTACHMENT.pack(number, time.time_ns(), len(self._gid), self._gid)
+        attachment = ATTACHMENT.pack(number, min(time.time_ns(), LATEST_NS), len(self._gid), self._gid)
         try:
             for publisher in self._publishers:
                 publisher.put(payload, attachment=attachment)

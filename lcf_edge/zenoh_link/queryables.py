@@ -1,7 +1,7 @@
 """Questions that are answered when asked: ``<prefix>/query/<name>``."""
 
 import threading
-from collections import Counter
+from collections import Counter, deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from typing import Any
@@ -18,31 +18,48 @@ Answer = Callable[[], tuple[bytes, str] | str]
 class Queryables:
     """Answers queries for each name, in a thread of its own: who asks and does not listen holds up nobody else.
 
-    ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``.
+    ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``, ``overtaken`` (by newer ones while
+    they waited).
     """
 
     def __init__(self, session: zenoh.Session, prefix: str, answers: Mapping[str, Answer]) -> None:
-        self.counts: Counter[str] = Counter(answered=0, refused=0, failed=0)
+        self.counts: Counter[str] = Counter(answered=0, refused=0, failed=0, overtaken=0)
         self._answers = {zenoh.KeyExpr(f"{prefix}/query/{name}"): answer for name, answer in answers.items()}
-        handler: Any = zenoh.handlers.RingChannel(CAPACITY)
-        self._queryable: Any = session.declare_queryable(f"{prefix}/query/*", handler)
-        self._thread = threading.Thread(
-            target=self._run, args=(self._queryable.handler,), name="zenoh queries", daemon=True
-        )
+        self._waiting: deque[zenoh.Query] = deque()
+        self._changed = threading.Condition()
+        self._closed = False
+        take: Any = zenoh.handlers.Callback(self._take, indirect=False)  # no queue in between
+        self._queryable: Any = session.declare_queryable(f"{prefix}/query/*", take)
+        self._thread = threading.Thread(target=self._run, name="zenoh queries", daemon=True)
         self._thread.start()
 
     def close(self) -> None:
         """Answer no more; may be called twice."""
         with suppress(zenoh.ZError):  # it was closed before
             self._queryable.undeclare()
+        with self._changed:
+            self._closed = True
+            self._waiting.clear()
+            self._changed.notify()
         self._thread.join(ENDING_S)
 
-    def _run(self, queries: Any) -> None:
+    def _take(self, query: zenoh.Query) -> None:
+        with self._changed:
+            if len(self._waiting) == CAPACITY:
+                self._waiting.popleft()  # its end tells who asked that no answer comes
+                self.counts["overtaken"] += 1
+            self._waiting.append(query)
+            self._changed.notify()
+
+    def _run(self) -> None:
         while True:
-            try:
-                self._answer(queries.recv())
-            except zenoh.ZError:  # closed
-                return
+            with self._changed:
+                self._changed.wait_for(lambda: self._waiting or self._closed)
+                if self._closed:
+                    return
+                query = self._waiting.popleft()
+            self._answer(query)
+            del query  # or it ends with the next one
 
     def _answer(self, query: zenoh.Query) -> None:
         """Its end, with that of the last name for it, tells who asked that no more answers come."""

@@ -7,13 +7,14 @@ memory (which would cost 27 MB), few sessions, small messages.
 import json
 import re
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 
 import zenoh
 
 from lcf_edge import config
 from lcf_edge.errors import PublishError
+from lcf_edge.zenoh_link import admission
 
 CLOSING_S = 1.0  # a frozen peer would hold up the closing for 10 s
 
@@ -26,16 +27,18 @@ _UNLESS_THE_FILE_SAYS = {
     "transport/shared_memory/enabled": "false",
     "transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES),
     "transport/unicast/max_sessions": "32",  # each takes some 160 kB
+    "transport/unicast/accept_timeout": "2000",  # ms; who connects and says nothing takes one of 100 places
 }
 
 
-def open_session(options: config.Zenoh) -> zenoh.Session:
+def open_session(options: config.Zenoh, publish: config.Publish | None = None) -> zenoh.Session:
     """Open a session; close it with ``close_session``, or use ``opened_session``.
 
-    ``options.config_file`` is read first; the keys go on top of it, where an empty list leaves the file's. Raises
+    ``options.config_file`` is read first; the keys go on top of it, where an empty list leaves the file's. ``publish``:
+    what a daemon publishes, which then takes in what it needs and nothing else; None: whatever comes. Raises
     ``PublishError`` that names the endpoint or the file.
     """
-    settings = _settings(options)
+    settings = _settings(options, admission.settings(options, publish) if publish else {})
     try:
         return zenoh.open(settings)
     except zenoh.ZError as error:
@@ -72,7 +75,7 @@ def reason(error: zenoh.ZError) -> str:
     return (inner[1] if inner else text).strip(" .!]")
 
 
-def _settings(options: config.Zenoh) -> zenoh.Config:
+def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Config:
     try:
         settings = zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
     except zenoh.ZError as error:
@@ -80,9 +83,9 @@ def _settings(options: config.Zenoh) -> zenoh.Config:
             f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); mend it, or name another"
         ) from error
     untouched = zenoh.Config()
-    for key, value in _UNLESS_THE_FILE_SAYS.items():
+    for key, value in {**_UNLESS_THE_FILE_SAYS, **admitted}.items():
         if settings.get_json(key) == untouched.get_json(key):
-            settings.insert_json5(key, value)
+            _insert(settings, key, value)
     settings.insert_json5("scouting/gossip/enabled", json.dumps(options.gossip))
     settings.insert_json5("mode", json.dumps(options.mode))
     for name, endpoints in (("connect", options.connect), ("listen", options.listen)):
@@ -94,6 +97,14 @@ def _settings(options: config.Zenoh) -> zenoh.Config:
                 wrong = f"zenoh.{name}: {', '.join(endpoints)}: no endpoint, which is protocol/address"
                 raise PublishError(f"{wrong}; write for example tcp/127.0.0.1:7447") from error
     return settings
+
+
+def _insert(settings: zenoh.Config, key: str, value: str) -> None:
+    """Raises ``PublishError`` for the prefix, which is all in it that can be wrong."""
+    try:
+        settings.insert_json5(key, value)
+    except zenoh.ZError as error:
+        raise PublishError(f"publish.prefix: no valid key ({reason(error)})") from error
 
 
 def _remedy(error: zenoh.ZError, options: config.Zenoh) -> str:

@@ -9,6 +9,7 @@ from lcf_edge import config
 from lcf_edge.cdr import CdrError, decode_scene
 from lcf_edge.errors import PublishError
 from lcf_edge.records import Scene
+from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 
 
@@ -43,7 +44,7 @@ class Scenes(Iterator[Scene]):
         while self._close.alive:
             try:
                 sample = self._subscriber.recv()
-                scene = decode_scene(sample.payload.to_bytes())
+                scene = decode_scene(SCENE.payload(sample))
             except CdrError:
                 self.broken += 1
             except zenoh.ZError:  # closed while it waited

@@ -1,6 +1,7 @@
 """A recording as camera, IMU and odometry: true timing, shared start, faults."""
 
 import threading
+import tracemalloc
 from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
@@ -155,6 +156,24 @@ class TestTiming:
         assert frame.seq == 4
         assert camera.counts["overtaken"] == 4
         assert len(imu.read()) == 0.2 * IMU_HZ + 1
+
+    def test_after_a_long_pause_few_pictures_are_held_and_the_others_are_counted(
+        self, devices: Devices, clock: VirtualClock
+    ) -> None:
+        camera = devices(RecordedCamera)
+
+        def most_bytes_after(pause_s: float) -> int:
+            clock.sleep_s(pause_s)
+            tracemalloc.reset_peak()
+            assert len(camera.read()) == 1
+            return tracemalloc.get_traced_memory()[1]
+
+        tracemalloc.start()
+        after_a_minute = most_bytes_after(60.0)  # the IMU's ring is full then
+        after_four = most_bytes_after(240.0)
+        tracemalloc.stop()
+        assert after_four < 1.1 * after_a_minute
+        assert camera.counts["overtaken"] == pytest.approx(300 * FPS, rel=0.01)
 
     def test_threads_share_one_start(self, recording: Path) -> None:
         """With the real clock, each device opened and read by its own thread."""

@@ -15,6 +15,7 @@ SHIPPED = ROOT / "systemd"
 CONFIGURATION = "etc/lcf-edge/config.toml"
 INSTALLED = {
     "etc/systemd/system/lcf-edge.service": "lcf-edge.service",
+    "etc/systemd/system/lcf-edge-gate.service": "lcf-edge-gate.service",
     "etc/udev/rules.d/70-lcf-edge.rules": "70-lcf-edge.rules",
     "etc/sysusers.d/lcf-edge.conf": "lcf-edge.sysusers",
     "etc/modules-load.d/lcf-edge.conf": "lcf-edge.modules",

@@ -9,12 +9,15 @@ from pathlib import Path
 import pytest
 
 from lcf_edge.config import Config
+from lcf_edge.daemon.descriptors import RESERVED
 from lcf_edge.daemon.loop import FRAME_WAIT_S
 from lcf_edge.daemon.service import ENDS_WITHIN_S, TICK_S
-from lcf_edge.zenoh_link.session import CLOSING_S
+from lcf_edge.gate.gate import MOST_PARTIES, MOST_STRANGERS
+from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, CLOSING_S
 
 SHIPPED = Path(__file__).parents[2] / "systemd"
 UNIT = SHIPPED / "lcf-edge.service"
+GATE_UNIT = SHIPPED / "lcf-edge-gate.service"
 LARGEST_EXPOSURE = 2.0
 KERNEL_NAMES = {
     "videodev": "video4linux",
@@ -41,18 +44,20 @@ def words(name: str) -> set[str]:
 
 
 @needs_systemd
-def test_systemd_finds_no_fault_but_the_program_that_is_not_here(tmp_path: Path) -> None:
-    unit = tmp_path / UNIT.name
+@pytest.mark.parametrize("shipped", [UNIT, GATE_UNIT], ids=lambda path: path.name)
+def test_systemd_finds_no_fault_but_the_program_that_is_not_here(tmp_path: Path, shipped: Path) -> None:
+    unit = tmp_path / shipped.name
     unit.write_text(
-        UNIT.read_text(encoding="utf-8").replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8"
+        shipped.read_text(encoding="utf-8").replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8"
     )
     done = subprocess.run(("systemd-analyze", "verify", unit), check=False, capture_output=True, text=True)
-    told = [line for line in done.stderr.splitlines() if UNIT.name in line]
+    told = [line for line in done.stderr.splitlines() if shipped.name in line]
     assert told == []
 
 
 @needs_systemd
-def test_little_is_exposed() -> None:
+@pytest.mark.parametrize("unit", [UNIT, GATE_UNIT], ids=lambda path: path.name)
+def test_little_is_exposed(unit: Path) -> None:
     done = subprocess.run(
         (
             "systemd-analyze",
@@ -60,7 +65,7 @@ def test_little_is_exposed() -> None:
             "--offline=true",
             f"--threshold={LARGEST_EXPOSURE * 10:.0f}",
             "--no-pager",
-            UNIT,
+            unit,
         ),
         check=False,
         capture_output=True,
@@ -69,7 +74,7 @@ def test_little_is_exposed() -> None:
     if "unrecognized option" in done.stderr:
         pytest.skip("this systemd-analyze has no --offline")
     assert done.returncode == 0, done.stdout.splitlines()[-1:]
-    exposure = re.search(r"exposure level for lcf-edge.service: ([\d.]+)", done.stdout)
+    exposure = re.search(r"exposure level for [\w.-]+: ([\d.]+)", done.stdout)
     assert exposure
     assert float(exposure[1]) <= LARGEST_EXPOSURE
 
@@ -136,3 +141,13 @@ def test_the_names_that_the_documents_and_the_configuration_use_are_made() -> No
 
 def test_a_reload_needs_no_program_that_a_minimal_system_lacks() -> None:
     assert settings()["ExecReload"] == ["/bin/sh -c 'kill -HUP $MAINPID'"]  # /bin/kill is of a package of its own
+
+
+def test_the_gate_may_open_what_its_bounds_need_and_no_more() -> None:
+    unit = dict(re.findall(r"^(\w+)=(.*)$", GATE_UNIT.read_text(encoding="utf-8"), re.M))
+    assert MOST_STRANGERS + 2 * MOST_PARTIES + 32 <= int(unit["LimitNOFILE"]) <= 256
+
+
+def test_the_daemon_may_open_what_its_sessions_need() -> None:
+    sessions, pending = int(_UNLESS_THE_FILE_SAYS["transport/unicast/max_sessions"]), 100
+    assert sessions + pending + RESERVED + 64 <= int(settings()["LimitNOFILE"][0]) <= 1024

@@ -2,10 +2,11 @@
 
 import threading
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.daemon.clock import STEP_NS, StoppableClock, SystemTime
+from lcf_edge.daemon.clock import STEP_NS, StoppableClock, SystemTime, utc
 
 
 class Clocks:
@@ -67,3 +68,11 @@ def test_a_stop_ends_a_wait_and_those_to_come() -> None:
     assert not sleeper.is_alive()
     assert clock.stopped
     clock.sleep_s(3600.0)
+
+
+@pytest.mark.parametrize(
+    ("system_ns", "text"),
+    [(0, "1970-01-01"), (2**63, "2262-04-11"), (10**30, "9999-12-31"), (-(10**30), "0001-01-01")],
+)
+def test_any_time_is_a_date(system_ns: int, text: str) -> None:
+    assert utc(system_ns).date().isoformat() == text

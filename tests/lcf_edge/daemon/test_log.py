@@ -3,6 +3,8 @@
 import io
 import logging
 import os
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -57,7 +59,7 @@ def test_standard_error_that_was_redirected_is_not_journald(tmp_path: Path) -> N
 def test_a_flood_is_cut_and_counted() -> None:
     now_s = 0.0
     stream = io.StringIO()
-    flood = log._NoFlood(lambda: now_s)
+    flood = log.NoFlood(lambda: now_s)
     log.start("info", stream, {})
     LOGGER.handlers[0].filters[:] = [flood]
     for number in range(100):
@@ -72,7 +74,7 @@ def test_a_flood_is_cut_and_counted() -> None:
 
 
 def test_kinds_without_end_take_no_memory_without_end() -> None:
-    flood: Any = log._NoFlood(lambda: 0.0)
+    flood: Any = log.NoFlood(lambda: 0.0)
     for number in range(5 * log.KINDS):
         assert flood.filter(logging.LogRecord("lcf_edge", logging.INFO, "", 0, f"kind {number}", (), None))
     assert len(flood._kinds) <= log.KINDS
@@ -83,3 +85,30 @@ def test_a_log_that_cannot_be_written_is_nobodys_error() -> None:
     log.start("info", stream, {})
     stream.close()
     LOGGER.info("lost")
+
+
+NOISY = """
+import os, sys, threading
+from lcf_edge.daemon import log
+log.take_over_standard_error()
+log.start("info")
+for _ in range(1000):
+    os.write(2, b"Corrupt JPEG data: \x1b[31m premature end\\n")
+log.LOGGER.info("end")
+sys.stderr.write("by Python\\n")
+os.close(2)  # its reader ends with it
+for thread in threading.enumerate():
+    if thread.name == "standard error":
+        thread.join()
+"""
+
+
+def test_what_a_library_writes_by_itself_is_limited_too() -> None:
+    done = subprocess.run((sys.executable, "-c", NOISY), check=True, capture_output=True, text=True)
+    lines = done.stderr.splitlines()
+    assert "by Python" in lines
+    assert "lcf-edge: end" in lines
+    told = [line for line in lines if line.startswith("lcf-edge: warning: library: Corrupt JPEG data")]
+    assert 1 <= len(told) <= log.AT_ONCE
+    assert len(lines) == len(told) + 2
+    assert "\x1b" not in done.stderr

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Camera, Config, Memory, Record
-from lcf_edge.daemon.memory import SHED_AT, MemoryWatch, Shedding, check_budget, needs_mib, resident_mib
+from lcf_edge.daemon.memory import SHED_AT, MemoryWatch, ResidentMemory, Shedding, check_budget, needs_mib
 from lcf_edge.errors import ConfigError
 
 
@@ -18,12 +18,12 @@ def test_resident_memory_is_what_the_kernel_says() -> None:
     kilobytes = next(
         int(line.split()[1]) for line in Path("/proc/self/status").read_text().splitlines() if "VmRSS" in line
     )
-    assert resident_mib() == pytest.approx(kilobytes / 1024, rel=0.1)
+    assert ResidentMemory()() == pytest.approx(kilobytes / 1024, rel=0.1)
 
 
 def test_a_table_of_statm_is_read_in_pages(tmp_path: Path) -> None:
     (tmp_path / "statm").write_text("9999 512 3 4 5 6 7\n")
-    assert resident_mib(tmp_path / "statm") == 512 * os.sysconf("SC_PAGE_SIZE") / 2**20
+    assert ResidentMemory(tmp_path / "statm")() == 512 * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
 @pytest.mark.parametrize("when", ["never", "always", "threat"])

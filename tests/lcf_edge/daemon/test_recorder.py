@@ -284,6 +284,16 @@ def test_at_its_size_a_file_ends_and_the_oldest_gives_way(tmp_path: Path, begin:
 
 
 @pytest.mark.usefixtures("often")
+def test_a_file_with_the_largest_of_numbers_does_not_end_the_pruning(tmp_path: Path, begin: Begin) -> None:
+    (tmp_path / f"lcf-edge-{'9' * 18}-20260101T000000Z.mcap").touch()
+    recorder = begin(file_mib=1, total_mib=3)
+    for seq in range(60):
+        recorder.put(seen(seq, width=320))
+        until(lambda: recorder._inbox.bytes == recorder._backlog.bytes == 0)
+    assert int(ended(recorder).values["files removed"]) > 1  # not the one alone
+
+
+@pytest.mark.usefixtures("often")
 def test_at_its_age_a_file_ends(tmp_path: Path, begin: Begin) -> None:
     recorder = begin(file_s=0.01)
     for seq in range(5):

@@ -26,14 +26,14 @@ def start(drive: Path, endpoint: str, manager: Any, tmp_path: Path) -> Iterator[
     """Start the daemon on the drive, with more settings."""
     daemons: list[Daemon] = []
 
-    def begin(*settings: str, drives: bool = True) -> Daemon:
+    def begin(*settings: str, drives: bool = True, program: tuple[str, ...] = ("-m", "lcf_edge")) -> Daemon:
         (tmp_path / "config.toml").touch()
         mine = [f'zenoh.listen=["{endpoint}"]']
         if drives:
             mine += ["camera.driver=recording", f"camera.recording={drive}", "imu.driver=recording"]
         arguments = [argument for setting in (*mine, *settings) for argument in ("--set", setting)]
         daemon = subprocess.Popen(
-            [sys.executable, "-m", "lcf_edge", "run", "-c", str(tmp_path / "config.toml"), *arguments],
+            [sys.executable, *program, "run", "-c", str(tmp_path / "config.toml"), *arguments],
             stderr=subprocess.PIPE,
             text=True,
             env={**os.environ, **manager.environment},
@@ -151,6 +151,59 @@ def test_what_cannot_work_ends_in_one_line(start: Start, settings: tuple[str, ..
     assert code == status
     assert part in said[-1]
     assert said[-1].startswith("lcf-edge: ")
+
+
+LATE = """
+import sys, time
+now_ns = time.time_ns
+time.time_ns = lambda: now_ns() + {years} * 31_556_952 * 10**9
+from lcf_edge.command_line import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.parametrize("years", [200, 300, 9000])
+def test_a_clock_that_no_message_can_tell_is_no_end(start: Start, manager: Any, tmp_path: Path, years: int) -> None:
+    daemon = start("record.when=always", f"record.folder={tmp_path}", program=("-c", LATE.format(years=years)))
+    manager.until("READY=1")
+    for _ in range(3):
+        manager.until("STATUS=")
+    daemon.terminate()
+    status, said = ended(daemon)
+    assert status == 0
+    assert said[-1] == "lcf-edge: stopping: SIGTERM"
+
+
+# A stand-in for strangers: whatever opens files in its process, and keeps them.
+CROWDED = """
+import os, resource, sys, threading
+from lcf_edge.command_line import main
+
+def crowd():
+    while True:
+        try:
+            os.open(os.devnull, os.O_RDONLY)
+        except OSError:
+            threading.Event().wait(0.1)
+
+resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
+threading.Timer(2.0, crowd).start()
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+def test_without_descriptors_it_lives_tells_and_reads_its_configuration(
+    start: Start, manager: Any, tmp_path: Path
+) -> None:
+    daemon = start(program=("-c", CROWDED))
+    manager.until("READY=1")
+    assert daemon.stderr
+    said = iter(daemon.stderr.readline, "")
+    assert next(line for line in said if "file descriptors" in line)
+    (tmp_path / "config.toml").write_text("[filter]\ntr_s = 3.5\n")
+    assert next(line for line in said if "reload" in line) == "lcf-edge: reload: changed filter.tr_s\n"
+    manager.until("STATUS=")
+    daemon.send_signal(signal.SIGKILL)  # its crowd never ends
 
 
 def test_two_at_one_port(start: Start, endpoint: str) -> None:

@@ -198,7 +198,7 @@ def test_an_imu_that_is_away_widens_and_is_told(config: Config, runs: Runs, link
 def test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so(
     config: Config, runs: Runs, link: Any, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    monkeypatch.setattr(service, "resident_mib", lambda: 1050.0)
+    monkeypatch.setattr(service, "ResidentMemory", lambda: lambda: 1050.0)
     link.looks = True
     runs.start(config)
     link.wait_for(lambda: link.statuses and "half of the corners" in link.statuses["memory"].message)
@@ -215,7 +215,7 @@ def test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so(
 def test_the_recording_buffer_goes_before_the_corners(
     config: Config, runs: Runs, link: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(service, "resident_mib", lambda: 1050.0)
+    monkeypatch.setattr(service, "ResidentMemory", lambda: lambda: 1050.0)
     runs.start(msgspec.structs.replace(config, record=Record(when="threat", folder=str(tmp_path))))
     link.wait_for(lambda: link.statuses and "corners" in link.statuses["memory"].message)
     told = "gave up the preview, most of the recording buffer, half of the corners"
@@ -400,7 +400,7 @@ def test_a_reload_gives_back_what_was_given_up(
     config: Config, runs: Runs, link: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     resident_mib = 1050.0
-    monkeypatch.setattr(service, "resident_mib", lambda: resident_mib)
+    monkeypatch.setattr(service, "ResidentMemory", lambda: lambda: resident_mib)
     begun = runs.start(config, written(tmp_path, config))
     link.wait_for(lambda: link.statuses and "half of the corners" in link.statuses["memory"].message)
     resident_mib = 50.0

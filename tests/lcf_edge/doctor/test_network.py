@@ -171,13 +171,30 @@ def test_an_open_port_without_encryption_is_warned_of(machine: Machine) -> None:
     assert "docs/network.md" in found.text
 
 
-@pytest.mark.parametrize(("mutual", "level"), [("true", Level.OK), ("false", Level.WARN)])
-def test_encryption_wants_certificates_of_both(machine: Machine, tmp_path: Path, mutual: str, level: Level) -> None:
+@pytest.mark.parametrize(("mutual", "text"), [("true", "lcf-edge gate"), ("false", "enable_mtls")])
+def test_encryption_wants_certificates_of_both_and_the_gate(
+    machine: Machine, tmp_path: Path, mutual: str, text: str
+) -> None:
     file = tmp_path / "zenoh.json5"
     file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {mutual}}}}}}}}}")
     (found,) = network.exposed(machine(), Zenoh(listen=["tls/0.0.0.0:7447"], config_file=str(file)))
-    assert found.level is level
-    assert ("enable_mtls" in found.text) is (level is Level.WARN)
+    assert found.level is Level.WARN
+    assert text in found.text
+
+
+def test_keys_that_others_can_read_are_told(tmp_path: Path) -> None:
+    key, file = tmp_path / "rover.key", tmp_path / "zenoh.json5"
+    key.touch(mode=0o600)
+    file.write_text(f'{{transport: {{link: {{tls: {{listen_private_key: "{key}"}}}}}}}}')
+    file.chmod(0o644)
+    options = Zenoh(config_file=str(file))
+    assert list(network.keys(options)) == []
+    key.chmod(0o666)
+    file.chmod(0o666)
+    of_key, of_file = network.keys(options)
+    assert of_key.text == f"{key}: mode 666, others can read it"
+    assert of_key.remedy == f"sudo chmod 600 {key}"
+    assert of_file.text == f"{file}: mode 666, others can write it"
 
 
 def test_the_ports_of_the_file_are_looked_at_too(machine: Machine, endpoint: str, tmp_path: Path) -> None:

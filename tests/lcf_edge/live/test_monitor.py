@@ -7,13 +7,16 @@ from collections.abc import Callable, Iterator
 from contextlib import closing
 from typing import Any
 
+import numpy as np
 import pytest
 
+from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.live.history import History
 from lcf_edge.live.monitor import Monitor, Presence, Snapshot
 from lcf_edge.live.source import Source
+from lcf_edge.records import CIRCLE, PSI_REGION, Scene
 from lcf_edge.zenoh_link import opened_session
 
 PATIENCE_S = 20.0
@@ -103,6 +106,17 @@ def test_what_is_no_message_is_counted_and_not_kept(endpoint: str) -> None:
             for publisher in publishers:
                 publisher.put(b"\0\1\0\0" + b"\xff" * 40)
         assert monitor.snapshot().broken >= 3
+        assert monitor.snapshot().scene is None
+
+
+def test_a_scene_too_large_to_be_ours_is_not_kept(endpoint: str) -> None:
+    crowd = Scene(1, 1, 640, 480, 1.5, np.zeros(10_000, CIRCLE), np.zeros(0, PSI_REGION))
+    with opened_session(Zenoh(listen=[endpoint])) as session, closing(Watched(endpoint).monitor) as monitor:
+        publisher = session.declare_publisher("lcf/scene")
+        deadline_s = time.monotonic() + PATIENCE_S
+        while not monitor.snapshot().broken and time.monotonic() < deadline_s:
+            publisher.put(encode_scene(crowd, "camera"))
+        assert monitor.snapshot().broken
         assert monitor.snapshot().scene is None
 
 

@@ -2,8 +2,10 @@
 
 import asyncio
 import json
+import resource
 import signal
 import socket
+import struct
 import sys
 import time
 from collections.abc import Callable, Coroutine, Iterator
@@ -23,6 +25,7 @@ from lcf_edge.command_line import main
 from lcf_edge.live.source import Source
 from lcf_edge.records import CIRCLE
 from lcf_edge.view import server
+from lcf_edge.view.doorkeeper import Doorkeeper
 from lcf_edge.view.guard import Guard
 
 PATIENCE_S = 30.0
@@ -253,7 +256,7 @@ def test_who_takes_nothing_is_let_go(rover: Any, monkeypatch: pytest.MonkeyPatch
 
     async def look() -> None:
         serving = server.Server(Source(rover.endpoint))
-        runner = web.AppRunner(serving.application(Guard("127.0.0.1")))
+        runner = web.AppRunner(serving.application(Guard("127.0.0.1"), Doorkeeper()))
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
         with deaf(f"http://127.0.0.1:{runner.addresses[0][1]}/"):
@@ -308,3 +311,67 @@ def test_without_the_library_it_names_the_extra(
     monkeypatch.setitem(sys.modules, "aiohttp", None)
     assert main(["view"]) == 1
     assert capsys.readouterr().err == "lcf-edge: view: aiohttp is missing; run pip install 'lcf-edge[view]'\n"
+
+
+# Who keeps connections without asking for anything.
+
+HALF = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
+
+
+@pytest.fixture
+def poor(endpoint: str, serving: Any) -> Iterator[Any]:
+    """A server with 256 descriptors."""
+    served = serving(endpoint)
+    resource.prlimit(served.process.pid, resource.RLIMIT_NOFILE, (256, 256))
+    yield served
+    served.process.kill()
+    served.process.communicate()
+
+
+def test_half_sent_requests_do_not_keep_a_browser_out(poor: Any) -> None:
+    parts = urlsplit(poor.address)
+    held = []
+    for _ in range(365):
+        held.append(socket.create_connection((parts.hostname or "", parts.port or 0), PATIENCE_S))
+        held[-1].sendall(HALF)
+    for _ in range(3):
+        assert ask(poor.address).status == 200
+    assert len(list(Path(f"/proc/{poor.process.pid}/fd").iterdir())) < 200
+    for one in held:
+        one.close()
+    status, said = poor.end()
+    assert status == 0
+    assert "Traceback" not in said
+    assert 1 <= len(said.splitlines()) <= 12
+    assert "connections" in said
+
+
+def test_who_asks_for_nothing_is_let_go(lonely: str) -> None:
+    parts = urlsplit(lonely)
+    for sent in (b"", HALF):
+        with socket.create_connection((parts.hostname or "", parts.port or 0), PATIENCE_S) as slow:
+            slow.sendall(sent)
+            assert slow.recv(100) == b""
+
+
+def test_a_browser_that_looks_is_not_let_go_for_those_who_wait(poor: Any) -> None:
+    parts = urlsplit(poor.address)
+
+    async def look(socket_: aiohttp.ClientWebSocketResponse) -> None:
+        await update(socket_)
+        held = [await asyncio.open_connection(parts.hostname, parts.port) for _ in range(150)]
+        assert (await update(socket_))["connection"]
+        for _, writer in held:
+            writer.close()
+
+    updates(poor.address, look)
+
+
+def test_saves_that_are_given_up_are_no_errors(seen: tuple[Any, Any]) -> None:
+    _, view = seen
+    parts = urlsplit(view.address)
+    for _ in range(30):
+        with socket.create_connection((parts.hostname or "", parts.port or 0), PATIENCE_S) as gone:
+            gone.sendall(b"GET /save HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n")
+            gone.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    assert ask(view.address).status == 200

@@ -65,8 +65,9 @@ class Peer:
         text = base64.b64encode(payload).decode()
         assert self.ask("put", key=key, payload=text, encoding=encoding, count=count)
 
-    def get(self, key: str) -> list[Sample | str]:
-        return [one["error"] if "error" in one else sample(one) for one in self.ask("get", key=key)]
+    def get(self, key: str, timeout_s: float = PATIENCE_S) -> list[Sample | str]:
+        replies = self.ask("get", key=key, timeout_s=timeout_s)
+        return [one["error"] if "error" in one else sample(one) for one in replies]
 
     def tokens(self, key: str) -> list[str]:
         return list(self.ask("tokens", key=key))

@@ -8,11 +8,13 @@ import json
 import queue
 import sys
 import threading
+import time
 from typing import Any
 
 import zenoh
 
 PATIENCE_S = 20.0
+PRIORITIES = (zenoh.Priority.REAL_TIME, zenoh.Priority.INTERACTIVE_HIGH, zenoh.Priority.DATA, zenoh.Priority.BACKGROUND)
 
 
 class Peer:
@@ -23,6 +25,16 @@ class Peer:
         self.session = zenoh.open(config)
         self.samples: dict[str, queue.Queue[zenoh.Sample]] = {}
         self.kept: list[Any] = []
+
+    def connected(self, timeout_s: float = PATIENCE_S) -> bool:
+        """Whether somebody is there in time; Zenoh tells of it to nobody who asks later."""
+        deadline_s = time.monotonic() + timeout_s
+        info: Any = self.session.info
+        while not (list(info.peers_zid()) or list(info.routers_zid())):
+            if time.monotonic() > deadline_s:
+                return False
+            time.sleep(0.005)
+        return True
 
     def subscribe(self, key: str) -> None:
         self.samples[key] = queue.Queue()
@@ -55,8 +67,25 @@ class Peer:
         """Whether or not somebody subscribed."""
         self.session.put(key, bytes.fromhex(payload), congestion_control=zenoh.CongestionControl.BLOCK)
 
-    def get(self, key: str) -> list[dict[str, Any]]:
-        replies = self.session.get(key, timeout=PATIENCE_S, target=zenoh.QueryTarget.ALL)
+    def delete(self, key: str) -> None:
+        self.session.delete(key, congestion_control=zenoh.CongestionControl.BLOCK)
+
+    def answer(self, key: str, payload: str) -> None:
+        """Answer whatever is asked there."""
+        self.kept.append(self.session.declare_queryable(key, lambda query: query.reply(key, bytes.fromhex(payload))))
+
+    def announce(self, key: str) -> None:
+        """Declare a liveliness token."""
+        self.kept.append(self.session.liveliness().declare_token(key))
+
+    def put_large(self, key: str, size: int, count: int) -> None:
+        """Whether or not somebody subscribed, at each priority."""
+        for number in range(count):
+            priority = PRIORITIES[number % len(PRIORITIES)]
+            self.session.put(key, bytes(size), congestion_control=zenoh.CongestionControl.BLOCK, priority=priority)
+
+    def get(self, key: str, timeout_s: float = PATIENCE_S) -> list[dict[str, Any]]:
+        replies = self.session.get(key, timeout=timeout_s, target=zenoh.QueryTarget.ALL)
         return [
             described(reply.ok) if reply.ok else {"error": reply.err.payload.to_string()} for reply in list(replies)
         ]

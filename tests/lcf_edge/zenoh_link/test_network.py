@@ -1,11 +1,17 @@
 """The network is reached as docs/network.md says: with certificates, and by those alone whom a rule names."""
 
 import re
+import resource
 import shlex
+import socket
+import ssl
 import subprocess
 import sys
+import threading
+import time
 import tomllib
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -14,12 +20,14 @@ import pytest
 import zenoh
 
 from lcf_edge.config import Config, Zenoh
+from lcf_edge.gate.gate import MOST_OF_ONE, MOST_STRANGERS
 from lcf_edge.records import Scene
 from lcf_edge.zenoh_link import opened_session
 from lcf_edge.zenoh_link.link import Link
 
 DOCUMENT = (Path(__file__).parents[3] / "docs/network.md").read_text(encoding="utf-8")
 SILENCE_S = 0.3
+PATIENCE_S = 20.0
 
 NewScene = Callable[..., Scene]
 Velocity = Callable[..., bytes]
@@ -33,11 +41,12 @@ def blocks(language: str) -> list[str]:
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The documented files, and the certificates that the documented commands make."""
     folder = tmp_path_factory.mktemp("tls")
-    (commands,) = blocks("bash")
-    authority, _, planner, _ = commands.splitlines()
-    guest = planner.replace("planner", "guest")
+    outer, inner = (block.splitlines() for block in blocks("bash"))
+    authority, _, planner, _ = outer
+    guests = [planner.replace("planner", "guest"), inner[2].replace("planner", "guest")]
+    unknown = planner.replace("planner", "unknown")
     stranger = planner.replace("planner", "stranger").replace("ca.", "other-ca.")
-    for command in (*commands.splitlines(), guest, authority.replace("ca.", "other-ca."), stranger):
+    for command in (*outer, *inner, *guests, unknown, authority.replace("ca.", "other-ca."), stranger):
         subprocess.run(shlex.split(command), cwd=folder, check=True, capture_output=True)
     rover, reader = blocks("json5")
     (folder / "zenoh.json5").write_text(rover.replace("/etc/lcf-edge/tls", str(folder)))
@@ -50,7 +59,7 @@ def rover(folder: Path, endpoint: str) -> Iterator[zenoh.Session]:
     """A session with the documented configuration."""
     (written,) = blocks("toml")
     options = msgspec.convert(tomllib.loads(written)["zenoh"], Zenoh)
-    assert options == Zenoh(listen=["tls/0.0.0.0:7447"], config_file="/etc/lcf-edge/zenoh.json5")
+    assert options == Zenoh(listen=["tls/127.0.0.1:7448"], config_file="/etc/lcf-edge/zenoh.json5")
     file = str(folder / "zenoh.json5")
     with opened_session(Zenoh(listen=[endpoint.replace("tcp/", "tls/")], config_file=file)) as opened:
         yield opened
@@ -63,28 +72,68 @@ def link(rover: zenoh.Session) -> Iterator[Link]:
     link.close()
 
 
+class Gate:
+    """``lcf-edge gate`` as a process, before ``endpoint``. ``endpoint``: of its own."""
+
+    def __init__(self, folder: Path, endpoint: str) -> None:
+        command = ("gate", "--tls", folder, "--listen", "127.0.0.1", "--port", "0", "--to", endpoint.rpartition(":")[2])
+        self.process = subprocess.Popen(
+            [sys.executable, "-m", "lcf_edge", *map(str, command)],
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout
+        self.told = self.process.stdout.readline()
+        self.port = int(self.told.split()[0].rpartition(":")[2])
+        self.endpoint = f"tls/localhost:{self.port}"
+
+    @property
+    def descriptors(self) -> int:
+        return len(list(Path(f"/proc/{self.process.pid}/fd").iterdir()))
+
+    @property
+    def resident_mib(self) -> float:
+        return int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+    def end(self) -> tuple[int, str]:
+        """Exit status, and what it said."""
+        self.process.terminate()
+        _, said = self.process.communicate(timeout=PATIENCE_S)
+        return self.process.returncode, said
+
+
 @pytest.fixture
-def party(start: Any, folder: Path, endpoint: str) -> Callable[[str], Any]:
+def gate(folder: Path, endpoint: str) -> Iterator[Gate]:
+    gate = Gate(folder, endpoint)
+    yield gate
+    status, said = gate.end()
+    assert status == 0
+    assert "Traceback" not in said
+
+
+@pytest.fixture
+def party(start: Any, folder: Path, gate: Gate) -> Callable[[str], Any]:
     """Somebody with a certificate."""
 
     def connect(name: str, **settings: Any) -> Any:
-        where = endpoint.replace("tcp/127.0.0.1", "tls/localhost")
+        where = gate.endpoint
         tls = {
             "transport__link__tls__root_ca_certificate": str(folder / "ca.pem"),
             "transport__link__tls__connect_certificate": str(folder / f"{name}.pem"),
             "transport__link__tls__connect_private_key": str(folder / f"{name}.key"),
             "transport__link__tls__enable_mtls": True,
         }
-        return start(mode="peer", listen__endpoints=[], connect__endpoints=[where], **(tls | settings))
+        return start(**({"mode": "peer", "listen__endpoints": [], "connect__endpoints": [where]} | tls | settings))
 
     return connect
 
 
 def test_a_planner_reads_as_documented(
-    link: Link, rover: zenoh.Session, until_matched: Any, folder: Path, endpoint: str, scene: Callable[..., Scene]
+    link: Link, rover: zenoh.Session, until_matched: Any, folder: Path, gate: Gate, scene: Callable[..., Scene]
 ) -> None:
     (code,) = blocks("python")
-    code = code.replace("tls/rover:7447", endpoint.replace("tcp/127.0.0.1", "tls/localhost"))
+    code = code.replace("tls/rover:7447", gate.endpoint)
     code = code.replace("planner.json5", str(folder / "planner.json5"))
     with subprocess.Popen((sys.executable, "-u", "-c", code), stdout=subprocess.PIPE, text=True) as planner:
         try:
@@ -125,11 +174,11 @@ def test_wheels_tell_the_speed_but_do_not_read(
     assert link.counts["speed taken"] == 1
 
 
-@pytest.mark.parametrize("who", ["guest", "stranger", "nobody"])
+@pytest.mark.parametrize("who", ["guest", "unknown", "stranger", "nobody"])
 def test_whom_no_rule_names_does_nothing(
     link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity, who: str
 ) -> None:
-    """One with a certificate but without a rule, one of another authority, one without a certificate."""
+    """With a certificate but without a rule, or unknown to the gate; of another authority; without a certificate."""
     nothing = {f"transport__link__tls__{key}": None for key in ("connect_certificate", "connect_private_key")}
     other = party(who) if who != "nobody" else party("guest", **nothing, transport__link__tls__enable_mtls=False)
     planner = party("planner")
@@ -141,3 +190,169 @@ def test_whom_no_rule_names_does_nothing(
     assert len(planner.receive("lcf/scene")) == 1
     assert other.receive("lcf/scene", timeout_s=SILENCE_S) == []
     assert not any(name.startswith("speed") for name in link.counts)
+
+
+# Every cell of the table in the document: who, on which key, does what.
+
+KEYS = ("lcf/scene", "lcf/preview/compressed", "lcf/diagnostics", "lcf/query/config", "lcf/@alive/rover", "lcf/speed")
+WHAT_IT_CALLS = {"receives", "asks", "sees", "sends"}
+ROVER, ACTOR = b"of the rover", b"of the actor"
+
+
+def documented(who: str) -> set[tuple[str, str]]:
+    """What the table of the document allows somebody: key, action."""
+    rows = [[cell.strip(" `") for cell in line.strip("|").split("|")] for line in DOCUMENT.splitlines() if "|" in line]
+    head = next(row for row in rows if row[0] == "key")
+    allowed = {(row[0], row[head.index(who)]) for row in rows if row[0] in KEYS and len(row) == len(head)}
+    assert {key for key, _ in allowed} == set(KEYS)
+    assert {action for _, action in allowed} <= {*WHAT_IT_CALLS, "-"}
+    return {cell for cell in allowed if cell[1] != "-"}
+
+
+@pytest.fixture
+def everything(rover: zenoh.Session) -> Iterator[list[tuple[str, str]]]:
+    """What reaches the rover on whatever key; it publishes, answers and is alive on each."""
+    came: list[tuple[str, str]] = []
+    listening = [
+        rover.declare_subscriber(key, lambda _, key=key: came.append((key, "sends")))  # type: ignore[misc]
+        for key in KEYS
+    ]
+    answering = [
+        rover.declare_queryable(key, lambda query, key=key: query.reply(key, ROVER))  # type: ignore[misc]
+        for key in KEYS
+    ]
+    alive = [rover.liveliness().declare_token(key) for key in KEYS]
+    yield came
+    for one in (*listening, *answering, *alive):
+        one.undeclare()  # type: ignore[no-untyped-call]
+
+
+def payloads(samples: Iterable[Any]) -> set[bytes]:
+    return {sample.payload for sample in samples if not isinstance(sample, str)}
+
+
+@pytest.mark.parametrize("mode", ["peer", "client"])
+@pytest.mark.parametrize("who", ["planner", "wheels", "anybody else"])
+def test_each_does_what_the_table_says_and_nothing_else(
+    rover: zenoh.Session, everything: list[tuple[str, str]], party: Any, who: str, mode: str
+) -> None:
+    """A client sends whether or not it has heard that somebody wants it, so the rover itself must refuse."""
+    actor = party({"anybody else": "guest"}.get(who, who), mode=mode)
+    witness = party("planner")
+    assert actor.ask("connected")
+    assert witness.ask("connected")
+    for key in KEYS:
+        witness.subscribe(key)
+        actor.subscribe(key)
+        actor.ask("answer", key=key, payload=ACTOR.hex())
+        actor.ask("announce", key=key + "/of-the-actor")
+    witness.get("lcf/query/config", SILENCE_S)  # what is asked is answered after what was declared
+    actor.get("lcf/query/config", SILENCE_S)
+    for key in KEYS:
+        rover.put(key, ROVER, congestion_control=zenoh.CongestionControl.BLOCK)
+    done = {(key, "asks") for key in KEYS if ROVER in payloads(actor.get(key, SILENCE_S))}
+    done |= {(key, "sees") for key in KEYS if key in actor.tokens(key)}
+    done |= {(key, "receives") for key in KEYS if ROVER in payloads(actor.receive(key, 1, SILENCE_S))}
+    everything.clear()  # of the rover itself
+    for key in (key for key, action in documented(who) if action == "sends"):
+        actor.put(key, ACTOR)  # once it has heard that somebody wants it
+    for key in KEYS:
+        actor.ask("put_blindly", key=key, payload=ACTOR.hex())
+        actor.ask("delete", key=key)
+    actor.get("lcf/query/config", SILENCE_S)
+    done |= set(everything)
+    assert done == documented(who)
+    # Nothing of the actor's reaches the rover's questions, or another planner.
+    answers = [one.ok.payload.to_bytes() for one in rover.get("lcf/**", timeout=SILENCE_S) if one.ok]
+    tokens = [str(one.ok.key_expr) for one in rover.liveliness().get("lcf/**", timeout=SILENCE_S) if one.ok]
+    assert set(answers) == {ROVER}
+    assert not [token for token in tokens if token.endswith("of-the-actor")]
+    assert witness.tokens("lcf/@alive/**") == ["lcf/@alive/rover"]
+    assert payloads(one for key in KEYS for one in witness.get(key, SILENCE_S)) == {ROVER}
+    assert payloads(one for key in KEYS for one in witness.receive(key, 9, SILENCE_S)) == {ROVER}
+
+
+# Strangers at the gate.
+
+
+class Strangers:
+    """Hundreds that connect without a pause, send ``first`` and stay."""
+
+    def __init__(self, port: int, first: bytes) -> None:
+        self.came = 0
+        self._port, self._first = port, first
+        self._ends = threading.Event()
+        self._held: deque[socket.socket] = deque(maxlen=300)
+        self._thread = threading.Thread(target=self._come, name="strangers")
+        self._thread.start()
+
+    def _come(self) -> None:
+        while not self._ends.wait(0.002):
+            try:
+                one = socket.create_connection(("127.0.0.1", self._port), PATIENCE_S)
+                one.sendall(self._first)
+            except ConnectionError:
+                continue
+            if len(self._held) == self._held.maxlen:
+                self._held.popleft().close()
+            self._held.append(one)
+            self.came += 1
+
+    def until(self, number: int) -> None:
+        deadline_s = time.monotonic() + 10 * PATIENCE_S
+        while self.came < number and time.monotonic() < deadline_s:
+            self._ends.wait(0.01)
+        assert self.came >= number
+
+    def leave(self) -> None:
+        self._ends.set()
+        self._thread.join()
+        for one in self._held:
+            one.close()
+
+
+@pytest.mark.parametrize("first", [b"", b"GET / HTTP/1.0\r\n\r\n", b"\x16\x03\x01\x02\x00\x01"])
+def test_strangers_keep_no_planner_out_and_take_a_bounded_number_of_descriptors(
+    link: Link, rover: zenoh.Session, gate: Gate, party: Any, first: bytes
+) -> None:
+    assert link
+    before = len(list(Path("/proc/self/fd").iterdir()))
+    strangers = Strangers(gate.port, first)
+    try:
+        strangers.until(400)
+        for _ in range(3):
+            planner = party("planner")
+            assert planner.ask("connected", timeout_s=2.0)
+            assert len(planner.get("lcf/query/config")) == 1
+        assert gate.descriptors < MOST_STRANGERS + 2 * 3 + 20
+        assert gate.resident_mib < 80
+    finally:
+        strangers.leave()
+    assert not rover.is_closed()
+    mine = len(list(Path("/proc/self/fd").iterdir())) - before
+    assert mine < 30, "nothing of theirs has reached the rover"
+
+
+def test_a_party_may_have_so_many_connections_and_no_more(rover: zenoh.Session, gate: Gate, folder: Path) -> None:
+    assert rover
+    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context.load_cert_chain(folder / "planner.pem", folder / "planner.key")
+    held = []
+    for _ in range(MOST_OF_ONE):
+        plain = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+        held.append(context.wrap_socket(plain, server_hostname="localhost"))
+    plain = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+    with context.wrap_socket(plain, server_hostname="localhost") as one_more:
+        assert one_more.recv(1) == b""
+    for one in held:
+        one.close()
+
+
+def test_a_gate_without_certificates_says_which_is_missing(tmp_path: Path) -> None:
+    command = (sys.executable, "-m", "lcf_edge", "gate", "--tls", tmp_path)
+    done = subprocess.run(command, check=False, capture_output=True, text=True)
+    assert done.returncode == 1
+    assert done.stderr == (
+        f"lcf-edge: {tmp_path}/rover.pem: cannot be used (No such file or directory); "
+        "docs/network.md says how to make it\n"
+    )

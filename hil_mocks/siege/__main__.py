@@ -1,0 +1,233 @@
+"""``python -m hil_mocks.siege``: besiege, and tell what it did."""
+
+import argparse
+import socket
+import sys
+import threading
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import zenoh
+
+from hil_mocks import scenes
+from hil_mocks.siege.attacks import (
+    CLIENT_HELLO,
+    HALF_A_REQUEST,
+    HTTP,
+    Attack,
+    Strangers,
+    liar,
+    page_is_served,
+    pause,
+    reloads,
+)
+from hil_mocks.siege.place import Process, certificates, planner_settings, rover_settings
+from lcf_edge.config import Camera, Config, Imu, Memory, Vehicle, Zenoh, to_toml
+from lcf_edge.errors import LcfError
+from lcf_edge.zenoh_link import opened_session
+from lcf_edge.zenoh_link.subscription import reading_from
+
+FPS = 15.0
+WARM_S = 4.0
+PAUSE_S = 2.0
+PATIENCE_S = 30.0
+BUDGET_MIB = 160.0  # the stand-in's pictures are in it
+GROWN_MIB = 10.0  # that a siege may cost
+LEAST_SHARE = 0.9  # of the frames
+LET_IN_S = 2.0
+MOST_DESCRIPTORS = {"daemon": 200, "gate": 200, "page": 230}
+MOST_LINES = 300  # of one log
+
+
+@dataclass
+class Figures:
+    """What was seen during the siege."""
+
+    waves: dict[str, int] = field(default_factory=dict)
+    let_in_s: list[float] = field(default_factory=list)  # of planners
+    descriptors: dict[str, int] = field(default_factory=dict)  # most
+    grown_mib: float = 0.0  # of the daemon, most
+    frames_share: float = 0.0
+    pages: int = 0
+    complaints: list[str] = field(default_factory=list)
+
+    def lines(self) -> list[str]:
+        """The report."""
+        return [
+            "waves: " + ", ".join(f"{name} {number}" for name, number in self.waves.items()),
+            f"planners: {len(self.let_in_s)} let in, the last after {max(self.let_in_s, default=0):.2f} s at most",
+            "descriptors, most: " + ", ".join(f"{name} {number}" for name, number in self.descriptors.items()),
+            f"memory of the daemon: {self.grown_mib:+.1f} MiB at most",
+            f"frames: {self.frames_share:.0%} of {FPS:g} a second; pages served: {self.pages}",
+        ]
+
+    def judge(self) -> None:
+        """Complain of what must not be."""
+        for told, wrong in (
+            (
+                f"a planner was let in after {max(self.let_in_s, default=0):.1f} s",
+                max(self.let_in_s, default=0) > LET_IN_S,
+            ),
+            ("no planner was let in", not self.let_in_s),
+            ("no page was served", not self.pages),
+            (f"memory grew by {self.grown_mib:.0f} MiB", self.grown_mib > GROWN_MIB),
+            (f"only {self.frames_share:.0%} of the frames", self.frames_share < LEAST_SHARE),
+        ):
+            if wrong:
+                self.complaints.append(told)
+        for name, number in self.descriptors.items():
+            if number > MOST_DESCRIPTORS[name]:
+                self.complaints.append(f"{name}: {number} descriptors")
+
+
+def free_ports(count: int) -> list[int]:
+    """Of loopback."""
+    probes = [socket.socket() for _ in range(count)]
+    for probe in probes:
+        probe.bind(("127.0.0.1", 0))
+    ports = [probe.getsockname()[1] for probe in probes]
+    for probe in probes:
+        probe.close()
+    return ports
+
+
+def besiege(seconds: float, folder: Path) -> Figures:
+    """For so long. Raises ``LcfError`` where it cannot begin."""
+    local, inner, outer, page_port = free_ports(4)
+    certificates(folder / "tls")
+    drive = scenes.write(
+        scenes.make("crossing", 3, seconds=4.0, fps=FPS, width=320, height=240, focal_px=250.0), folder
+    )
+    config = Config(
+        camera=Camera(driver="recording", recording=str(drive), width=320, height=240, fps=FPS),
+        imu=Imu(driver="recording"),
+        vehicle=Vehicle(speed_source="zenoh"),
+        memory=Memory(budget_mib=BUDGET_MIB),
+        zenoh=Zenoh(
+            listen=[f"tcp/127.0.0.1:{local}", f"tls/127.0.0.1:{inner}"],
+            config_file=str(rover_settings(folder / "tls")),
+        ),
+    )
+    file = folder / "config.toml"
+    file.write_text(to_toml(config), encoding="utf-8")
+    processes = [
+        Process("daemon", folder, "run", "-c", str(file)),
+        Process("gate", folder, "gate", "--tls", str(folder / "tls"), "--listen", "127.0.0.1", "--port", str(outer),
+                "--to", str(inner)),
+        Process("page", folder, "view", "--connect", f"tcp/127.0.0.1:{local}", "--port", str(page_port)),
+    ]  # fmt: skip
+    attacks = [
+        Strangers("nonsense at the gate", 0.01, outer, HTTP),
+        Strangers("silence at the gate", 0.02, outer, b""),
+        Strangers("half a handshake", 0.02, outer, CLIENT_HELLO),
+        Strangers("silence at the local port", 0.1, local, b""),
+        Strangers("slow page", 0.02, page_port, HALF_A_REQUEST),
+        Attack("liar", 0.5, liar(f"tcp/127.0.0.1:{local}")),
+        Attack("reload", 1.0, reloads(file, to_toml(config))),
+    ]
+    figures = Figures()
+    try:
+        planner = str(planner_settings(folder / "tls"))
+        wait_for_planner(f"tls/localhost:{outer}", planner, PATIENCE_S)
+        time.sleep(WARM_S)
+        watched(figures, processes, attacks, seconds, outer, page_port, planner)
+    finally:
+        for attack in attacks:
+            if attack.ident is not None:
+                attack.end()
+        for process in processes:
+            alive = process.status is None
+            status = process.end()
+            if not alive or status != 0:
+                figures.complaints.append(f"{process.name}: ended with status {status}: {(process.said or [''])[-1]}")
+            if any("Traceback" in line for line in process.said) or len(process.said) > MOST_LINES:
+                figures.complaints.append(f"{process.name}: {len(process.said)} lines in its log, or a traceback")
+    figures.judge()
+    return figures
+
+
+def watched(
+    figures: Figures,
+    processes: Sequence[Process],
+    attacks: Sequence[Attack],
+    seconds: float,
+    outer: int,
+    page_port: int,
+    planner: str,
+) -> None:
+    """Attack, and look once a second."""
+    daemon = processes[0]
+    before_mib = daemon.resident_mib
+    for attack in attacks:
+        attack.start()
+    with opened_session(reading_from(f"tls/localhost:{outer}", planner)) as session:
+        received = 0
+
+        def count(_: zenoh.Sample) -> None:
+            nonlocal received
+            received += 1
+
+        subscriber = session.declare_subscriber("lcf/scene", count)
+        while not received:
+            time.sleep(0.01)
+        received, begin_s, paused_s = 0, time.monotonic(), 0.0
+        while time.monotonic() < begin_s + seconds:
+            if not paused_s and time.monotonic() > begin_s + seconds / 2:
+                pause(daemon.pid, PAUSE_S)
+                paused_s = PAUSE_S
+            figures.let_in_s.append(wait_for_planner(f"tls/localhost:{outer}", planner, PATIENCE_S))
+            with suppress(OSError):
+                figures.pages += page_is_served(page_port)
+            if any(process.status is not None for process in processes):
+                return
+            for process in processes:
+                most = max(process.descriptors, figures.descriptors.get(process.name, 0))
+                figures.descriptors[process.name] = most
+            figures.grown_mib = max(figures.grown_mib, daemon.resident_mib - before_mib)
+            time.sleep(0.5)
+        figures.frames_share = received / FPS / (time.monotonic() - begin_s - paused_s)
+        subscriber.undeclare()  # type: ignore[no-untyped-call]
+    figures.waves = {attack.name: attack.waves for attack in attacks}
+
+
+def wait_for_planner(endpoint: str, settings: str, patience_s: float) -> float:
+    """How long a planner takes from nothing to its first scene, s. Raises ``LcfError``."""
+    came = threading.Event()
+    begin_s = time.monotonic()
+    with opened_session(reading_from(endpoint, settings)) as session:
+        subscriber = session.declare_subscriber("lcf/scene", lambda _: came.set())
+        if not came.wait(patience_s):
+            raise LcfError(f"siege: no scene comes to a planner within {patience_s:g} s")
+        took_s = time.monotonic() - begin_s
+        subscriber.undeclare()  # type: ignore[no-untyped-call]
+    return took_s
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Besiege, and tell."""
+    parser = argparse.ArgumentParser(
+        prog="python -m hil_mocks.siege",
+        description="The daemon, its gate and its page under attack, on loopback.",
+        allow_abbrev=False,
+    )
+    parser.add_argument("--seconds", type=float, default=60.0, metavar="N", help="of the siege (%(default)g)")
+    arguments = parser.parse_args(argv)
+    with TemporaryDirectory(prefix="lcf-edge-siege-") as folder:
+        try:
+            figures = besiege(arguments.seconds, Path(folder))
+        except LcfError as error:
+            sys.stderr.write(f"{error}\n")
+            return error.exit_status
+        except KeyboardInterrupt:
+            return 130
+    sys.stdout.writelines(f"{line}\n" for line in figures.lines())
+    sys.stderr.writelines(f"siege: {complaint}\n" for complaint in figures.complaints)
+    return 1 if figures.complaints else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

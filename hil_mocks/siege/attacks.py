@@ -1,0 +1,113 @@
+"""Who comes: each attack is a thread that repeats one thing, holds a bounded number of sockets, and ends when told."""
+
+import os
+import signal
+import socket
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
+import zenoh
+
+from lcf_edge.config import Zenoh
+from lcf_edge.errors import PublishError
+from lcf_edge.zenoh_link import opened_session
+
+HELD = 150  # sockets of one attack
+CONNECT_S = 1.0
+HTTP = b"GET / HTTP/1.0\r\n\r\n"
+HALF_A_REQUEST = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
+CLIENT_HELLO = b"\x16\x03\x01\x02\x00\x01"  # as far as it goes
+
+
+class Attack(threading.Thread):
+    """Calls ``wave`` each ``pause_s`` until it is to end. ``waves`` counts."""
+
+    def __init__(self, name: str, pause_s: float, wave: Callable[[], object]) -> None:
+        super().__init__(name=name, daemon=True)
+        self.waves = 0
+        self._pause_s, self._wave = pause_s, wave
+        self._ends = threading.Event()
+
+    def run(self) -> None:
+        """Attack."""
+        while not self._ends.wait(self._pause_s):
+            with suppress(OSError, zenoh.ZError, PublishError):  # what is refused was refused
+                self._wave()
+            self.waves += 1
+
+    def end(self) -> None:
+        """And wait for it."""
+        self._ends.set()
+        self.join(10.0)
+
+
+class Strangers(Attack):
+    """One more connection at a time, which sends ``first`` and stays until ``HELD`` others have come."""
+
+    def __init__(self, name: str, pause_s: float, port: int, first: bytes) -> None:
+        super().__init__(name, pause_s, self._come)
+        self._port, self._first = port, first
+        self._held: deque[socket.socket] = deque()
+
+    def _come(self) -> None:
+        if len(self._held) == HELD:
+            self._held.popleft().close()
+        self._held.append(socket.create_connection(("127.0.0.1", self._port), CONNECT_S))
+        self._held[-1].sendall(self._first)
+
+    def end(self) -> None:
+        """And leave."""
+        super().end()
+        for one in self._held:
+            one.close()
+
+
+def liar(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
+    """A local process that speaks for the rover, sends what is too large, and asks without listening."""
+
+    def wave() -> None:
+        with opened_session(Zenoh(mode="client", connect=[endpoint], listen=[])) as session:
+            token = session.liveliness().declare_token(f"{prefix}/@alive/liar")
+            for key in ("scene", "speed", "diagnostics", "query/config"):
+                session.put(f"{prefix}/{key}", os.urandom(64))
+                session.put(f"{prefix}/{key}", bytes(1_000_000))
+            for _ in range(50):
+                session.get(f"{prefix}/query/*", zenoh.handlers.RingChannel(1), timeout=1.0)
+            declared: list[Any] = [token]
+            declared += [session.declare_subscriber(f"{prefix}/none/{n}", lambda _: None) for n in range(50)]
+            for one in declared:
+                one.undeclare()
+
+    return wave
+
+
+def reloads(file: Path, good: str) -> Callable[[], None]:
+    """In turn a configuration that is broken, wrong, unreadably large, and good."""
+    texts = ("nonsense = 1\n", "[filter]\ntr_s = -1.0\n", "a" * 3_000_000, good)
+    turn = iter(range(2**30))
+
+    def wave() -> None:
+        new = file.with_suffix(".new")
+        new.write_text(texts[next(turn) % len(texts)], encoding="utf-8")
+        new.replace(file)
+
+    return wave
+
+
+def pause(process: int, seconds: float) -> None:
+    """Stop a process for a while, as a suspended machine does."""
+    os.kill(process, signal.SIGSTOP)
+    time.sleep(seconds)
+    os.kill(process, signal.SIGCONT)
+
+
+def page_is_served(port: int) -> bool:
+    """Whether a browser gets the page."""
+    with closing(socket.create_connection(("127.0.0.1", port), CONNECT_S)) as browser:
+        browser.sendall(b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: close\r\n\r\n")
+        return browser.recv(15).startswith(b"HTTP/1.1 200")

@@ -1,0 +1,67 @@
+"""File descriptors in reserve: strangers who use up all others do not keep devices and files from being opened."""
+
+import os
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+
+RESERVED = 24
+LENT = 8  # at a time: a device or a file needs two or three
+
+
+class Reserve:
+    """Holds ``RESERVED`` descriptors back, of which some are lent while a device or a file is opened.
+
+    ``short``: at the last ``check`` no other was left. ``shortages``: how often that began.
+    """
+
+    def __init__(self) -> None:
+        self.short = False
+        self.shortages = 0
+        self._lock = threading.Lock()
+        self._held: list[int] = []
+        self._borrowers = 0
+        self._fill()
+
+    @contextmanager
+    def lent(self) -> Iterator[None]:
+        """A few descriptors are free within, whoever uses up the others. What is kept open is replaced when it can."""
+        with self._lock:
+            self._borrowers += 1
+            for number in self._held[:LENT]:
+                os.close(number)
+            del self._held[:LENT]
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._borrowers -= 1
+                self._fill()
+
+    def check(self) -> None:
+        """Look whether others have used up all that are not reserved."""
+        with self._lock:
+            if not self._borrowers:
+                self._fill()
+            short = not _one_is_free()
+        self.shortages += short and not self.short
+        self.short = short
+
+    def close(self) -> None:
+        """Give them back; the reserve is not used again."""
+        with self._lock:
+            while self._held:
+                os.close(self._held.pop())
+
+    def _fill(self) -> None:
+        with suppress(OSError):  # others have them all; the next check tries again
+            while len(self._held) < RESERVED:
+                self._held.append(os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC))
+
+
+def _one_is_free() -> bool:
+    try:
+        os.close(os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC))
+    except OSError:
+        return False
+    return True

@@ -1,0 +1,176 @@
+"""Lets parties through to the daemon. Whatever strangers do takes no more than ``MOST_STRANGERS`` descriptors.
+
+A connection is a stranger's until its TLS handshake has shown a certificate. The oldest stranger gives way to the
+newest: an honest handshake is over in a few round trips, long before so many others have come.
+"""
+
+import asyncio
+import gc
+import signal
+import socket
+from collections import Counter
+from contextlib import closing, suppress
+from typing import Any
+
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.gate.certificates import ROVER_NAME, Certificates, common_name
+
+MOST_STRANGERS = 64
+HANDSHAKE_S = 5.0
+MOST_OF_ONE = 8  # connections of one common name
+MOST_PARTIES = 32  # connections in all
+DIAL_S = 2.0
+SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
+PIECE_BYTES = 2**16
+PAUSE_S = 0.1  # where the system gives no connection
+TELL_EACH_S = 10.0
+COLLECT_EACH = 32  # connections: asyncio leaves each in a cycle, with 256 KiB of buffer
+BACKLOG = 128
+
+Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
+
+
+async def serve(listening: socket.socket, daemon: tuple[str, int], certificates: Certificates) -> None:
+    """Until SIGINT or SIGTERM."""
+    loop = asyncio.get_running_loop()
+    loop.set_exception_handler(lambda *_: None)  # of connections: counted where they end
+    gc.collect()
+    gc.freeze()  # what is here now stays: collections are short
+    gate = Gate(daemon, certificates)
+    tasks = [loop.create_task(gate.accept(listening)), loop.create_task(gate.tell())]
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, lambda: [task.cancel() for task in tasks])
+    with suppress(asyncio.CancelledError):
+        await asyncio.gather(*tasks)
+    gate.tell_now()
+
+
+class Gate:
+    """``counts``: ``let in``, and of those who were not: ``no certificate``, ``gave way``, ``unknown NAME``, …"""
+
+    def __init__(self, daemon: tuple[str, int], certificates: Certificates) -> None:
+        self.counts: Counter[str] = Counter()
+        self._told: Counter[str] = Counter()
+        self._daemon = daemon
+        self._certificates = certificates
+        self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
+        self._parties: dict[asyncio.Task[None], str] = {}
+        self._gone = 0
+
+    async def accept(self, listening: socket.socket) -> None:
+        """Until cancelled."""
+        loop = asyncio.get_running_loop()
+        listening.setblocking(False)
+        while True:
+            try:
+                connection, _ = await loop.sock_accept(listening)
+            except OSError:
+                self.counts["no descriptor"] += 1
+                await asyncio.sleep(PAUSE_S)
+                continue
+            while len(self._strangers) >= MOST_STRANGERS:
+                oldest = next(iter(self._strangers))
+                del self._strangers[oldest]
+                oldest.cancel()
+                self.counts["gave way"] += 1
+            task = loop.create_task(self._meet(connection))
+            self._strangers[task] = None
+            task.add_done_callback(self._forget)
+            await asyncio.sleep(0)  # handshakes go on, however many come
+
+    async def tell(self) -> None:
+        """Now and then, until cancelled."""
+        while True:
+            await asyncio.sleep(TELL_EACH_S)
+            self.tell_now()
+
+    def tell_now(self) -> None:
+        """What has happened since it was last told."""
+        news = self.counts - self._told
+        self._told = self.counts.copy()
+        if news:
+            LOGGER.info("gate: %s", ", ".join(f"{what} {number}" for what, number in sorted(news.items())))
+
+    def _forget(self, task: asyncio.Task[None]) -> None:
+        self._strangers.pop(task, None)
+        self._parties.pop(task, None)
+        if not task.cancelled() and task.exception() is not None:
+            self.counts["failed"] += 1
+        self._gone += 1
+        if self._gone % COLLECT_EACH == 0:
+            gc.collect()
+
+    async def _meet(self, connection: socket.socket) -> None:
+        """From the first byte to the last."""
+        task = asyncio.current_task()
+        assert task is not None
+        try:
+            outer = await self._handshake(connection)
+        except (OSError, asyncio.IncompleteReadError):
+            self.counts["no certificate"] += 1
+            return
+        finally:
+            self._strangers.pop(task, None)
+        with closing(outer[1]):
+            name = common_name(outer[1].get_extra_info("ssl_object"))
+            refusal = self._refusal(name)
+            if refusal:
+                self.counts[refusal] += 1
+                return
+            self._parties[task] = name
+            await self._through(outer, name)
+
+    async def _handshake(self, connection: socket.socket) -> Stream:
+        loop = asyncio.get_running_loop()
+        reader = asyncio.StreamReader(PIECE_BYTES)
+        protocol = asyncio.StreamReaderProtocol(reader)
+        try:
+            connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+            transport, _ = await loop.connect_accepted_socket(
+                lambda: protocol, connection, ssl=self._certificates.server, ssl_handshake_timeout=HANDSHAKE_S
+            )
+        except BaseException:
+            connection.close()
+            raise
+        return reader, asyncio.StreamWriter(transport, protocol, reader, loop)
+
+    def _refusal(self, name: str) -> str:
+        """Why a party is not let in; empty: it is."""
+        if name not in self._certificates.parties:
+            return "of no known name"
+        names = list(self._parties.values())
+        if len(names) >= MOST_PARTIES or names.count(name) >= MOST_OF_ONE:
+            return f"too many of {name}"
+        return ""
+
+    async def _through(self, outer: Stream, name: str) -> None:
+        try:
+            async with asyncio.timeout(DIAL_S):
+                inner = await asyncio.open_connection(
+                    *self._daemon, ssl=self._certificates.parties[name], server_hostname=ROVER_NAME, limit=PIECE_BYTES
+                )
+        except OSError:  # also in time
+            self.counts["daemon away"] += 1
+            return
+        self.counts[f"let in {name}"] += 1
+        with closing(inner[1]):
+            pumps = [asyncio.create_task(_pump(*way)) for way in ((outer[0], inner[1]), (inner[0], outer[1]))]
+            try:
+                await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            finally:
+                for pump in pumps:
+                    pump.cancel()
+                outer[1].transport.abort()
+                inner[1].transport.abort()
+
+
+async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
+    """Until one side ends, is silent, or takes nothing any more."""
+    with suppress(OSError):
+        while True:
+            async with asyncio.timeout(SILENCE_S):
+                piece: Any = await reader.read(PIECE_BYTES)
+                if not piece:
+                    return
+                writer.write(piece)
+                await writer.drain()

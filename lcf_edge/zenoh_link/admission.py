@@ -1,0 +1,72 @@
+"""What a daemon that listens on this machine alone takes in from others: what it needs, and nothing else.
+
+Every local process can connect. It may read all that the daemon publishes, ask it, and tell the speed; it cannot send
+scenes, answers or tokens to others through the daemon, nor fill its memory with large messages.
+"""
+
+import json
+from typing import Any
+
+from lcf_edge.config import Publish, Zenoh
+
+LARGEST_MESSAGE_BYTES = 2**14
+"""What comes in larger in parts is dropped before it is put together: a speed takes less than 1 kB."""
+
+_EVERY_MESSAGE = [
+    "put",
+    "delete",
+    "declare_subscriber",
+    "query",
+    "reply",
+    "declare_queryable",
+    "liveliness_token",
+    "declare_liveliness_subscriber",
+    "liveliness_query",
+]
+
+
+def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
+    """Of Zenoh, as JSON by key, where no file of the user's own says better.
+
+    A daemon that connects to routers, is one, or speaks to ROS 2 routes for others as well, by keys that it cannot
+    know: there are no rules then.
+    """
+    wanted = {"transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES)}
+    if options.mode == "peer" and not options.connect and not options.config_file and not publish.ros2:
+        wanted["access_control"] = json.dumps(access_control(publish.prefix))
+    return wanted
+
+
+def access_control(prefix: str) -> dict[str, Any]:
+    """Zenoh's rules for everybody: reading, asking, and the speed."""
+
+    def taken_in(name: str, messages: list[str], *keys: str) -> dict[str, Any]:
+        return {
+            "id": name,
+            "permission": "allow",
+            "flows": ["ingress"],
+            "messages": messages,
+            "key_exprs": [f"{prefix}/{key}" for key in keys],
+        }
+
+    out = {
+        "id": "out",
+        "permission": "allow",
+        "flows": ["egress"],
+        "messages": _EVERY_MESSAGE,
+        "key_exprs": ["**", f"{prefix}/@alive/*"],  # ** leaves out names that begin with @
+    }
+    rules = [
+        out,
+        taken_in("subscribed to", ["declare_subscriber"], "scene", "preview/compressed", "diagnostics"),
+        taken_in("asked", ["query"], "query/*"),
+        taken_in("asked whether alive", ["declare_liveliness_subscriber", "liveliness_query"], "@alive/*"),
+        taken_in("speed", ["put"], "speed"),
+    ]
+    return {
+        "enabled": True,
+        "default_permission": "deny",
+        "rules": rules,
+        "subjects": [{"id": "everybody"}],
+        "policies": [{"rules": [rule["id"] for rule in rules], "subjects": ["everybody"]}],
+    }

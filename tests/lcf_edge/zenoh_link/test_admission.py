@@ -1,0 +1,90 @@
+"""On loopback every local process may read, ask and tell the speed; it cannot speak for the rover."""
+
+import resource
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from lcf_edge.config import Publish, Zenoh
+from lcf_edge.zenoh_link.admission import settings
+
+ALLOWED_MIB = 10.0
+SILENCE_S = 0.3
+
+Daemon = subprocess.Popen[str]
+
+
+def resident_mib(process: Daemon) -> float:
+    return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+
+@pytest.fixture
+def daemon(endpoint: str) -> Iterator[Daemon]:
+    """Without a camera."""
+    command = ("run", "--set", f'zenoh.listen=["{endpoint}"]', "--set", "camera.device=/dev/no-such-camera")
+    process = subprocess.Popen([sys.executable, "-m", "lcf_edge", *command], stderr=subprocess.PIPE, text=True)
+    assert process.stderr
+    assert next(line for line in process.stderr if "ready" in line)
+    yield process
+    process.terminate()
+    _, said = process.communicate(timeout=20)
+    assert process.returncode == 0
+    assert "Traceback" not in said
+
+
+@pytest.fixture
+def local(start: Any, endpoint: str, daemon: Daemon) -> Callable[[], Any]:
+    """Any process of this machine."""
+    assert daemon
+
+    def connect() -> Any:
+        peer = start(mode="client", listen__endpoints=[], connect__endpoints=[endpoint])
+        assert peer.ask("connected")
+        return peer
+
+    return connect
+
+
+def test_a_local_process_cannot_speak_for_the_rover(local: Callable[[], Any]) -> None:
+    planner, liar = local(), local()
+    keys = ("lcf/scene", "lcf/diagnostics", "lcf/query/config", "lcf/query/fake")
+    for key in keys:
+        planner.subscribe(key)
+        liar.ask("answer", key=key, payload=b"fake".hex())
+        liar.ask("announce", key="lcf/@alive/fake")
+    assert planner.get("lcf/query/schema")
+    for key in keys:
+        liar.ask("put_blindly", key=key, payload=b"fake".hex())
+    assert liar.get("lcf/query/schema"), "what it has sent has arrived"
+    assert planner.tokens("lcf/@alive/*") == ["lcf/@alive/rover"]
+    told = [one for key in keys for one in (*planner.receive(key, 3, SILENCE_S), *planner.get(key, SILENCE_S))]
+    assert told
+    assert b"fake" not in {one if isinstance(one, str) else one.payload for one in told}
+
+
+def test_large_messages_do_not_fill_its_memory(local: Callable[[], Any], daemon: Daemon) -> None:
+    floods = [local() for _ in range(6)]
+    assert floods[0].get("lcf/query/schema")
+    before_mib = resident_mib(daemon)
+    for flood in floods:
+        flood.ask("put_large", key="lcf/speed", size=1_000_000, count=20)
+    assert floods[0].get("lcf/query/schema")
+    assert resident_mib(daemon) - before_mib < ALLOWED_MIB
+
+
+@pytest.mark.parametrize(
+    "options",
+    [
+        (Zenoh(mode="router"), Publish()),
+        (Zenoh(connect=["tcp/192.0.2.1:7447"]), Publish()),
+        (Zenoh(config_file="zenoh.json5"), Publish()),
+        (Zenoh(), Publish(ros2=True)),
+    ],
+)
+def test_who_routes_for_others_or_has_rules_of_its_own_gets_none(options: tuple[Zenoh, Publish]) -> None:
+    assert "access_control" not in settings(*options)
+    assert "access_control" in settings(Zenoh(), Publish())
