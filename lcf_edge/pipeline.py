@@ -63,7 +63,7 @@ class Pipeline:
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each table that is allocated once and kept."""
-        lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.bends else {}
+        lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.is_distorted else {}
         return {**self.filter.table_bytes(), **lens}
 
     @property
@@ -155,7 +155,7 @@ class Pipeline:
         """
         rows = wanted.nonzero()[0]
         x, y = self._lens.distort_xy(table.x[rows], table.y[rows])
-        if self._lens.bends:
+        if self._lens.is_distorted:
             seen = np.isfinite(x)
             rows, x, y = rows[seen], x[seen], y[seen]
         across, down = self._lens.width - 1, self._lens.height - 1

@@ -231,6 +231,6 @@ def test_in_frame_is_what_the_camera_can_see(lens: Lens, through: Lens | None) -
     edge = np.array([[0, 0], [639, 479], [-2, 240], [641, 240], [320, -2], [320, 481], [320, 240]], np.float32)
     position = camera.undistort(edge)
     expected = [True, True, False, False, False, False, True]
-    if camera.bends:  # rounding of the inverse at the very border
+    if camera.is_distorted:  # rounding of the inverse at the very border
         position[:2] += np.array([[0.5, 0.5], [-0.5, -0.5]], np.float32)
     assert Matcher(camera).in_frame(*position.T).tolist() == expected
