@@ -111,7 +111,7 @@ def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float
 Edges = tuple[EdgeTable, CornerTable]
 
 
-def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int = 199, seed: int = 0) -> Edges:
+def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int = 200, seed: int = 0) -> Edges:
     """Trusted edges predicted anywhere on their lines, and their corners where ``missed`` puts them."""
     random = np.random.default_rng(seed)
     edges, corners = EdgeTable(number, 1, 1), CornerTable(number)
@@ -134,7 +134,8 @@ def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int 
 def missing_rotation(edges: EdgeTable, corners: CornerTable, sigma_rad: float) -> tuple[npt.NDArray[np.float64], float]:
     """The rotation that the gyro missed, (3, 3), and what stays uncertain of it."""
     off = OffLine()
-    assert derotation.measure_off_line(off, edges.columns, corners.columns, PINHOLE, SETTINGS)
+    for row in range(edges.count):
+        derotation.off_line(off, edges.columns, row, corners.columns, PINHOLE)
     derotation.missing_rotation(off, sigma_rad)
     return np.eye(3) + np.cross(np.eye(3), [off.turn_x, off.turn_y, off.turn_z]), off.sigma
 
@@ -159,7 +160,7 @@ def test_a_gyro_that_is_sure_is_believed() -> None:
 
 
 def test_more_edges_leave_less_uncertain() -> None:
-    sigmas = [missing_rotation(*off_the_lines(np.eye(3), 0.0, number), SIGMA_RAD)[1] for number in (25, 100, 199)]
+    sigmas = [missing_rotation(*off_the_lines(np.eye(3), 0.0, number), SIGMA_RAD)[1] for number in (25, 100, 200)]
     assert sigmas == sorted(sigmas, reverse=True)
     assert all(math.isfinite(sigma) for sigma in sigmas)
 

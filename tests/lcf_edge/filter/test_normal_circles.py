@@ -260,7 +260,7 @@ def test_only_what_lies_beside_the_path_passes_by(
     ahead_m = 4.0
     circles = CircleTable(1)
     circles.active[0] = True
-    circles.x[0], circles.y[0] = around.focus[0] + 500 * right_m / ahead_m, 200
+    circles.x[0], circles.y[0] = around.focus_x + 500 * right_m / ahead_m, 200
     circles.radius[0], circles.expansion[0] = 25, around.speed_mps / ahead_m
     assert bool(normal_circles.passes_by(circles.columns, 0, around)) is passes
 
