@@ -4,13 +4,13 @@ import math
 
 from lcf_edge.filter import flow, key_frames, rebel_detection
 from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import Integers
 from lcf_edge.filter.rebel_detection import Baselines, Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.types import Integers
 
-KEYS = 16
 MIN_BASELINE_S = 0.08  # shorter links say nothing
 SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands
 PENDING = 2  # links of a chain that waits for its third key frame

@@ -2,10 +2,9 @@
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import edge_equations
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
 
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members
@@ -38,8 +37,8 @@ class Members:
 
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
-        self.size = memoryview(np.zeros(capacity, np.int32))
-        self.x, self.y, self.variance_x, self.variance_y = (memoryview(np.zeros(capacity)) for _ in range(4))
+        self.size = integers(capacity)
+        self.x, self.y, self.variance_x, self.variance_y = (doubles(capacity) for _ in range(4))
 
 
 def clear(members: Members, g: int) -> None:
@@ -96,9 +95,10 @@ def weakest_row(circles: CircleColumns, settings: Settings) -> int:
     """Row of the circle with the least trust, if that is less than a newborn's; -1: none."""
     weakest = -1
     for c in range(circles.capacity):
-        if circles.active[c] and circles.trust[c] < settings.tr_new:
-            if weakest < 0 or circles.trust[c] < circles.trust[weakest]:
-                weakest = c
+        if not circles.active[c] or circles.trust[c] >= settings.tr_new:
+            continue
+        if weakest < 0 or circles.trust[c] < circles.trust[weakest]:
+            weakest = c
     return weakest
 
 

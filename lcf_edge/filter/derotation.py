@@ -2,13 +2,11 @@
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import flow
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.settings import Settings
-from lcf_edge.filter.types import Doubles
 
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
 MIN_EDGES = 25  # that a correction of the rotation needs
@@ -60,7 +58,7 @@ class OffLine:
 
     def __init__(self) -> None:
         self.count = 0
-        self.pitch, self.yaw, self.roll, self.px = (memoryview(np.zeros(MAX_EDGES)) for _ in range(4))
+        self.pitch, self.yaw, self.roll, self.px = (doubles(MAX_EDGES) for _ in range(4))
         self.turn_x = self.turn_y = self.turn_z = self.sigma = 0.0
 
 

@@ -18,7 +18,6 @@ cpdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept 
 cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
 cpdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
 cpdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
-@cython.locals(breaks=bint)
 cpdef void update(EdgeColumns edges, CircleColumns normal, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
 cpdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner) noexcept nogil
 cpdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, double x, double y, double dt_s, Settings settings) noexcept nogil

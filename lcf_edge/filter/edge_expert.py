@@ -5,9 +5,9 @@ import math
 from lcf_edge.filter import edge_equations, edge_rows, flow, image_plane, line_expert, rebel_circles
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Bytes
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.types import Bytes
 
 MIN_CORR = 0.25
 SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
@@ -93,13 +93,12 @@ def update(
         x, y, x0, y0 = corners.x[corner], corners.y[corner], edges.x[i], edges.y[i]
         relation = relation_of(edges, i, x, y, delta_px, settings)
         go_on(edges, i)
-        if relation == edge_equations.FOLLOWS or relation == edge_equations.DISAGREES:
+        if relation in (edge_equations.FOLLOWS, edge_equations.DISAGREES):
             correct(edges, i, normal, x, y, dt_s, settings)
             take_corner(edges, i, corners, corner)
         change = edge_equations.trust_change(relation)
         edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
-        breaks = relation == edge_equations.BREAKS or relation == edge_equations.STAYS
-        if breaks and edges.count < edges.capacity:
+        if relation in (edge_equations.BREAKS, edge_equations.STAYS) and edges.count < edges.capacity:
             stray(edges, i, x0, y0, corners, corner, dt_s, settings)
 
 
@@ -228,9 +227,7 @@ def first_expansion(
     return expansion
 
 
-def join_rebels(
-    edges: EdgeColumns, start: int, circles: CircleColumns, around: Situation, settings: Settings
-) -> None:
+def join_rebels(edges: EdgeColumns, start: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
     """New landmarks inside a rebel circle are expected to move as it does: they start in α with its motion.
 
     ``start``: row of the first of them.

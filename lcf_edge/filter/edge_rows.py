@@ -1,9 +1,8 @@
 """Whole rows of the table of edges: copied, emptied, removed."""
 
 from lcf_edge.filter.columns import EdgeColumns
-from lcf_edge.filter.types import Bytes
-
-KEYS = 16
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.memory import Bytes
 
 
 def copy_row(edges: EdgeColumns, source: int, target: int) -> None:

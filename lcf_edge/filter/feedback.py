@@ -2,13 +2,12 @@
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import alpha, circles, flow, image_plane, normal_circles
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
@@ -29,8 +28,8 @@ class Candidates:
     """
 
     def __init__(self, capacity: int) -> None:
-        self.ignored, self.passing, self.ready = (memoryview(np.zeros(capacity, np.uint8)) for _ in range(3))
-        self.members, self.watched = (memoryview(np.zeros(capacity, np.int32)) for _ in range(2))
+        self.ignored, self.passing, self.ready = (octets(capacity) for _ in range(3))
+        self.members, self.watched = (integers(capacity) for _ in range(2))
 
 
 def advance(psi: PsiColumns, normal: CircleColumns, around: Situation) -> None:

@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter.types import Doubles
+from lcf_edge.filter.memory import Doubles
 
 PI = 3.141592653589793
 MIN_SCALE = 1e-6  # of a homography: what is behind the camera goes far away

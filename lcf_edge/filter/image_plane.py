@@ -44,4 +44,4 @@ def project(plane: ImagePlane, x: float, y: float) -> bool:
     plane.u, plane.v = x, y
     if plane.is_distorted:
         distort(plane, x, y)
-    return 0 <= plane.u and plane.u <= plane.width - 1 and 0 <= plane.v and plane.v <= plane.height - 1
+    return 0 <= plane.u <= plane.width - 1 and 0 <= plane.v <= plane.height - 1

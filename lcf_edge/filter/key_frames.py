@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 
-from lcf_edge.filter.types import Doubles
-
-KEYS = 16
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.memory import Doubles, doubles, memory_of
 
 
 class KeyFrames:
@@ -17,9 +16,9 @@ class KeyFrames:
     """
 
     def __init__(self) -> None:
-        self.rotation = memoryview(np.tile(np.eye(3), (KEYS, 1, 1)))
-        self.displacement = memoryview(np.zeros((KEYS, 3)))
-        self.elapsed_s, self.sigma_rad = memoryview(np.zeros(KEYS)), memoryview(np.zeros(KEYS))
+        self.rotation = memory_of(np.tile(np.eye(3), (KEYS, 1, 1)))
+        self.displacement = doubles(KEYS, 3)
+        self.elapsed_s, self.sigma_rad = doubles(KEYS), doubles(KEYS)
         self.number = 0
         self.since_s = 0.0
 

@@ -2,9 +2,9 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from lcf_edge.config import Config
 from lcf_edge.filter import (
@@ -28,15 +28,17 @@ from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import Corners, Motion
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.matching import CornerIndex
+from lcf_edge.filter.memory import Doubles, integers, memory_of, octets
 from lcf_edge.filter.normal_circles import Flowing
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Baselines, Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Heading, Situation, turn_heading
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, PsiTable
-from lcf_edge.filter.types import Doubles
 from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
+
+Matrix = npt.NDArray[np.float64]
 
 SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
 SURPRISES = 3.0  # and by so many times what the gyro lately missed
@@ -81,8 +83,8 @@ class LineCircleFilter:
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
-        self._born, self._breaking = (memoryview(np.zeros(capacity, np.int32)) for _ in range(2))
-        self._dead = memoryview(np.zeros(capacity, np.uint8))
+        self._born, self._breaking = (integers(capacity) for _ in range(2))
+        self._dead = octets(capacity)
         self._flowing = Flowing(capacity, memory.circles_normal)
         self._rebel_groups = RebelGroups(capacity, memory.circles_rebel)
         self._candidates = Candidates(memory.circles_normal)
@@ -134,7 +136,7 @@ class LineCircleFilter:
         pixel = np.ascontiguousarray(corners.pixel, np.int32)
         position = np.ascontiguousarray(corners.position, np.float32)
         words = np.ascontiguousarray(corners.appearance).view(np.uint64)
-        matching.take_corners(self.corners.columns, memoryview(pixel), memoryview(position), memoryview(words))
+        matching.take_corners(self.corners.columns, memory_of(pixel), memory_of(position), memory_of(words))
         matching.fill(self._index, self.corners.columns)
 
     def _derotate(self, motion: Motion) -> None:
@@ -188,9 +190,7 @@ class LineCircleFilter:
     def _find(self, motion: Motion) -> None:
         """Corners for edges."""
         slack_px = self._slack_px(motion)
-        matching.find(
-            self._index, self._plane, self.edges.columns, self.corners.columns, slack_px, self._settings
-        )
+        matching.find(self._index, self._plane, self.edges.columns, self.corners.columns, slack_px, self._settings)
 
     def _slack_px(self, motion: Motion) -> float:
         """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""
@@ -284,9 +284,7 @@ class LineCircleFilter:
         edges, normal, rebel, psi = self.edges.columns, self.normal.columns, self.rebel.columns, self.psi.columns
         candidates, around, settings = self._candidates, self._around, self._settings
         feedback.mark_ignored(candidates, psi)
-        evicted = normal_circles.update(
-            self._flowing, edges, normal, candidates.ignored, around, settings, self._ids
-        )
+        evicted = normal_circles.update(self._flowing, edges, normal, candidates.ignored, around, settings, self._ids)
         evicted += rebel_circles.update(
             self._rebel_groups,
             edges,
@@ -320,6 +318,6 @@ class LineCircleFilter:
         )
 
 
-def _memory(rotation: Any) -> memoryview:
+def _memory(rotation: Matrix) -> Doubles:
     """A rotation (3, 3) as the loops take it, (1, 3, 3)."""
-    return memoryview(np.ascontiguousarray(rotation, np.float64).reshape(1, 3, 3))
+    return memory_of(np.ascontiguousarray(rotation, np.float64).reshape(1, 3, 3))

@@ -32,10 +32,10 @@ def psi_at(psi: PsiColumns, x: float, y: float) -> int:
 
 def any_active(psi: PsiColumns) -> bool:
     """Whether there are ψ regions at all."""
+    active = 0
     for p in range(psi.capacity):
-        if psi.active[p]:
-            return True
-    return False
+        active += psi.active[p]
+    return active > 0
 
 
 def coincides(

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from libc.stdlib cimport abs
-from lcf_edge.filter cimport c_rounding as rounding
+from lcf_edge.filter cimport rounding
 from lcf_edge.filter cimport image_plane
 from lcf_edge.filter.columns cimport CornerColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -11,8 +11,9 @@ cdef int CELL_SHIFT
 cdef double DISTANCE_COST
 cdef double LIKENESS_FLOOR
 cdef double WIDE_LIKENESS
-cdef int SAMPLES
+cdef int APPEARANCE_SAMPLES
 cdef int MEAN_GREY
+cdef double MEAN_OF_SUM
 cdef int ROUNDS
 
 cdef class CornerIndex:
@@ -28,10 +29,10 @@ cpdef void fill(CornerIndex index, CornerColumns corners) noexcept nogil
 cpdef int first_cell(double middle, double gate) noexcept nogil
 cpdef int last_cell(double middle, double gate, int cells) noexcept nogil
 @cython.locals(total=int)
-cpdef int difference(EdgeColumns edges, Py_ssize_t i, CornerIndex index, Py_ssize_t place) noexcept nogil
+cpdef double difference(EdgeColumns edges, Py_ssize_t i, CornerIndex index, Py_ssize_t place) noexcept nogil
 @cython.locals(total=int)
-cpdef int contrast(EdgeColumns edges, Py_ssize_t i) noexcept nogil
-cpdef double likeness_needed(int contrast_sum, Settings settings) noexcept nogil
+cpdef double contrast(EdgeColumns edges, Py_ssize_t i) noexcept nogil
+cpdef double likeness_needed(double own_contrast, Settings settings) noexcept nogil
 cpdef void choose(CornerIndex index, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, double x, double y, double gate, double most) noexcept nogil
 cpdef double gate_px(EdgeColumns edges, Py_ssize_t i, double slack_px, bint wide, Settings settings) noexcept nogil
 @cython.locals(nothing_there=bint)

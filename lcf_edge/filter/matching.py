@@ -7,15 +7,16 @@ import numpy as np
 from lcf_edge.filter import image_plane, rounding
 from lcf_edge.filter.columns import CornerColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
+from lcf_edge.filter.memory import Doubles, Integers, Words, doubles, integers, memory_of
 from lcf_edge.filter.settings import Settings
-from lcf_edge.filter.types import Doubles, Integers, Words
 
 CELL_SHIFT = 4  # cells of 16x16 px hold a few corners
 DISTANCE_COST = 0.4  # grey levels a px, so that of equal looks the nearest wins
 LIKENESS_FLOOR = 3.0  # grey levels of camera noise
 WIDE_LIKENESS = 0.5  # a wider look needs a better likeness, by this factor
-SAMPLES = 16  # of an appearance
 MEAN_GREY = 128  # of an appearance
+MEAN_OF_SUM = 1 / 16.0  # over the samples of an appearance
 ROUNDS = 2  # of mutual best choice
 
 
@@ -31,12 +32,12 @@ class CornerIndex:
     def __init__(self, width: int, height: int, capacity: int) -> None:
         self.columns = (width >> CELL_SHIFT) + 1
         self.rows = (height >> CELL_SHIFT) + 1
-        self.start = memoryview(np.zeros(self.columns * self.rows + 1, np.int32))
-        self.order = memoryview(np.zeros(capacity, np.int32))
-        self.x, self.y = memoryview(np.zeros(capacity)), memoryview(np.zeros(capacity))
-        appearance = np.zeros((capacity, SAMPLES), np.uint8)
-        self.appearance, self.words = memoryview(appearance), memoryview(appearance.view(np.uint64))
-        self.nbytes = 4 * (self.columns * self.rows + 1) + capacity * (4 + 8 + 8 + SAMPLES)
+        self.start = integers(self.columns * self.rows + 1)
+        self.order = integers(capacity)
+        self.x, self.y = doubles(capacity), doubles(capacity)
+        appearance = np.zeros((capacity, APPEARANCE_SAMPLES), np.uint8)
+        self.appearance, self.words = memory_of(appearance), memory_of(appearance.view(np.uint64))
+        self.nbytes = 4 * (self.columns * self.rows + 1) + capacity * (4 + 8 + 8 + APPEARANCE_SAMPLES)
 
 
 def take_corners(corners: CornerColumns, pixel: Integers, position: Doubles, words: Words) -> None:
@@ -89,28 +90,28 @@ def last_cell(middle: float, gate: float, cells: int) -> int:
     return min(rounding.whole(middle + gate) >> CELL_SHIFT, cells - 1)
 
 
-def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> int:
-    """Sum of the absolute grey differences of two appearances."""
+def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> float:
+    """Mean absolute grey difference of two appearances."""
     total = 0
     for k in range(edges.appearance.shape[1]):
         total += abs(edges.appearance[i, k] - index.appearance[place, k])
-    return total
+    return total * MEAN_OF_SUM
 
 
-def contrast(edges: EdgeColumns, i: int) -> int:
-    """Sum of the absolute grey differences of an appearance from its mean."""
+def contrast(edges: EdgeColumns, i: int) -> float:
+    """Mean absolute grey difference of an appearance from its mean."""
     total = 0
     for k in range(edges.appearance.shape[1]):
         total += abs(edges.appearance[i, k] - MEAN_GREY)
-    return total
+    return total * MEAN_OF_SUM
 
 
-def likeness_needed(contrast_sum: int, settings: Settings) -> float:
+def likeness_needed(own_contrast: float, settings: Settings) -> float:
     """Largest mean grey difference at which an appearance still counts as the same: a share of its own contrast.
 
     A faint corner must look more alike than a strong one, else it is taken for its neighbours.
     """
-    return min(LIKENESS_FLOOR + settings.appearance_share * contrast_sum / SAMPLES, settings.appearance_max)
+    return min(LIKENESS_FLOOR + settings.appearance_share * own_contrast, settings.appearance_max)
 
 
 def choose(
@@ -130,7 +131,7 @@ def choose(
             corner = index.order[place]
             if not corners.free[corner]:
                 continue
-            unlike = difference(edges, i, index, place) / 16.0
+            unlike = difference(edges, i, index, place)
             if unlike >= most:
                 continue
             cost = unlike + DISTANCE_COST * math.sqrt(away2)

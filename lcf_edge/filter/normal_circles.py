@@ -2,16 +2,14 @@
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import circles as shared
 from lcf_edge.filter import edge_equations, flow, image_plane, path, rounding
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Bytes, doubles, integers
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.types import Bytes
 
 SPEED_NOISE_PX = 0.6  # 1 sigma of an edge's V, times t_f
 PASSING_WIDTHS = 2.0  # half widths of the vehicle, beside its path
@@ -42,13 +40,13 @@ class Flowing:
 
     def __init__(self, edges: int, circles: int) -> None:
         self.count = self.open_count = 0
-        self.row, self.cell = memoryview(np.zeros(edges, np.int32)), memoryview(np.zeros(edges, np.int32))
-        self.r, self.cos, self.sin, self.expansion = (memoryview(np.zeros(edges)) for _ in range(4))
-        self.cell_size = memoryview(np.zeros(CELLS * CELLS * OCTAVES, np.int32))
+        self.row, self.cell = integers(edges), integers(edges)
+        self.r, self.cos, self.sin, self.expansion = (doubles(edges) for _ in range(4))
+        self.cell_size = integers(CELLS * CELLS * OCTAVES)
         self.members = Members(circles)
-        self.before, self.included, self.open = (memoryview(np.zeros(circles, np.int32)) for _ in range(3))
-        self.mean_cos, self.mean_sin, self.mean_expansion = (memoryview(np.zeros(circles)) for _ in range(3))
-        self.beta_cos, self.beta_sin = (memoryview(np.zeros(circles)) for _ in range(2))
+        self.before, self.included, self.open = (integers(circles) for _ in range(3))
+        self.mean_cos, self.mean_sin, self.mean_expansion = (doubles(circles) for _ in range(3))
+        self.beta_cos, self.beta_sin = (doubles(circles) for _ in range(2))
 
 
 def predict(circles: CircleColumns, plane: ImagePlane, around: Situation) -> None:
@@ -265,9 +263,8 @@ def largest_cell(flowing: Flowing, support: int) -> int:
         cell = flowing.cell[j]
         if cell < 0 or flowing.cell_size[cell] < support:
             continue
-        if largest < 0 or flowing.cell_size[cell] > flowing.cell_size[largest]:
-            largest = cell
-        elif flowing.cell_size[cell] == flowing.cell_size[largest] and cell < largest:
+        size, most = flowing.cell_size[cell], flowing.cell_size[max(largest, 0)]
+        if largest < 0 or size > most or (size == most and cell < largest):
             largest = cell
     return largest
 

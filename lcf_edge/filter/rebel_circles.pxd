@@ -35,8 +35,9 @@ cdef class RebelGroups:
     cdef public int[::1] verdict, label, group
     cdef public double[::1] vx, vy, elapsed_s
     cdef public Members members
-    cdef public double[::1] mean_vx, mean_vy, mean_s, standing, inwards, closing_mps, focus_rate, focus_r2, below2, below_vy
-    cdef int[::1] flowing, circle, best_circle, best_group
+    cdef public double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
+    cdef public int[::1] standing, inwards, flowing, circle
+    cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
     cdef unsigned char[::1] odd, updated, missed
 

@@ -2,17 +2,15 @@
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import circles as shared
 from lcf_edge.filter import edge_equations, flow, image_plane, path, situation
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Integers, doubles, integers, octets
 from lcf_edge.filter.rebel_detection import Baselines, Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.types import Integers
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
@@ -43,8 +41,8 @@ class RebelGroups:
     A row a rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s; ``elapsed_s``, over which it was seen;
     ``label``, the lowest of its group; ``group``, its number, -1: too few go with it.
 
-    A row a group: ``members``; means of ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, ``inwards``, shares of
-    those that stand still and are incoming, that fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
+    A row a group: ``members``; means of ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, ``inwards``, how many
+    stand still and are incoming, and how many fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
     ``focus_r2``, means of μ/t·r² and r²; ``below2`` and ``below_vy``, of the height under the horizon squared, and
     times V; ``flowing``, normal edges inside; ``odd``, too few of those inside are rebels; ``circle``, row of C_r, -1:
     none; ``votes`` for each circle.
@@ -52,17 +50,20 @@ class RebelGroups:
 
     def __init__(self, rebels: int, circles: int) -> None:
         self.count = self.groups = 0
-        self.verdict, self.label, self.group = (memoryview(np.zeros(rebels, np.int32)) for _ in range(3))
-        self.vx, self.vy, self.elapsed_s = (memoryview(np.zeros(rebels)) for _ in range(3))
+        self.verdict, self.label, self.group = (integers(rebels) for _ in range(3))
+        self.vx, self.vy, self.elapsed_s = (doubles(rebels) for _ in range(3))
         self.members = Members(rebels)
-        self.mean_vx, self.mean_vy, self.mean_s, self.standing = (memoryview(np.zeros(rebels)) for _ in range(4))
-        self.inwards, self.closing_mps, self.focus_rate = (memoryview(np.zeros(rebels)) for _ in range(3))
-        self.focus_r2, self.below2, self.below_vy = (memoryview(np.zeros(rebels)) for _ in range(3))
-        self.flowing, self.circle = (memoryview(np.zeros(rebels, np.int32)) for _ in range(2))
-        self.odd = memoryview(np.zeros(rebels, np.uint8))
-        self.votes = memoryview(np.zeros((rebels, circles), np.int32))
-        self.best_circle, self.best_group = memoryview(np.zeros(rebels, np.int32)), memoryview(np.zeros(circles, np.int32))
-        self.updated, self.missed = (memoryview(np.zeros(circles, np.uint8)) for _ in range(2))
+        self.mean_vx, self.mean_vy, self.mean_s = (doubles(rebels) for _ in range(3))
+        self.closing_mps, self.focus_rate = (doubles(rebels) for _ in range(2))
+        self.focus_r2, self.below2, self.below_vy = (doubles(rebels) for _ in range(3))
+        self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
+        self.odd = octets(rebels)
+        self.votes = integers(rebels, circles)
+        self.best_circle, self.best_group = (
+            integers(rebels),
+            integers(circles),
+        )
+        self.updated, self.missed = (octets(circles) for _ in range(2))
 
 
 # Prediction
@@ -171,9 +172,7 @@ def take_rebels(
         groups.vy[k] = (edges.y[i] - verdicts.y[j]) / elapsed_s
 
 
-def are_linked(
-    groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings
-) -> bool:
+def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings) -> bool:
     """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
 
     They are near, and move in the same direction with a like speed, or differ in velocity by no more than the parts of
@@ -209,9 +208,7 @@ def join(groups: RebelGroups, a: int, b: int) -> None:
     groups.label[max(one, other)] = min(one, other)
 
 
-def cluster(
-    groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings
-) -> None:
+def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
     """Rebels that are linked are of one group, and so are those that others link."""
     for a in range(groups.count):
         i = verdicts.row[groups.verdict[a]]
@@ -243,9 +240,9 @@ def number_groups(groups: RebelGroups, support: int) -> None:
 def clear_group(groups: RebelGroups, g: int) -> None:
     """A group without rebels."""
     shared.clear(groups.members, g)
-    groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = groups.standing[g] = groups.inwards[g] = 0.0
+    groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
-    groups.flowing[g] = 0
+    groups.flowing[g] = groups.standing[g] = groups.inwards[g] = 0
 
 
 def average(
@@ -282,9 +279,9 @@ def average(
         groups.below2[g] += share * below * below
         groups.below_vy[g] += share * below * groups.vy[k]
         if verdicts.incoming[j]:
-            groups.standing[g] += share
+            groups.standing[g] += 1
         if verdicts.mover[j] and verdicts.short[j] > math.fabs(verdicts.drift[j]):
-            groups.inwards[g] += share
+            groups.inwards[g] += 1
     for k in range(groups.count):
         g = groups.group[k]
         if g >= 0:
@@ -370,7 +367,9 @@ def involve(
             groups.circle[g] = -1
 
 
-def is_aligned(groups: RebelGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> bool:
+def is_aligned(
+    groups: RebelGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
+) -> bool:
     """Whether a group goes on as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction."""
     beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), flow.length(groups.mean_vx[g], groups.mean_vy[g])
     still = STILL_PX / groups.mean_s[g]
@@ -399,9 +398,10 @@ def largest_new(groups: RebelGroups) -> int:
     """The largest group without a circle, -1: there is none."""
     largest = -1
     for g in range(groups.groups):
-        if groups.circle[g] < 0 and not groups.odd[g]:
-            if largest < 0 or groups.members.size[g] > groups.members.size[largest]:
-                largest = g
+        if groups.circle[g] >= 0 or groups.odd[g]:
+            continue
+        if largest < 0 or groups.members.size[g] > groups.members.size[largest]:
+            largest = g
     return largest
 
 
@@ -458,7 +458,7 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     What stands still expands about the focus, what moves about the horizon: 1/TTC = V_e/r, fitted over the members.
     """
     c = groups.circle[g]
-    stands = groups.standing[g] >= 0.5
+    stands = 2 * groups.standing[g] >= groups.members.size[g]
     range_m = groups.closing_mps[g] / max(standing_expansion(groups, g), MIN_RATE)
     rate = expansion_of(groups, g, stands, range_m, around)
     before = rate
@@ -492,7 +492,7 @@ def cause_of(
     if stands or (circles.ttc[c] < around.horizon_s and not beside):
         return INCOMING
     crosses = math.fabs(aside_mps) > SIDEWAYS * math.fabs(around.speed_mps)  # who walks in from the side crosses
-    return LEADING if groups.inwards[g] > 0.5 and not crosses else CROSSING
+    return LEADING if 2 * groups.inwards[g] > groups.members.size[g] and not crosses else CROSSING
 
 
 # Circles without a group

@@ -8,16 +8,15 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 
 import math
 
-import numpy as np
-
 from lcf_edge.filter import flow, path
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
-KEYS = 16
 ROOT_2 = 1.4142135623730951
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 MAX_FOCUS_SHARE = 0.5  # of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
@@ -40,7 +39,7 @@ MIN_R_PX = 1.0
 LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover's recent link
 CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the recent link
 MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
-MAX_DEVIATION_RAD = 0.5
+MAX_DEVIATION_RAD = 0.5  # DL is bounded
 
 
 class Baselines:
@@ -51,10 +50,8 @@ class Baselines:
     """
 
     def __init__(self) -> None:
-        self.h = memoryview(np.zeros((KEYS, 9)))
-        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (
-            memoryview(np.zeros(KEYS)) for _ in range(5)
-        )
+        self.h = doubles(KEYS, 9)
+        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (doubles(KEYS) for _ in range(5))
 
 
 def measure_baselines(
@@ -90,11 +87,11 @@ class Verdicts:
 
     def __init__(self, capacity: int) -> None:
         self.count = 0
-        self.row, self.slot, self.oldest, self.near = (memoryview(np.zeros(capacity, np.int32)) for _ in range(4))
-        self.x, self.y, self.r, self.drift = (memoryview(np.zeros(capacity)) for _ in range(4))
-        self.short, self.over, self.outward, self.expansion = (memoryview(np.zeros(capacity)) for _ in range(4))
-        self.mover, self.incoming = (memoryview(np.zeros(capacity, np.uint8)) for _ in range(2))
-        self.inverse, self.doubt = (memoryview(np.zeros(capacity)) for _ in range(2))
+        self.row, self.slot, self.oldest, self.near = (integers(capacity) for _ in range(4))
+        self.x, self.y, self.r, self.drift = (doubles(capacity) for _ in range(4))
+        self.short, self.over, self.outward, self.expansion = (doubles(capacity) for _ in range(4))
+        self.mover, self.incoming = (octets(capacity) for _ in range(2))
+        self.inverse, self.doubt = (doubles(capacity) for _ in range(2))
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
 

@@ -1,4 +1,4 @@
-"""Whole numbers from others, as C converts them. Compiled by ``c_rounding.pxd``."""
+"""Whole numbers from others, as C converts them; the .pxd beside it is a header that serves the compiled modules."""
 
 
 def whole(x: float) -> int:

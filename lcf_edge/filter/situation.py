@@ -5,7 +5,7 @@ import math
 from lcf_edge.config import Camera, Config
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.inputs import Motion
-from lcf_edge.filter.types import Doubles
+from lcf_edge.filter.memory import Doubles
 
 PITCH_MEMORY_S = 1.0  # shaking faster than this turns the camera, not the way of the vehicle
 YAW_MEMORY_S = 0.3
@@ -40,7 +40,8 @@ class Situation:
 
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
     unknown. ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal
-    length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``: t_f.
+    length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``:
+    t_f.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:

@@ -15,14 +15,14 @@ import numpy.typing as npt
 
 from lcf_edge.filter import edge_rows
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, PsiColumns
-from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, Corners
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, KEYS
 from lcf_edge.filter.line_expert import group_at
+from lcf_edge.filter.memory import memory_of
 
 Rows = npt.NDArray[np.signedinteger[Any]]
 Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.floating[Any]]
 
-KEYS = 16  # key frames that an edge remembers
 NO_CIRCLE = -1
 
 
@@ -176,25 +176,21 @@ class Table:
 
     def __getattr__(self, name: str) -> npt.NDArray[Any]:
         try:
-            return self.__dict__["arrays"][name]  # type: ignore[no-any-return]
+            return self.__dict__["arrays"][name]
         except KeyError:
             raise AttributeError(f"{type(self).__name__} has no column {name}") from None
 
-    def memory(self) -> dict[str, memoryview]:
+    def memory(self) -> dict[str, Any]:
         """The columns as the loops take them: numbers of Python where they run uncompiled, which do not wrap."""
-        memory = {name: memoryview(_bytes_of(array)) for name, array in self.arrays.items()}
+        memory = {name: memory_of(array) for name, array in self.arrays.items()}
         if "appearance" in self.arrays:  # the same samples, eight at a time
-            memory["words"] = memoryview(self.arrays["appearance"].view(np.uint64))
+            memory["words"] = memory_of(self.arrays["appearance"].view(np.uint64))
         return memory
 
     @property
     def nbytes(self) -> int:
         """Bytes that the table occupies from start to end."""
         return sum(array.nbytes for array in self.arrays.values())
-
-
-def _bytes_of(array: npt.NDArray[Any]) -> npt.NDArray[Any]:
-    return array.view(np.uint8) if array.dtype == np.bool_ else array
 
 
 class EdgeTable(Table):
@@ -231,7 +227,7 @@ class EdgeTable(Table):
 
     def remove(self, dead: Mask) -> None:
         """Delete rows; ``dead``: bool (count,). The last rows move into the gaps."""
-        edge_rows.remove(self.columns, memoryview(np.ascontiguousarray(dead).view(np.uint8)))
+        edge_rows.remove(self.columns, memory_of(dead))
 
     def normal_room(self) -> int:
         """Rows that E_n may still take."""
@@ -302,12 +298,8 @@ class GroupTable(Table):
 
 
 class CornerTable(Table):
-    """``CORNER_COLUMNS``. A frame with more corners than it has room for makes it grow."""
+    """``CORNER_COLUMNS``."""
 
     def __init__(self, capacity: int) -> None:
         super().__init__(CORNER_COLUMNS, capacity)
         self.columns = CornerColumns(self.memory())
-
-    def room_for(self, corners: Corners) -> "CornerTable":
-        """This table, or a larger one where these corners do not fit."""
-        return self if len(corners) <= self.capacity else CornerTable(len(corners))

@@ -33,7 +33,7 @@ Floats = npt.NDArray[np.float32]
 
 
 class Seen:
-    """Rebel edges at ``x``, ``y`` (px) that moved so (px/s) for a while: the first rows of a table, and the verdicts."""
+    """Rebel edges at ``x``, ``y`` (px) that moved so (px/s) for a while: first rows of a table, and verdicts."""
 
     def __init__(
         self, edges: EdgeTable, x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any, seen_s: float = SEEN_S
@@ -212,9 +212,7 @@ def test_what_is_about_to_be_met_coasts_when_it_is_large(situation: Situation) -
         assert (scene.update().trust == before) == keeps
 
 
-def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(
-    situation: Situation, lens: Lens
-) -> None:
+def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation, lens: Lens) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
     circles = scene.circles

@@ -92,9 +92,7 @@ class Watched:
         edges, baselines = self.seen()
         whole, recent = (self.judged(edges, baselines, slot) for slot in (0, 1))
         noisy = Settings(Filter(edge_noise_px=0.8))
-        return [
-            bool(rebel_detection.agree(whole, row, recent, row, baselines, noisy)) for row in range(whole.count)
-        ]
+        return [bool(rebel_detection.agree(whole, row, recent, row, baselines, noisy)) for row in range(whole.count)]
 
 
 @pytest.fixture(scope="session")
@@ -332,7 +330,9 @@ def agrees(whole: Verdicts, recent: Verdicts) -> bool:
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_jump_is_no_motion(sign: int) -> None:
     assert agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * 30))
-    assert not agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * 60))  # all of it in the recent link
+    assert not agrees(
+        verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * 60)
+    )  # all of it in the recent link
     assert not agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=False))  # all of it before
     assert not agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * -30))
 
