@@ -33,7 +33,7 @@ from lcf_edge.filter.normal_circles import Flowing
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Baselines, Verdicts
 from lcf_edge.filter.settings import Settings
-from lcf_edge.filter.situation import Heading, Situation, turn_heading
+from lcf_edge.filter.situation import Heading, Situation, follow, turn_heading
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, PsiTable
 from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
@@ -75,7 +75,7 @@ class LineCircleFilter:
         self._index = CornerIndex(lens.width, lens.height, memory.corners)
         self._heading = Heading(config.camera)
         self._around = Situation(config, self._pinhole)
-        self._around.follow(self._heading, Motion(1.0, np.eye(3), 0.0, math.nan, 0.0))
+        follow(self._around, self._heading, math.nan, 0.0, 1.0)
         self._keys = KeyFrames()
         self._baselines = Baselines()
         self._homography = Homography()
@@ -143,7 +143,7 @@ class LineCircleFilter:
         """Step 0, and the predictions of circles and ψ."""
         rotation = _memory(motion.rotation)
         turn_heading(self._heading, rotation, motion.yaw_rate_radps, motion.dt_s)
-        self._around.follow(self._heading, motion)
+        follow(self._around, self._heading, motion.speed_mps, motion.yaw_rate_radps, motion.dt_s)
         self._advance_keys(rotation, motion)
         self._warp(rotation)
         normal_circles.predict(self.normal.columns, self._plane, self._around)

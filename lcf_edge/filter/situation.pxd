@@ -15,4 +15,5 @@ cdef class Situation:
     cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, yaw_rate_radps, scene_flow_pxps
 
 cpdef void turn_heading(Heading heading, const double[:, :, ::1] rotation, double yaw_rate_radps, double dt_s) noexcept nogil
+cpdef void follow(Situation around, Heading heading, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil
 cpdef double ground_range_m(Situation around, double y) noexcept nogil

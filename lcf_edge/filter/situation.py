@@ -4,7 +4,6 @@ import math
 
 from lcf_edge.config import Camera, Config
 from lcf_edge.filter.flow import Pinhole
-from lcf_edge.filter.inputs import Motion
 from lcf_edge.filter.memory import Doubles
 
 PITCH_MEMORY_S = 1.0  # shaking faster than this turns the camera, not the way of the vehicle
@@ -54,14 +53,15 @@ class Situation:
         self.focus_x, self.focus_y, self.horizon_y = pinhole.cx, pinhole.cy, pinhole.cy
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
 
-    def follow(self, heading: Heading, motion: Motion) -> None:
-        """Take the heading and the motion of this frame."""
-        pinhole, speed = self.pinhole, motion.speed_mps
-        self.focus_x = pinhole.cx + pinhole.fx * heading.ray_x
-        self.focus_y = self.horizon_y = pinhole.cy + pinhole.fy * heading.ray_y
-        self.dt_s, self.speed_mps, self.yaw_rate_radps = motion.dt_s, speed, motion.yaw_rate_radps
-        known = math.isfinite(speed)
-        self.scene_flow_pxps = abs(speed) * pinhole.focal / self.scene_depth_m if known else INFINITY
+
+def follow(around: Situation, heading: Heading, speed_mps: float, yaw_rate_radps: float, dt_s: float) -> None:
+    """Take the heading and the motion of this frame."""
+    around.focus_x = around.pinhole.cx + around.pinhole.fx * heading.ray_x
+    around.focus_y = around.horizon_y = around.pinhole.cy + around.pinhole.fy * heading.ray_y
+    around.dt_s, around.speed_mps, around.yaw_rate_radps = dt_s, speed_mps, yaw_rate_radps
+    around.scene_flow_pxps = INFINITY
+    if math.isfinite(speed_mps):
+        around.scene_flow_pxps = math.fabs(speed_mps) * around.pinhole.focal / around.scene_depth_m
 
 
 def ground_range_m(around: Situation, y: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+import lcf_edge
 from lcf_edge.config import Config, Memory
 from lcf_edge.lens import Lens
 
@@ -27,7 +28,8 @@ Landmarks = Callable[..., npt.NDArray[np.float64]]
 
 def run(path: Path, *, pure: bool) -> list[str]:
     """What the script prints: how it ran, and a digest a frame."""
-    environment = os.environ | {"LCF_EDGE_PURE": "1"} if pure else os.environ
+    environment = os.environ | {"PYTHONPATH": str(Path(lcf_edge.__file__).parents[1])}
+    environment |= {"LCF_EDGE_PURE": "1"} if pure else {}
     command = [sys.executable, str(SCRIPT), str(path)]
     return subprocess.run(command, check=True, capture_output=True, text=True, env=environment).stdout.split()
 
