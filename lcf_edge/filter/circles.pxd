@@ -19,13 +19,13 @@ cdef class Members:
     cdef public int[::1] size
     cdef public double[::1] x, y, variance_x, variance_y
 
-cpdef unsigned int new_id(Ids ids) noexcept nogil
-cpdef void clear(Members members, Py_ssize_t g) noexcept nogil
-cpdef double radius_of(Members members, Py_ssize_t g, double most_px) noexcept nogil
-cpdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
-cpdef void describe(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g) noexcept nogil
-cpdef void give_birth(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings, Ids ids) noexcept nogil
-cpdef int free_row(CircleColumns circles) noexcept nogil
-cpdef int weakest_row(CircleColumns circles, Settings settings) noexcept nogil
-cpdef void release(EdgeColumns edges, CircleColumns circles, bint rebel) noexcept nogil
-cpdef int make_room(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil
+cdef unsigned int new_id(Ids ids) noexcept nogil
+cdef void clear(Members members, Py_ssize_t g) noexcept nogil
+cdef double radius_of(Members members, Py_ssize_t g, double most_px) noexcept nogil
+cdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
+cdef void describe(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g) noexcept nogil
+cdef void give_birth(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings, Ids ids) noexcept nogil
+cdef int free_row(CircleColumns circles) noexcept nogil
+cdef int weakest_row(CircleColumns circles, Settings settings) noexcept nogil
+cdef void release(EdgeColumns edges, CircleColumns circles, bint rebel) noexcept nogil
+cdef int make_room(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil

@@ -19,7 +19,7 @@ cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept
 cpdef void derotate_circles(CircleColumns circles, Homography h, double roll) noexcept nogil
 cpdef void derotate_psi(PsiColumns psi, Homography h) noexcept nogil
 cpdef void derotate_predictions(EdgeColumns edges, Homography h) noexcept nogil
-cpdef bint tells_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
+cdef bint tells_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
 cpdef bint measure_off_line(OffLine off, EdgeColumns edges, CornerColumns corners, Pinhole pinhole, Settings settings) noexcept nogil
 cpdef void off_line(OffLine off, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Pinhole pinhole) noexcept nogil
 cpdef void missing_rotation(OffLine off, double prior_sigma_rad) noexcept nogil

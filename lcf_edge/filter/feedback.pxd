@@ -23,14 +23,14 @@ cdef class Candidates:
 cpdef void advance(PsiColumns psi, CircleColumns normal, Situation around) noexcept nogil
 cpdef void mark_ignored(Candidates candidates, PsiColumns psi) noexcept nogil
 @cython.locals(some=bint, trusted=bint)
-cpdef bint mark_ready(Candidates candidates, CircleColumns normal, Situation around, Settings settings) noexcept nogil
-cpdef void keep_watched(Candidates candidates, CircleColumns normal, EdgeColumns edges, KeyFrames keys) noexcept nogil
-cpdef int best_supported(Candidates candidates, CircleColumns normal) noexcept nogil
-cpdef int free_row(PsiColumns psi) noexcept nogil
-cpdef void write_region(PsiColumns psi, Py_ssize_t p, CircleColumns normal, Py_ssize_t c, double life_s, Ids ids) noexcept nogil
+cdef bint mark_ready(Candidates candidates, CircleColumns normal, Situation around, Settings settings) noexcept nogil
+cdef void keep_watched(Candidates candidates, CircleColumns normal, EdgeColumns edges, KeyFrames keys) noexcept nogil
+cdef int best_supported(Candidates candidates, CircleColumns normal) noexcept nogil
+cdef int free_row(PsiColumns psi) noexcept nogil
+cdef void write_region(PsiColumns psi, Py_ssize_t p, CircleColumns normal, Py_ssize_t c, double life_s, Ids ids) noexcept nogil
 cpdef int write(PsiColumns psi, CircleColumns normal, EdgeColumns edges, Candidates candidates, KeyFrames keys, Situation around, Settings settings, Ids ids) noexcept nogil
-cpdef bint is_near(PsiColumns psi, Py_ssize_t p, double x, double y, double reach_px) noexcept nogil
-cpdef void end_near(PsiColumns psi, double x, double y, double reach_px) noexcept nogil
+cdef bint is_near(PsiColumns psi, Py_ssize_t p, double x, double y, double reach_px) noexcept nogil
+cdef void end_near(PsiColumns psi, double x, double y, double reach_px) noexcept nogil
 @cython.locals(inside=bint)
-cpdef void end_aside(PsiColumns psi, Candidates candidates, ImagePlane plane) noexcept nogil
+cdef void end_aside(PsiColumns psi, Candidates candidates, ImagePlane plane) noexcept nogil
 cpdef void give_way(PsiColumns psi, Candidates candidates, EdgeColumns edges, CircleColumns rebel, ImagePlane plane) noexcept nogil

@@ -11,7 +11,7 @@ cdef class Homography:
 
 cpdef double wrap(double angle) noexcept nogil
 cpdef double line_distance(double dx, double dy, double cos, double sin) noexcept nogil
-cpdef double length(double dx, double dy) noexcept nogil
+cdef double length(double dx, double dy) noexcept nogil
 cpdef void set_homography(Homography h, Pinhole pinhole, const double[:, :, ::1] rotation, Py_ssize_t k) noexcept nogil
 cpdef double warp_x(Homography h, double x, double y) noexcept nogil
 cpdef double warp_y(Homography h, double x, double y) noexcept nogil

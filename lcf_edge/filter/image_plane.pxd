@@ -9,5 +9,5 @@ cdef class ImagePlane:
     cdef double fx, fy, cx, cy, k1, k2, k3, k4, p1, p2, reach
     cdef readonly double u, v
 
-cpdef void distort(ImagePlane plane, double x, double y) noexcept nogil
+cdef void distort(ImagePlane plane, double x, double y) noexcept nogil
 cpdef bint project(ImagePlane plane, double x, double y) noexcept nogil

@@ -11,18 +11,18 @@ cdef double NEW_SHARE
 cdef int SPARE_CORNERS
 cdef int CIRCLE_SHAPE
 
-cpdef bint holds(PsiColumns psi, Py_ssize_t p, double x, double y) noexcept nogil
+cdef bint holds(PsiColumns psi, Py_ssize_t p, double x, double y) noexcept nogil
 cpdef int psi_at(PsiColumns psi, double x, double y) noexcept nogil
-cpdef bint any_active(PsiColumns psi) noexcept nogil
+cdef bint any_active(PsiColumns psi) noexcept nogil
 @cython.locals(seen=bint, beside=bint)
 cpdef bint coincides(CornerIndex index, ImagePlane plane, CornerColumns corners, double x, double y, double reach_px) noexcept nogil
-cpdef void place_in_psi(PsiColumns psi, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double reach_px) noexcept nogil
+cdef void place_in_psi(PsiColumns psi, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double reach_px) noexcept nogil
 cpdef void end_surprised(PsiColumns psi) noexcept nogil
-cpdef void hold(EdgeColumns edges, PsiColumns psi, int key_number, double tr_s) noexcept nogil
+cdef void hold(EdgeColumns edges, PsiColumns psi, int key_number, double tr_s) noexcept nogil
 cpdef int omit(PsiColumns psi, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, int key_number, Settings settings) noexcept nogil
 @cython.locals(full=bint, k=Py_ssize_t)
-cpdef bint insert_group(GroupColumns groups, CircleColumns circles, Py_ssize_t c, int row) noexcept nogil
-cpdef void copy_group(GroupColumns groups, Py_ssize_t source, Py_ssize_t target) noexcept nogil
+cdef bint insert_group(GroupColumns groups, CircleColumns circles, Py_ssize_t c, int row) noexcept nogil
+cdef void copy_group(GroupColumns groups, Py_ssize_t source, Py_ssize_t target) noexcept nogil
 cpdef int collect(GroupColumns groups, CircleColumns normal, CircleColumns rebel, double tr_cr) noexcept nogil
 cpdef int group_at(GroupColumns groups, double x, double y) noexcept nogil
 cpdef int circle_at(GroupColumns groups, double x, double y) noexcept nogil

@@ -26,17 +26,17 @@ cdef class CornerIndex:
 cpdef void take_corners(CornerColumns corners, const int[:, ::1] pixel, const float[:, ::1] position, const unsigned long long[:, ::1] words) noexcept nogil
 cpdef int cell_of(CornerIndex index, int x, int y) noexcept nogil
 cpdef void fill(CornerIndex index, CornerColumns corners) noexcept nogil
-cpdef int first_cell(double middle, double gate) noexcept nogil
-cpdef int last_cell(double middle, double gate, int cells) noexcept nogil
+cdef int first_cell(double middle, double gate) noexcept nogil
+cdef int last_cell(double middle, double gate, int cells) noexcept nogil
 @cython.locals(total=int)
 cpdef double difference(EdgeColumns edges, Py_ssize_t i, CornerIndex index, Py_ssize_t place) noexcept nogil
 @cython.locals(total=int)
 cpdef double contrast(EdgeColumns edges, Py_ssize_t i) noexcept nogil
 cpdef double likeness_needed(double own_contrast, Settings settings) noexcept nogil
-cpdef void choose(CornerIndex index, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, double x, double y, double gate, double most) noexcept nogil
-cpdef double gate_px(EdgeColumns edges, Py_ssize_t i, double slack_px, bint wide, Settings settings) noexcept nogil
+cdef void choose(CornerIndex index, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, double x, double y, double gate, double most) noexcept nogil
+cdef double gate_px(EdgeColumns edges, Py_ssize_t i, double slack_px, bint wide, Settings settings) noexcept nogil
 @cython.locals(nothing_there=bint)
-cpdef int choose_all(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double slack_px, bint wide, Settings settings, bint again) noexcept nogil
-cpdef int take_mutual(EdgeColumns edges, CornerColumns corners) noexcept nogil
-cpdef int look(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double slack_px, bint wide, Settings settings) noexcept nogil
+cdef int choose_all(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double slack_px, bint wide, Settings settings, bint again) noexcept nogil
+cdef int take_mutual(EdgeColumns edges, CornerColumns corners) noexcept nogil
+cdef int look(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double slack_px, bint wide, Settings settings) noexcept nogil
 cpdef int find(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double slack_px, Settings settings) noexcept nogil

@@ -31,20 +31,20 @@ cdef class Flowing:
 
 cpdef void predict(CircleColumns circles, ImagePlane plane, Situation around) noexcept nogil
 cpdef bint passes_by(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
-cpdef void gather(Flowing flowing, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
-cpdef bint lies_inside(EdgeColumns edges, Py_ssize_t i, CircleColumns circles, Py_ssize_t c) noexcept nogil
-cpdef bint fits(Flowing flowing, Py_ssize_t j, EdgeColumns edges, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
-cpdef int nearest_open(Flowing flowing, EdgeColumns edges, Py_ssize_t i, CircleColumns circles) noexcept nogil
-cpdef void open_circles(Flowing flowing, CircleColumns circles, unsigned char[::1] ignored) noexcept nogil
-cpdef void involve(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef void average(Flowing flowing, Members members, EdgeColumns edges) noexcept nogil
-cpdef bint is_involved(Flowing flowing, Py_ssize_t c, Settings settings) noexcept nogil
-cpdef bint is_aligned(Flowing flowing, CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
-cpdef void compare(Flowing flowing, CircleColumns circles, unsigned char[::1] ignored, Settings settings) noexcept nogil
-cpdef void direct(CircleColumns circles, Situation around) noexcept nogil
-cpdef int cell_of(double x, double y, double expansion, Situation around, double size_px) noexcept nogil
-cpdef void sort_left(Flowing flowing, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
-cpdef int largest_cell(Flowing flowing, int support) noexcept nogil
-cpdef void average_cell(Flowing flowing, int cell, Members members, EdgeColumns edges, Py_ssize_t c) noexcept nogil
-cpdef int found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef void gather(Flowing flowing, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cdef bint lies_inside(EdgeColumns edges, Py_ssize_t i, CircleColumns circles, Py_ssize_t c) noexcept nogil
+cdef bint fits(Flowing flowing, Py_ssize_t j, EdgeColumns edges, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+cdef int nearest_open(Flowing flowing, EdgeColumns edges, Py_ssize_t i, CircleColumns circles) noexcept nogil
+cdef void open_circles(Flowing flowing, CircleColumns circles, unsigned char[::1] ignored) noexcept nogil
+cdef void involve(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef void average(Flowing flowing, Members members, EdgeColumns edges) noexcept nogil
+cdef bint is_involved(Flowing flowing, Py_ssize_t c, Settings settings) noexcept nogil
+cdef bint is_aligned(Flowing flowing, CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
+cdef void compare(Flowing flowing, CircleColumns circles, unsigned char[::1] ignored, Settings settings) noexcept nogil
+cdef void direct(CircleColumns circles, Situation around) noexcept nogil
+cdef int cell_of(double x, double y, double expansion, Situation around, double size_px) noexcept nogil
+cdef void sort_left(Flowing flowing, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cdef int largest_cell(Flowing flowing, int support) noexcept nogil
+cdef void average_cell(Flowing flowing, int cell, Members members, EdgeColumns edges, Py_ssize_t c) noexcept nogil
+cdef int found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
 cpdef int update(Flowing flowing, EdgeColumns edges, CircleColumns circles, unsigned char[::1] ignored, Situation around, Settings settings, Ids ids) noexcept nogil

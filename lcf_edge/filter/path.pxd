@@ -5,6 +5,6 @@ cdef double INFINITY
 cdef double MIN_CURVATURE
 cdef double MIN_SPEED_MPS
 
-cpdef double arc_radius_m(Situation around) noexcept nogil
+cdef double arc_radius_m(Situation around) noexcept nogil
 cpdef double miss(double right_m, double ahead_m, Situation around) noexcept nogil
 cpdef double way_to(double right_m, double ahead_m, Situation around) noexcept nogil

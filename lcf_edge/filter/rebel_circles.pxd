@@ -42,40 +42,40 @@ cdef class RebelGroups:
     cdef unsigned char[::1] odd, updated, missed
 
 cpdef void predict(CircleColumns circles, Situation around) noexcept nogil
-cpdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, double tr_s) noexcept nogil
+cdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, double tr_s) noexcept nogil
 cpdef void end_outside(CircleColumns circles, ImagePlane plane, Situation around, Settings settings) noexcept nogil
-cpdef int circle_at(CircleColumns circles, double x, double y, double tr_s) noexcept nogil
-cpdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) noexcept nogil
-cpdef double velocity_x(CircleColumns circles, Py_ssize_t c, double x, double horizon_s) noexcept nogil
-cpdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double horizon_s) noexcept nogil
+cdef int circle_at(CircleColumns circles, double x, double y, double tr_s) noexcept nogil
+cdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) noexcept nogil
+cdef double velocity_x(CircleColumns circles, Py_ssize_t c, double x, double horizon_s) noexcept nogil
+cdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double horizon_s) noexcept nogil
 cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
-cpdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
+cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
 cpdef int lowest_label(RebelGroups groups, int k) noexcept nogil
-cpdef void join(RebelGroups groups, int a, int b) noexcept nogil
+cdef void join(RebelGroups groups, int a, int b) noexcept nogil
 cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
-cpdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
+cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(few=bint)
-cpdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Settings settings) noexcept nogil
+cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Settings settings) noexcept nogil
 @cython.locals(inside=bint)
-cpdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
-cpdef void choose(RebelGroups groups, CircleColumns circles) noexcept nogil
-cpdef void involve(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
-cpdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
-cpdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef int largest_new(RebelGroups groups) noexcept nogil
-cpdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
-cpdef double standing_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
+cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
+cdef void choose(RebelGroups groups, CircleColumns circles) noexcept nogil
+cdef void involve(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef int largest_new(RebelGroups groups) noexcept nogil
+cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
+cdef double standing_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef double own_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
-cpdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil
+cdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil
 @cython.locals(stands=bint)
-cpdef void contact(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef double finite(double value) noexcept nogil
+cdef void contact(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef double finite(double value) noexcept nogil
 @cython.locals(beside=bint, crosses=bint)
-cpdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint stands, double aside_mps, Situation around) noexcept nogil
+cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint stands, double aside_mps, Situation around) noexcept nogil
 @cython.locals(across=bint)
-cpdef bint is_hidden(CircleColumns circles, Py_ssize_t c, double tr_s) noexcept nogil
+cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, double tr_s) noexcept nogil
 @cython.locals(waits=bint)
-cpdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

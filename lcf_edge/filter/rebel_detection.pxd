@@ -48,13 +48,13 @@ cpdef void measure_baselines(Baselines baselines, KeyFrames keys, Homography h, 
 cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines) noexcept nogil
 @cython.locals(drifts=bint)
 cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
-cpdef double ground_outward(double y, double lever, Situation around) noexcept nogil
-cpdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Baselines baselines, Settings settings) noexcept nogil
-cpdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
-cpdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
-cpdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around) noexcept nogil
-cpdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
+cdef double ground_outward(double y, double lever, Situation around) noexcept nogil
+cdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Baselines baselines, Settings settings) noexcept nogil
+cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
+cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
+cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around) noexcept nogil
+cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef void find_incoming(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines, Settings settings) noexcept nogil
-cpdef bint rates_agree(double old, double new, double slack) noexcept nogil
+cdef bint rates_agree(double old, double new, double slack) noexcept nogil
 cpdef void give_birth(EdgeColumns edges, Verdicts first, Py_ssize_t j, Verdicts second, Py_ssize_t k, double elapsed_s, Settings settings) noexcept nogil

@@ -22,9 +22,9 @@ def main(path: Path) -> None:
     """``path``: a pickle of the configuration, the lens, and what each step takes."""
     config, lens, frames = pickle.loads(path.read_bytes())
     tables = LineCircleFilter(config, lens)
-    print("uncompiled" if str(alpha.__file__).endswith(".py") else "compiled")
-    for corners, motion in frames:
-        print(digest(tables, tables.step(corners, motion)))
+    lines = ["uncompiled" if str(alpha.__file__).endswith(".py") else "compiled"]
+    lines += [digest(tables, tables.step(corners, motion)) for corners, motion in frames]
+    sys.stdout.write("\n".join(lines))
 
 
 if __name__ == "__main__":
