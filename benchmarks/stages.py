@@ -15,18 +15,16 @@ from lcf_edge.filter import LineCircleFilter
 from lcf_edge.lens import Lens
 
 STEPS = {
+    "_take": "0. corners taken, sorted by cells",
     "_derotate": "0. rotation out, circles and ψ predicted",
-    "_edge_expert.predict": "3. edges predicted",
-    "_line_expert.omit": "1. ψ omits, and looks in passing",
-    "groups.collect": "1. λ groups",
-    "_edge_expert.find": "2. corners found for edges",
+    "_predict": "1. edges predicted",
+    "_omit": "2. ψ omits, and looks in passing",
+    "_collect": "2. λ groups",
+    "_find": "3. corners found for edges",
     "_refine": "3. rotation that the gyro missed",
-    "_edge_expert.update": "3. edges classified and updated",
-    "_edge_expert.delete": "3. edges deleted",
-    "_edge_expert.add": "3. new edges",
-    "_edge_expert.join_rebels": "3. new edges inside rebel circles",
-    "_alpha.mark_key": "5. key frame",
-    "_alpha.detect": "5. α, rebels",
+    "_update": "4. edges classified, updated, deleted",
+    "_add": "4. new edges",
+    "_detect": "5. key frame, α, rebels",
     "_update_circles": "6. circles, 7. feedback",
 }
 _WARM_UP = 20
@@ -52,20 +50,16 @@ def measure(drive: Drive, config: Config) -> list[Stage]:
     return [Stage(name, median, median / total) for name, median in medians.items()]
 
 
-def _timed(filters: LineCircleFilter, path: str) -> list[float]:
-    """Let a method of the filter, or of one of its parts, note how long each call takes, µs."""
-    *owner, name = path.split(".")
-    part: Any = filters
-    for each in owner:
-        part = getattr(part, each)
-    method: Callable[..., Any] = getattr(part, name)
+def _timed(filters: LineCircleFilter, name: str) -> list[float]:
+    """Let a method of the filter note how long each call takes, µs."""
+    method: Callable[..., Any] = getattr(filters, name)
     times_us: list[float] = []
 
     def timed(*arguments: Any) -> Any:
         started = time.perf_counter_ns()
-        answer = method(*arguments)
+        result = method(*arguments)
         times_us.append((time.perf_counter_ns() - started) / 1000)
-        return answer
+        return result
 
-    setattr(part, name, timed)
+    setattr(filters, name, timed)
     return times_us

@@ -42,7 +42,7 @@ class CornerDetector:
         pixel += FAST_FROM_PX
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
         keep = np.arange(found)
-        if self._lens.bends:
+        if self._lens.is_distorted:
             keep = np.isfinite(position[:, 0]).nonzero()[0]
         evicted = max(0, len(keep) - self._capacity)
         if evicted:

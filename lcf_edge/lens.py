@@ -104,21 +104,21 @@ class Lens:
 
     def distort(self, points: Points) -> Points:
         """Positions of the ideal pinhole (same fx, fy, cx, cy) → of the input frame; float32 (n, 2), px."""
-        if not self.bends:
+        if not self.is_distorted:
             return points
         x, y = self._rays(points)
         s = x * x + y * y
-        p1, p2 = self._decentring
+        p1, p2 = self.decentring
         ray = self._ray(np.sqrt(s))
-        gain = _poly(self._radial, ray * ray) + 2 * (p2 * x + p1 * y)
+        gain = _poly(self.radial, ray * ray) + 2 * (p2 * x + p1 * y)
         if self.model == "equidistant":
             gain *= ray / np.sqrt(np.maximum(s, 1e-18))  # θ/r; the middle stays where it is
-        gain[ray > self._reach] = np.nan
+        gain[ray > self.reach] = np.nan
         return self._pixels(x * gain + p2 * s, y * gain + p1 * s)
 
     def distort_xy(self, x: Any, y: Any) -> tuple[Any, Any]:
         """``distort`` of positions given as two arrays, float32 (n,) px each."""
-        if not self.bends:
+        if not self.is_distorted:
             return x, y
         placed = self.distort(np.stack((x, y), axis=1))
         return placed[:, 0], placed[:, 1]
@@ -129,14 +129,14 @@ class Lens:
         The inverse of ``distort``: its radial part by a table, polished by Newton steps where the model has
         decentring.
         """
-        if not self.bends:
+        if not self.is_distorted:
             return points
         xd, yd = self._rays(points)
         radius = np.sqrt(xd * xd + yd * yd)
         bent, gains = self._inverse
         gain = np.interp(radius, bent, gains, right=np.nan)
         x, y = xd * gain, yd * gain
-        if any(self._decentring):
+        if any(self.decentring):
             x, y = self._polish(x, y, xd, yd)
         return self._pixels(x, y)
 
@@ -145,7 +145,7 @@ class Lens:
 
         ``x``, ``y``: (n,) integers. The table takes 8 bytes a pixel (2.5 MB at 640×480).
         """
-        if not self.bends:
+        if not self.is_distorted:
             return np.stack((x, y), axis=1).astype(np.float32)
         return self._table.take(y.astype(np.intp) * self.width + x, axis=0)
 
@@ -158,7 +158,7 @@ class Lens:
         return np.arctan(right), np.arctan2(-down, np.sqrt(1 + right * right))
 
     @cached_property
-    def bends(self) -> bool:
+    def is_distorted(self) -> bool:
         """Whether positions differ from those of the pinhole at all."""
         return self.model == "equidistant" or any(self.coefficients)
 
@@ -168,22 +168,22 @@ class Lens:
         return np.array([[self.fx, 0.0, self.cx], [0.0, self.fy, self.cy], [0.0, 0.0, 1.0]])
 
     @cached_property
-    def _radial(self) -> tuple[float, ...]:
+    def radial(self) -> tuple[float, ...]:
         """Coefficients 1, k1, k2, … of the radial polynomial's gain."""
         decentring = slice(2, 4) if self.model == "radial-tangential" else slice(0, 0)
         return (1.0, *np.delete(self.coefficients, decentring).tolist())
 
     @cached_property
-    def _decentring(self) -> tuple[float, float]:
+    def decentring(self) -> tuple[float, float]:
         """p1, p2."""
         if self.model != "radial-tangential":
             return 0.0, 0.0
         return self.coefficients[2], self.coefficients[3]
 
     @cached_property
-    def _reach(self) -> float:
+    def reach(self) -> float:
         """Largest r (radial-tangential) or θ (equidistant) that the model maps usefully."""
-        slope = [(2 * i + 1) * k for i, k in enumerate(self._radial)]  # of ρ, as a polynomial of r² or θ²
+        slope = [(2 * i + 1) * k for i, k in enumerate(self.radial)]  # of ρ, as a polynomial of r² or θ²
         slope[0] -= _SMALLEST_SLOPE
         slope = [k if abs(k) >= _SMALLEST_COEFFICIENT else 0.0 for k in slope]
         roots = np.roots(slope[::-1])
@@ -194,10 +194,10 @@ class Lens:
     def _inverse(self) -> tuple[_Floats, _Floats]:
         """Distorted radius, ascending, and what it must be multiplied with to become r."""
         equidistant = self.model == "equidistant"
-        angles = np.linspace(1e-6, self._reach if equidistant else np.arctan(self._reach), _NODES)
+        angles = np.linspace(1e-6, self.reach if equidistant else np.arctan(self.reach), _NODES)
         r = np.tan(angles)
         ray = angles if equidistant else r
-        bent = ray * _poly(self._radial, ray * ray)
+        bent = ray * _poly(self.radial, ray * ray)
         return bent, r / bent
 
     @cached_property
@@ -216,11 +216,11 @@ class Lens:
 
     def _polish(self, x: _Floats, y: _Floats, xd: _Floats, yd: _Floats) -> tuple[_Floats, _Floats]:
         """Newton's method on the radial-tangential model, whose Jacobian is symmetric; NaN where it fails."""
-        p1, p2 = self._decentring
-        slopes = tuple(2 * i * k for i, k in enumerate(self._radial))[1:]
+        p1, p2 = self.decentring
+        slopes = tuple(2 * i * k for i, k in enumerate(self.radial))[1:]
         for _ in range(_NEWTON_STEPS):
             s = x * x + y * y
-            gain = _poly(self._radial, s) + 2 * (p2 * x + p1 * y)
+            gain = _poly(self.radial, s) + 2 * (p2 * x + p1 * y)
             ex, ey = x * gain + p2 * s - xd, y * gain + p1 * s - yd
             slope = _poly(slopes, s)
             xx = gain + x * x * slope + 4 * p2 * x
@@ -228,7 +228,7 @@ class Lens:
             yy = gain + y * y * slope + 4 * p1 * y
             determinant = xx * yy - xy * xy
             x, y = x - (yy * ex - xy * ey) / determinant, y - (xx * ey - xy * ex) / determinant
-        x[(np.abs(ex) + np.abs(ey) > _TOLERANCE) | (s > self._reach**2)] = np.nan
+        x[(np.abs(ex) + np.abs(ey) > _TOLERANCE) | (s > self.reach**2)] = np.nan
         return x, y
 
     def _rays(self, points: Points) -> tuple[_Floats, _Floats]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import numpy.typing as npt
 
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
@@ -63,7 +64,7 @@ class Pipeline:
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each table that is allocated once and kept."""
-        lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.bends else {}
+        lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.is_distorted else {}
         return {**self.filter.table_bytes(), **lens}
 
     @property
@@ -155,7 +156,7 @@ class Pipeline:
         """
         rows = wanted.nonzero()[0]
         x, y = self._lens.distort_xy(table.x[rows], table.y[rows])
-        if self._lens.bends:
+        if self._lens.is_distorted:
             seen = np.isfinite(x)
             rows, x, y = rows[seen], x[seen], y[seen]
         across, down = self._lens.width - 1, self._lens.height - 1
@@ -166,18 +167,24 @@ class Pipeline:
         corners, omitted = self._seen
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
-        place = self._lens.distort(np.stack([edges.x[:n], edges.y[:n]], axis=1))
-        centres = self._lens.distort(np.stack([groups.x, groups.y], axis=1))
+        place = self._lens.distort(_points(edges.x[:n], edges.y[:n]))
+        g = groups.count
+        centres = self._lens.distort(_points(groups.x[:g], groups.y[:g]))
         focus = self._lens.distort(np.array([self.filter.focus], np.float32))[0]
         return View(
             corners=corners.pixel.astype(np.float32),
             omitted=omitted,
             edges=place[~rebel],
             rebels=place[rebel],
-            groups=np.concatenate([centres, groups.bs[:, None]], axis=1),
+            groups=np.concatenate([centres, _points(groups.bs[:g])], axis=1),
             edge_group=groups.assign(edges.x[:n][~rebel], edges.y[:n][~rebel]).astype(np.intp),
             focus=focus,
         )
+
+
+def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:
+    """Coordinates, (n,) each, side by side."""
+    return np.stack(coordinates, axis=1).astype(np.float32)
 
 
 def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome]]:

@@ -1,11 +1,17 @@
-"""The Line-Circle filter (Tafrishi & Kandjani 2017): pure, bounded, whole-array.
+"""The Line-Circle filter (Tafrishi & Kandjani 2017): pure, bounded, one edge at a time.
 
-One step, in reading order (``line_circle_filter`` calls them in this order):
+Modules with a ``.pxd`` beside them are compiled; uncompiled they give the same bytes (``docs/filter.md``). One step,
+in reading order (``line_circle_filter`` calls them in this order):
 
 ``inputs``           what a step takes: the frame's corners and the vehicle's motion since the last frame
 ``tables``           what is kept between steps: edges (E_n, E_r, α), circles (C_n, C_r), ψ; preallocated
-``flow``             directions, flow lines, homographies, key frames
+``columns``          the same, as the loops see them; ``edge_rows`` moves whole rows, ``memory`` makes room
+``settings``         the configuration's constants, as the loops take them
+``flow``             directions, flow lines, the ideal camera, rotations as homographies
+``key_frames``       how the vehicle has turned and moved since each key frame
 ``situation``        the vehicle at this instant: where it heads in the picture, what it is, how it moves
+``path``             its path over the ground: how far beside it something lies, and how long the way to it is
+``image_plane``      where a position of the ideal pinhole is seen through the lens
 ``derotation``       step 0: the camera's rotation is taken out of all that is stored
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one

@@ -1,119 +1,119 @@
-"""What normal and rebel circles share: newborn trust, identities, places in the table, the blend of two circles."""
+"""What normal and rebel circles share: identities, rows in the table, members, the blend of two circles."""
 
-from typing import Any
+import math
 
-import numpy as np
-import numpy.typing as npt
-
-from lcf_edge.config import Filter
-from lcf_edge.filter.edge_equations import update_position
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Rows
+from lcf_edge.filter import edge_equations
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.memory import doubles, integers
+from lcf_edge.filter.settings import Settings
 
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members
-RADIUS_LEAST_PX = 6.0
+MIN_RADIUS_PX = 6.0
 EXTENT_SIGMAS = 3.6  # full width of the members, in standard deviations
-
-
-def newborn_trust(settings: Filter) -> float:
-    """Tr of everything new: ½(Tr_cr + Tr_s)."""
-    return 0.5 * (settings.tr_cr + settings.tr_s)
+LAST_ID = 0xFFFFFFFF
+INFINITY = float("inf")
+NAN = float("nan")
 
 
 class Ids:
-    """Identities for newborn circles: never 0, as good as never twice."""
+    """Identities for newborn circles: never 0, and none again before 4 billion others."""
 
     def __init__(self) -> None:
-        self._next = 1
-
-    def take(self, number: int) -> npt.NDArray[np.uint32]:
-        """The next ``number`` identities."""
-        ids = (np.arange(self._next, self._next + number) - 1) % 0xFFFFFFFF + 1
-        self._next = (self._next + number - 1) % 0xFFFFFFFF + 1
-        return ids.astype(np.uint32)
+        self.next = 1
 
 
-def release(edges: EdgeTable, circles: CircleTable, rebel: bool) -> None:
-    """Edges forget circles that are no more."""
-    n = edges.count
-    circle = edges.circle[:n]
-    gone = (circle >= 0) & (edges.rebel[:n] == rebel) & ~circles.active.take(circle, mode="clip")
-    circle[gone] = NO_CIRCLE
-
-
-def claim(edges: EdgeTable, circles: CircleTable, number: int, settings: Filter, rebel: bool) -> tuple[Rows, int]:
-    """Rows for newborn circles: free ones first, then those of circles trusted less than a newborn.
-
-    Answers the rows (perhaps fewer than asked) and how many circles, old or new, found no place.
-    """
-    rows = free = (~circles.active).nonzero()[0][:number]
-    if number > len(free):
-        weak = (circles.active & (circles.trust < newborn_trust(settings))).nonzero()[0]
-        weak = weak[np.argsort(circles.trust[weak], kind="stable")][: number - len(free)]
-        circles.active[weak] = False
-        release(edges, circles, rebel)
-        rows = np.concatenate([free, weak])
-    circles.active[rows] = True
-    return rows, number - len(free)
+def new_id(ids: Ids) -> int:
+    """The next identity."""
+    number = ids.next
+    ids.next = number % LAST_ID + 1
+    return number
 
 
 class Members:
-    """Edges gathered into groups, and what a circle takes from them.
+    """Edges gathered into groups, and what a circle takes from them; a row a group.
 
-    ``label``: int (k,), group of each edge, 0 to ``groups`` - 1; a group may be empty. ``x``, ``y``: px.
-    Per group, float32 (groups,): ``size``, ``centre_x``, ``centre_y``, ``spread`` (mean squared distance, px²),
-    ``width``, ``height`` (extent, px).
+    ``size``: edges. Means over them, px: ``x``, ``y``; px²: ``variance_x``, ``variance_y`` about the former.
     """
 
-    def __init__(self, label: Rows, groups: int, x: Floats, y: Floats) -> None:
-        self.label = label
-        self._groups = groups
-        self.size = np.bincount(label, minlength=groups)
-        self._safe = np.maximum(self.size, 1).astype(np.float32)
-        self.centre_x, self.centre_y = self.mean(x), self.mean(y)
-        off_x, off_y = x - self.centre_x.take(label), y - self.centre_y.take(label)
-        variance_x, variance_y = self.mean(off_x * off_x), self.mean(off_y * off_y)
-        self.spread = variance_x + variance_y
-        self.width = np.float32(EXTENT_SIGMAS) * np.sqrt(variance_x)
-        self.height = np.float32(EXTENT_SIGMAS) * np.sqrt(variance_y)
-
-    def mean(self, values: npt.NDArray[Any]) -> Floats:
-        """Mean of a value of the edges, (k,), over each group; 0 for an empty one."""
-        return (np.bincount(self.label, values, minlength=self._groups) / self._safe).astype(np.float32)
-
-    def radius(self, most_px: float) -> Floats:
-        """R that holds most of each group, px."""
-        reach = np.float32(RADIUS_SIGMAS) * np.sqrt(self.spread)
-        return np.asarray(np.minimum(np.maximum(reach, np.float32(RADIUS_LEAST_PX)), np.float32(most_px)))
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self.size = integers(capacity)
+        self.x, self.y, self.variance_x, self.variance_y = (doubles(capacity) for _ in range(4))
 
 
-def blend(circles: CircleTable, rows: Rows, members: Members, groups: Rows, settings: Filter) -> None:
-    """The circle predicted and the circle that its edges show, weighed by trust (as eq. EnEstimation).
-
-    ``rows``: of the table; ``groups``: the group of members of each.
-    """
-    trust = circles.trust[rows]
-    for column, seen in (
-        (circles.x, members.centre_x),
-        (circles.y, members.centre_y),
-        (circles.radius, members.radius(settings.bs_px)),
-    ):
-        column[rows] = update_position(trust, settings.tr_cr, column[rows], seen[groups])
-    describe(circles, rows, members, groups)
+def clear(members: Members, g: int) -> None:
+    """A group without edges."""
+    members.size[g] = 0
+    members.x[g] = members.y[g] = members.variance_x[g] = members.variance_y[g] = 0.0
 
 
-def describe(circles: CircleTable, rows: Rows, members: Members, groups: Rows) -> None:
-    """Support and extent of circles, from their members."""
-    circles.support[rows] = members.size[groups]
-    circles.width[rows], circles.height[rows] = members.width[groups], members.height[groups]
+def radius_of(members: Members, g: int, most_px: float) -> float:
+    """R that holds most of a group, px."""
+    reach = RADIUS_SIGMAS * math.sqrt(members.variance_x[g] + members.variance_y[g])
+    return min(max(reach, MIN_RADIUS_PX), most_px)
 
 
-def give_birth(circles: CircleTable, rows: Rows, members: Members, groups: Rows, settings: Filter, ids: Ids) -> None:
-    """Newborn circles from their members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
-    circles.x[rows], circles.y[rows] = members.centre_x[groups], members.centre_y[groups]
-    circles.radius[rows] = members.radius(settings.bs_px)[groups]
-    describe(circles, rows, members, groups)
-    circles.trust[rows] = newborn_trust(settings)
-    circles.id[rows] = ids.take(len(rows))
-    circles.corr[rows] = 1
-    circles.cause[rows] = 0
-    circles.ttc[rows], circles.range[rows], circles.lateral[rows] = np.inf, np.nan, np.nan
+def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings) -> None:
+    """The circle predicted and the circle that its edges show, weighed by trust (as eq. EnEstimation)."""
+    trust, tr_cr = circles.trust[c], settings.tr_cr
+    radius = radius_of(members, g, settings.bs_px)
+    circles.x[c] = edge_equations.update_position(trust, tr_cr, circles.x[c], members.x[g])
+    circles.y[c] = edge_equations.update_position(trust, tr_cr, circles.y[c], members.y[g])
+    circles.radius[c] = edge_equations.update_position(trust, tr_cr, circles.radius[c], radius)
+    describe(circles, c, members, g)
+
+
+def describe(circles: CircleColumns, c: int, members: Members, g: int) -> None:
+    """Support and extent of a circle, from its members."""
+    circles.support[c] = members.size[g]
+    circles.width[c] = EXTENT_SIGMAS * math.sqrt(members.variance_x[g])
+    circles.height[c] = EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
+
+
+def give_birth(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings, ids: Ids) -> None:
+    """A newborn circle from its members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
+    circles.active[c] = 1
+    circles.x[c], circles.y[c] = members.x[g], members.y[g]
+    circles.radius[c] = radius_of(members, g, settings.bs_px)
+    describe(circles, c, members, g)
+    circles.trust[c] = settings.tr_new
+    circles.id[c] = new_id(ids)
+    circles.corr[c] = 1.0
+    circles.cause[c] = 0
+    circles.ttc[c], circles.range[c], circles.lateral[c] = INFINITY, NAN, NAN
+
+
+def free_row(circles: CircleColumns) -> int:
+    """The first row that is not in use, -1: none."""
+    for c in range(circles.capacity):
+        if not circles.active[c]:
+            return c
+    return -1
+
+
+def weakest_row(circles: CircleColumns, settings: Settings) -> int:
+    """Row of the circle with the least trust, if that is less than a newborn's; -1: none."""
+    weakest = -1
+    for c in range(circles.capacity):
+        if not circles.active[c] or circles.trust[c] >= settings.tr_new:
+            continue
+        if weakest < 0 or circles.trust[c] < circles.trust[weakest]:
+            weakest = c
+    return weakest
+
+
+def release(edges: EdgeColumns, circles: CircleColumns, rebel: bool) -> None:
+    """Edges forget circles that are no more. ``rebel``: of C_r, else of C_n."""
+    for i in range(edges.count):
+        c = edges.circle[i]
+        if c >= 0 and (edges.rebel[i] != 0) == rebel and not circles.active[c]:
+            edges.circle[i] = -1
+
+
+def make_room(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings: Settings) -> int:
+    """End the circle that is trusted least, if less than a newborn is; return its row, -1: there is none."""
+    c = weakest_row(circles, settings)
+    if c >= 0:
+        circles.active[c] = 0
+        release(edges, circles, rebel)
+    return c

@@ -2,73 +2,138 @@
 
 import math
 
-import numpy as np
-
-from lcf_edge.filter.flow import Matrix, Pinhole, carry
-from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, PsiTable
+from lcf_edge.filter import flow
+from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, PsiColumns
+from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.memory import doubles
+from lcf_edge.filter.settings import Settings
 
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
-LEAST_EDGES = 25  # that a correction of the rotation needs
-MOST_EDGES = 200  # and that are enough
-_ROUNDS = 2
+MIN_EDGES = 25  # that a correction of the rotation needs
+MAX_EDGES = 200  # and that are enough
+ROUNDS = 2
 
 
-def derotate(
-    pinhole: Pinhole,
-    rotation: Matrix,
-    edges: EdgeTable,
-    circles: tuple[CircleTable, CircleTable],
-    psi: PsiTable,
-) -> None:
-    """H = K·R·K⁻¹ on every stored image position; own directions turn with the picture."""
-    h = pinhole.homography(rotation)
-    n = edges.count
-    roll = np.float32(math.atan2(rotation[1, 0], rotation[0, 0]))
-    turned = edges.own_way().nonzero()[0]
-    origin_x, origin_y = edges.origin_x.take(turned), edges.origin_y.take(turned)
-    places = [(edges.x[:n], edges.y[:n]), (origin_x, origin_y)]
-    places += [(table.x, table.y) for table in (*circles, psi)]
-    x, y = carry(h, np.concatenate([x for x, _ in places]), np.concatenate([y for _, y in places]))
-    start = 0
-    for to_x, to_y in places:
-        stop = start + len(to_x)
-        to_x[:], to_y[:] = x[start:stop], y[start:stop]
-        start = stop
-    edges.origin_x[turned], edges.origin_y[turned] = origin_x, origin_y
-    edges.beta[turned] += roll
-    for table in circles:
-        table.beta += roll
+def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
+    """H = K·R·K⁻¹ on every stored place of the edges; own directions turn with the picture. ``roll``: rad."""
+    for i in range(edges.count):
+        x, y = edges.x[i], edges.y[i]
+        edges.x[i], edges.y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+        if edges.own_way(i):
+            x, y = edges.origin_x[i], edges.origin_y[i]
+            edges.origin_x[i], edges.origin_y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+            edges.beta[i] += roll
 
 
-def missing_rotation(
-    pinhole: Pinhole, x: Floats, y: Floats, off_px: Floats, cos: Floats, sin: Floats, prior_sigma_rad: float
-) -> tuple[Matrix, float]:
-    """The small rotation that puts edges back on their flow lines; and what stays uncertain of it, rad.
+def derotate_circles(circles: CircleColumns, h: Homography, roll: float) -> None:
+    """H = K·R·K⁻¹ on the centres of circles; their directions turn with the picture."""
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            x, y = circles.x[c], circles.y[c]
+            circles.x[c], circles.y[c] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+            circles.beta[c] += roll
 
-    ``x``, ``y``: corners, float32 (n,) px. ``off_px``: their distances from the flow lines (``line_distance``), which
-    do not depend on depth. ``cos``, ``sin``: of β. Least squares, robust against what moves, with the
-    gyro's uncertainty as prior. Answers a first-order rotation (3, 3), as in ``Motion.rotation``.
+
+def derotate_psi(psi: PsiColumns, h: Homography) -> None:
+    """H = K·R·K⁻¹ on the centres of ψ."""
+    for p in range(psi.capacity):
+        if psi.active[p]:
+            x, y = psi.x[p], psi.y[p]
+            psi.x[p], psi.y[p] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+
+
+def derotate_predictions(edges: EdgeColumns, h: Homography) -> None:
+    """H = K·R·K⁻¹ on L'."""
+    for i in range(edges.count):
+        x, y = edges.predicted_x[i], edges.predicted_y[i]
+        edges.predicted_x[i], edges.predicted_y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+
+
+class OffLine:
+    """Edges that tell about the rotation, a row each, at most ``MAX_EDGES``.
+
+    ``pitch``, ``yaw``, ``roll``: px across the flow line for 1 rad about x, y and z; ``px``: distance from it. The
+    answer: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad.
     """
-    focal = np.float32(pinhole.focal)
-    u = (x - np.float32(pinhole.cx)) * np.float32(1 / pinhole.fx)
-    v = (y - np.float32(pinhole.cy)) * np.float32(1 / pinhole.fy)
-    uv = u * v
-    # px across the line for a rotation of 1 rad about x, y and z
-    across = np.empty((3, len(x)), np.float32)
-    across[0] = sin * uv - cos * (1 + v * v)
-    across[1] = cos * uv - sin * (1 + u * u)
-    across[2] = sin * v + cos * u
-    across *= focal
-    prior = np.eye(3) * (CORNER_SIGMA_PX / prior_sigma_rad) ** 2
-    turn = np.zeros(3)
-    information = prior
-    for _ in range(_ROUNDS):
-        rest = off_px - turn.astype(np.float32) @ across
-        rest *= np.float32(0.5 / CORNER_SIGMA_PX)
-        outlying = 1 + rest * rest
-        weighted = across / (outlying * outlying)
-        information = (weighted @ across.T).astype(np.float64) + prior
-        turn = np.linalg.solve(information, (weighted @ off_px).astype(np.float64))
-    a, b, c = turn
-    sigma = CORNER_SIGMA_PX * math.sqrt(np.diag(np.linalg.inv(information))[:2].max())  # of pitch and yaw
-    return np.array([[1, -c, b], [c, 1, -a], [-b, a, 1]]), sigma
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.pitch, self.yaw, self.roll, self.px = (doubles(MAX_EDGES) for _ in range(4))
+        self.turn_x = self.turn_y = self.turn_z = self.sigma = 0.0
+
+
+def tells_rotation(edges: EdgeColumns, i: int, tr_s: float) -> bool:
+    """Whether the distance of an edge from its flow line tells about the rotation: trusted, normal, found."""
+    return edges.corner[i] >= 0 and edges.trust[i] >= tr_s and not edges.own_way(i)
+
+
+def measure_off_line(
+    off: OffLine, edges: EdgeColumns, corners: CornerColumns, pinhole: Pinhole, settings: Settings
+) -> bool:
+    """How far trusted normal edges were found from their flow lines, which does not depend on depth.
+
+    Return whether there are enough of them.
+    """
+    off.count = 0
+    telling = 0
+    for i in range(edges.count):
+        if tells_rotation(edges, i, settings.tr_s):
+            telling += 1
+    if telling < MIN_EDGES:
+        return False
+    stride = 1 + telling // MAX_EDGES
+    telling = 0
+    for i in range(edges.count):
+        if tells_rotation(edges, i, settings.tr_s):
+            if telling % stride == 0:
+                off_line(off, edges, i, corners, pinhole)
+            telling += 1
+    return True
+
+
+def off_line(off: OffLine, edges: EdgeColumns, i: int, corners: CornerColumns, pinhole: Pinhole) -> None:
+    """Note one edge: its distance from the flow line, and what a small rotation would make of it, px a rad."""
+    k, corner = off.count, edges.corner[i]
+    x, y, cos, sin = corners.x[corner], corners.y[corner], edges.cos[i], edges.sin[i]
+    u, v = (x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy
+    off.pitch[k] = pinhole.focal * (sin * u * v - cos * (1 + v * v))
+    off.yaw[k] = pinhole.focal * (cos * u * v - sin * (1 + u * u))
+    off.roll[k] = pinhole.focal * (sin * v + cos * u)
+    off.px[k] = flow.line_distance(x - edges.predicted_x[i], y - edges.predicted_y[i], cos, sin)
+    off.count += 1
+
+
+def missing_rotation(off: OffLine, prior_sigma_rad: float) -> None:
+    """The small rotation that puts edges back on their flow lines, and what stays uncertain of it.
+
+    Least squares, robust against what moves, with the gyro's uncertainty as prior: (Σ w·aᵀa + prior)·turn = Σ w·a·px,
+    a = (pitch, yaw, roll) of an edge, w = 1/(1 + (rest/2σ)²)².
+    """
+    prior = CORNER_SIGMA_PX / prior_sigma_rad
+    prior = prior * prior
+    off.turn_x = off.turn_y = off.turn_z = 0.0
+    for _ in range(ROUNDS):
+        xx = yy = zz = prior
+        xy = xz = yz = x = y = z = 0.0
+        for k in range(off.count):
+            a, b, c, px = off.pitch[k], off.yaw[k], off.roll[k], off.px[k]
+            rest = (px - (off.turn_x * a + off.turn_y * b + off.turn_z * c)) * (0.5 / CORNER_SIGMA_PX)
+            outlying = 1 + rest * rest
+            weight = 1 / (outlying * outlying)
+            xx += weight * a * a
+            xy += weight * a * b
+            xz += weight * a * c
+            yy += weight * b * b
+            yz += weight * b * c
+            zz += weight * c * c
+            x += weight * a * px
+            y += weight * b * px
+            z += weight * c * px
+        # by the adjugate of the symmetric matrix
+        ix, iy, iz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
+        jy, jz, kz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
+        determinant = xx * ix + xy * iy + xz * iz
+        off.turn_x = (ix * x + iy * y + iz * z) / determinant
+        off.turn_y = (iy * x + jy * y + jz * z) / determinant
+        off.turn_z = (iz * x + jz * y + kz * z) / determinant
+        off.sigma = CORNER_SIGMA_PX * math.sqrt(max(ix, jy) / determinant)  # of pitch and yaw

@@ -1,92 +1,191 @@
 """Feedback: circles that are fully trusted become ψ, and ψ gives way to whatever breaks the flow."""
 
-import numpy as np
+import math
 
-from lcf_edge.config import Filter
+from lcf_edge.filter import alpha, circles, flow, image_plane, normal_circles
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.matching import Matcher
-from lcf_edge.filter.tables import CircleTable, EdgeTable, Mask, PsiTable
-from lcf_edge.records import Shape
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns, PsiColumns
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import integers, octets
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
 
+PI = 3.141592653589793
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
-PSI_LEAST_FRAMES = 3.5
+MIN_PSI_FRAMES = 3.5
 MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
+CIRCLE_MARGIN_PX = 24.0  # and between ψ and a rebel circle
+CIRCLE_SHAPE = 1  # Ty
+RECTANGLE_SHAPE = 2
 
 
-class Feedback:
-    """Writes, moves and ends ψ regions."""
+class Candidates:
+    """Normal circles, a row each.
 
-    def __init__(self, settings: Filter, matcher: Matcher) -> None:
-        self._settings = settings
-        self._matcher = matcher
-        self._ids = Ids()
+    ``ignored``: under an active ψ. ``passing``: the vehicle passes it at a distance. ``ready``: may write ψ.
+    ``members``: its edges; ``watched``: those with a history that tells what moves.
+    """
 
-    def ignored(self, psi: PsiTable, circles: CircleTable) -> Mask:
-        """Normal circles under an active ψ; bool (capacity,)."""
-        under = np.zeros(circles.capacity, np.bool_)
-        under[psi.circle[psi.active & (psi.circle >= 0)]] = True
-        return under
+    def __init__(self, capacity: int) -> None:
+        self.ignored, self.passing, self.ready = (octets(capacity) for _ in range(3))
+        self.members, self.watched = (integers(capacity) for _ in range(2))
 
-    def ready(self, psi: PsiTable, circles: CircleTable) -> Mask:
-        """Normal circles at Tr_max that have no ψ; bool (capacity,)."""
-        return circles.active & (circles.trust >= self._settings.tr_max) & ~self.ignored(psi, circles)
 
-    def write(self, psi: PsiTable, circles: CircleTable, ready: Mask, dt_s: float) -> int:
-        """Normal circles write ψ, their trust falls back to Tr_s; answers evictions.
+def advance(psi: PsiColumns, normal: CircleColumns, around: Situation) -> None:
+    """ψ moves with its circle's prediction and grows with it; it expires, and ends with its circle."""
+    for p in range(psi.capacity):
+        if not psi.active[p]:
+            continue
+        psi.life_s[p] -= around.dt_s
+        if psi.life_s[p] <= 0 or psi.circle[p] < 0 or not normal.active[psi.circle[p]]:
+            psi.active[p] = 0
+        growth = psi.expansion[p] * around.dt_s
+        psi.x[p] += (psi.x[p] - around.focus_x) * growth
+        psi.y[p] += (psi.y[p] - around.focus_y) * growth
+        psi.width[p] *= 1 + growth
+        psi.height[p] *= 1 + growth
 
-        ``ready``: bool (capacity,), those at Tr_max that may be ignored.
-        """
-        settings = self._settings
-        rows = np.flatnonzero(ready)
-        places = np.flatnonzero(~psi.active)[: len(rows)]
-        evicted = len(rows) - len(places)
-        rows = rows[np.argsort(-circles.support[rows], kind="stable")][: len(places)]
-        width, height = circles.width[rows], circles.height[rows]
-        diameter = 2 * circles.radius[rows]
-        rectangle = width * height < RECTANGLE_FITS * np.pi / 4 * diameter * diameter
-        psi.active[places] = True
-        psi.shape[places] = np.where(rectangle, Shape.RECTANGLE, Shape.CIRCLE)
-        psi.x[places], psi.y[places] = circles.x[rows], circles.y[rows]
-        psi.width[places] = np.where(rectangle, width, diameter)
-        psi.height[places] = np.where(rectangle, height, diameter)
-        psi.trust[places] = circles.trust[rows]
-        psi.expansion[places] = circles.expansion[rows]
-        psi.life_s[places] = max(settings.psi_life_s, PSI_LEAST_FRAMES * dt_s)
-        psi.circle[places] = rows
-        psi.id[places] = self._ids.take(len(places))
-        circles.trust[rows] = settings.tr_s
-        return evicted
 
-    def advance(self, psi: PsiTable, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
-        """ψ moves with its circle's prediction and grows with it, and expires."""
-        psi.life_s -= np.float32(dt_s)
-        orphan = ~circles.active[np.maximum(psi.circle, 0)] | (psi.circle < 0)
-        psi.active &= (psi.life_s > 0) & ~orphan
-        growth = psi.expansion * np.float32(dt_s)
-        psi.x += (psi.x - np.float32(focus[0])) * growth
-        psi.y += (psi.y - np.float32(focus[1])) * growth
-        psi.width *= 1 + growth
-        psi.height *= 1 + growth
+def mark_ignored(candidates: Candidates, psi: PsiColumns) -> None:
+    """Normal circles under an active ψ."""
+    for c in range(candidates.ignored.shape[0]):
+        candidates.ignored[c] = 0
+    for p in range(psi.capacity):
+        if psi.active[p] and psi.circle[p] >= 0:
+            candidates.ignored[psi.circle[p]] = 1
 
-    def give_way(self, psi: PsiTable, passing: Mask, edges: EdgeTable, rebel: CircleTable) -> None:
-        """End the ψ regions that come near a rebel edge, a chain of α, a rebel circle or the sides of the frame.
 
-        At the sides appears what nobody has seen yet. ``passing``: bool (circles,), normal circles that the vehicle
-        still passes at a distance: in a turn, what was beside the path may come to lie on it.
-        """
-        if not psi.active.any():
-            return
-        psi.active &= passing.take(psi.circle, mode="clip")
-        reach = psi.width / 2 + np.float32(MARGIN_PX)
-        psi.active &= self._matcher.in_frame(psi.x - reach, psi.y) & self._matcher.in_frame(psi.x + reach, psi.y)
-        n = edges.count
-        breaking = edges.rebel[:n] | (edges.links[:n] > 0)
-        x = np.concatenate([edges.x[:n][breaking], rebel.x[rebel.active]])
-        y = np.concatenate([edges.y[:n][breaking], rebel.y[rebel.active]])
-        edge_reach = np.full(np.count_nonzero(breaking), np.float32(MARGIN_PX))
-        reach = np.concatenate([edge_reach, rebel.radius[rebel.active] + np.float32(2 * MARGIN_PX)])
-        dx, dy = np.abs(x[:, None] - psi.x), np.abs(y[:, None] - psi.y)
-        from_circle = np.hypot(dx, dy) - psi.width / 2
-        from_rectangle = np.hypot(np.maximum(dx - psi.width / 2, 0), np.maximum(dy - psi.height / 2, 0))
-        away = np.where(psi.shape == Shape.CIRCLE, from_circle, from_rectangle)
-        psi.active &= ~(away <= reach[:, None]).any(axis=0)
+def mark_ready(candidates: Candidates, normal: CircleColumns, around: Situation, settings: Settings) -> bool:
+    """Normal circles at Tr_max that are passed at a distance and have no ψ; return whether there are any."""
+    some = False
+    for c in range(normal.capacity):
+        candidates.passing[c] = 1 if normal_circles.passes_by(normal, c, around) else 0
+        trusted = normal.active[c] != 0 and normal.trust[c] >= settings.tr_max
+        candidates.ready[c] = 1 if trusted and candidates.passing[c] and not candidates.ignored[c] else 0
+        if candidates.ready[c]:
+            some = True
+    return some
+
+
+def keep_watched(candidates: Candidates, normal: CircleColumns, edges: EdgeColumns, keys: KeyFrames) -> None:
+    """Only circles most of whose edges have a history that tells what moves stay ready."""
+    for c in range(normal.capacity):
+        candidates.members[c] = candidates.watched[c] = 0
+    for i in range(edges.count):
+        c = edges.circle[i]
+        if c >= 0 and not edges.rebel[i]:
+            candidates.members[c] += 1
+            if alpha.has_history(edges, i, keys, alpha.SURE_BASELINE_S):
+                candidates.watched[c] += 1
+    for c in range(normal.capacity):
+        if 2 * candidates.watched[c] <= candidates.members[c]:
+            candidates.ready[c] = 0
+
+
+def best_supported(candidates: Candidates, normal: CircleColumns) -> int:
+    """The circle that is ready with the most edges, -1: none is."""
+    best = -1
+    for c in range(normal.capacity):
+        if candidates.ready[c] and (best < 0 or normal.support[c] > normal.support[best]):
+            best = c
+    return best
+
+
+def free_row(psi: PsiColumns) -> int:
+    """The first row that is not in use, -1: none."""
+    for p in range(psi.capacity):
+        if not psi.active[p]:
+            return p
+    return -1
+
+
+def write_region(psi: PsiColumns, p: int, normal: CircleColumns, c: int, life_s: float, ids: Ids) -> None:
+    """A circle writes ψ: with its centre and radius, or as a rectangle where that fits better."""
+    width, height, diameter = normal.width[c], normal.height[c], 2 * normal.radius[c]
+    psi.active[p] = 1
+    psi.id[p] = circles.new_id(ids)
+    psi.shape[p] = CIRCLE_SHAPE
+    psi.width[p] = psi.height[p] = diameter
+    if width * height < RECTANGLE_FITS * PI / 4 * diameter * diameter:
+        psi.shape[p] = RECTANGLE_SHAPE
+        psi.width[p], psi.height[p] = width, height
+    psi.x[p], psi.y[p], psi.trust[p] = normal.x[c], normal.y[c], normal.trust[c]
+    psi.expansion[p], psi.life_s[p], psi.circle[p] = normal.expansion[c], life_s, c
+
+
+def write(
+    psi: PsiColumns,
+    normal: CircleColumns,
+    edges: EdgeColumns,
+    candidates: Candidates,
+    keys: KeyFrames,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """Normal circles at Tr_max write ψ, those with the most support first, their trust falls back to Tr_s.
+
+    Return how many found no place.
+    """
+    mark_ignored(candidates, psi)
+    if not mark_ready(candidates, normal, around, settings):
+        return 0
+    keep_watched(candidates, normal, edges, keys)
+    evicted = 0
+    life_s = max(settings.psi_life_s, MIN_PSI_FRAMES * around.dt_s)
+    c = best_supported(candidates, normal)
+    while c >= 0:
+        p = free_row(psi)
+        if p >= 0:
+            write_region(psi, p, normal, c, life_s, ids)
+            normal.trust[c] = settings.tr_s
+        else:
+            evicted += 1
+        candidates.ready[c] = 0
+        c = best_supported(candidates, normal)
+    return evicted
+
+
+def is_near(psi: PsiColumns, p: int, x: float, y: float, reach_px: float) -> bool:
+    """Whether a point is within ``reach_px`` of a region."""
+    dx, dy = math.fabs(x - psi.x[p]), math.fabs(y - psi.y[p])
+    half_x, half_y = 0.5 * psi.width[p], 0.5 * psi.height[p]
+    if psi.shape[p] == CIRCLE_SHAPE:
+        return flow.length(dx, dy) - half_x <= reach_px
+    return flow.length(max(dx - half_x, 0.0), max(dy - half_y, 0.0)) <= reach_px
+
+
+def end_near(psi: PsiColumns, x: float, y: float, reach_px: float) -> None:
+    """End the regions within ``reach_px`` of a point."""
+    for p in range(psi.capacity):
+        if psi.active[p] and is_near(psi, p, x, y, reach_px):
+            psi.active[p] = 0
+
+
+def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane) -> None:
+    """End the regions on the path, as in a turn what was beside may come to lie on it, and at the sides of the frame.
+
+    At the sides appears what nobody has seen yet.
+    """
+    for p in range(psi.capacity):
+        if not psi.active[p]:
+            continue
+        reach = 0.5 * psi.width[p] + MARGIN_PX
+        inside = image_plane.project(plane, psi.x[p] - reach, psi.y[p])
+        inside = image_plane.project(plane, psi.x[p] + reach, psi.y[p]) and inside
+        if not inside or not candidates.passing[max(psi.circle[p], 0)]:
+            psi.active[p] = 0
+
+
+def give_way(
+    psi: PsiColumns, candidates: Candidates, edges: EdgeColumns, rebel: CircleColumns, plane: ImagePlane
+) -> None:
+    """End the ψ regions that come near a rebel edge, a chain of α, a rebel circle, the path or the frame's sides."""
+    end_aside(psi, candidates, plane)
+    for i in range(edges.count):
+        if edges.own_way(i):
+            end_near(psi, edges.x[i], edges.y[i], MARGIN_PX)
+    for c in range(rebel.capacity):
+        if rebel.active[c]:
+            end_near(psi, rebel.x[c], rebel.y[c], rebel.radius[c] + CIRCLE_MARGIN_PX)

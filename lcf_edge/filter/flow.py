@@ -1,22 +1,20 @@
-"""Where what stands still goes in the picture: directions, flow lines, derotation, key frames."""
+"""Where what stands still goes in the picture: angles, flow lines, the ideal camera, rotations as homographies."""
 
-from dataclasses import dataclass
+import math
 
-import numpy as np
-import numpy.typing as npt
+from lcf_edge.filter.memory import Doubles
 
-from lcf_edge.filter.tables import KEYS, Floats
-
-Matrix = npt.NDArray[np.float64]
-NEAR = 1e-6
+PI = 3.141592653589793
+MIN_SCALE = 1e-6  # of a homography: what is behind the camera goes far away
 
 
-def wrap(angle: Floats) -> Floats:
-    """Angle in (-π, π], any shape."""
-    return np.asarray(np.pi - np.remainder(np.pi - angle, 2 * np.pi), np.float32)
+def wrap(angle: float) -> float:
+    """Angle in (-π, π]."""
+    turned = math.fmod(PI - angle, 2 * PI)
+    return PI - (turned + 2 * PI if turned < 0 else turned)
 
 
-def line_distance(dx: Floats, dy: Floats, cos: Floats, sin: Floats) -> Floats:
+def line_distance(dx: float, dy: float, cos: float, sin: float) -> float:
     """Signed distance in px of an offset (dx, dy) from the line through the origin in the direction (cos β, sin β).
 
     The paper's error-span condition with O as IC and tan β as the slope; signed, and without a pole at vertical
@@ -25,77 +23,45 @@ def line_distance(dx: Floats, dy: Floats, cos: Floats, sin: Floats) -> Floats:
     return dy * cos - dx * sin
 
 
-@dataclass(frozen=True, slots=True)
+def length(dx: float, dy: float) -> float:
+    """√(dx² + dy²)."""
+    return math.sqrt(dx * dx + dy * dy)
+
+
 class Pinhole:
-    """The ideal camera that positions refer to, px."""
+    """The ideal camera that positions refer to, px. ``focal``: mean of ``fx`` and ``fy``."""
 
-    fx: float
-    fy: float
-    cx: float
-    cy: float
-
-    @property
-    def focal(self) -> float:
-        """Mean focal length, px."""
-        return 0.5 * (self.fx + self.fy)
-
-    def homography(self, rotation: Matrix) -> Matrix:
-        """H = K·R·K⁻¹: carries image positions of distant points through a rotation; (…, 3, 3)."""
-        h = np.array(rotation)
-        h[..., 0, :] = self.fx * h[..., 0, :] + self.cx * h[..., 2, :]
-        h[..., 1, :] = self.fy * h[..., 1, :] + self.cy * h[..., 2, :]
-        h[..., :, 0] /= self.fx
-        h[..., :, 1] /= self.fy
-        h[..., :, 2] -= self.cx * h[..., :, 0] + self.cy * h[..., :, 1]
-        return h
+    def __init__(self, fx: float, fy: float, cx: float, cy: float) -> None:
+        self.fx, self.fy, self.cx, self.cy = fx, fy, cx, cy
+        self.focal = 0.5 * (fx + fy)
 
 
-def carry(h: Matrix, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-    """Image positions through a homography; x, y: float32 (n,) px."""
-    a, b, c, d, e, f, g, i, j = map(np.float32, h.ravel().tolist())
-    scale = 1 / np.maximum(g * x + i * y + j, np.float32(NEAR))
-    return (a * x + b * y + c) * scale, (d * x + e * y + f) * scale
-
-
-class KeyFrames:
-    """The key frames of α: how the vehicle has turned and moved since each.
-
-    A point that stands still at X in the axes of key frame k is now at ``rotation[k]``·X - ``displacement[k]``.
-    ``number``: float count of key frames so far; slot of key frame i is i mod KEYS.
-    """
+class Homography:
+    """H = K·R·K⁻¹, row after row: where the picture of distant points goes when the camera turns."""
 
     def __init__(self) -> None:
-        self.rotation = np.tile(np.eye(3), (KEYS, 1, 1))
-        self.displacement = np.zeros((KEYS, 3))
-        self.elapsed_s = np.zeros(KEYS)
-        self.sigma_rad = np.zeros(KEYS)  # of the rotation since
-        self.number = 0  # key frames so far
-        self.since_s = 0.0  # time since the last one
+        self.xx = self.yy = self.ww = 1.0
+        self.xy = self.xw = self.yx = self.yw = self.wx = self.wy = 0.0
 
-    def advance(self, rotation: Matrix, forward: npt.NDArray[np.float64], speed_mps: float, dt_s: float) -> None:
-        """Account for the motion of one frame interval; ``forward``: (3,) unit direction of travel in camera axes."""
-        step = 0.5 * speed_mps * dt_s * (forward + rotation @ forward)  # chord of the arc
-        self.rotation[:] = rotation @ self.rotation
-        self.displacement[:] = self.displacement @ rotation.T + step
-        self.elapsed_s += dt_s
-        self.since_s += dt_s
 
-    def blur(self, sigma_rad: float) -> None:
-        """Account for what the rotation of the last interval leaves uncertain."""
-        self.sigma_rad[:] = np.hypot(self.sigma_rad, sigma_rad)
+def set_homography(h: Homography, pinhole: Pinhole, rotation: Doubles, k: int) -> None:
+    """H = K·R·K⁻¹ of the ``k``-th of rotations (n, 3, 3)."""
+    h.xx = (pinhole.fx * rotation[k, 0, 0] + pinhole.cx * rotation[k, 2, 0]) / pinhole.fx
+    h.yx = (pinhole.fy * rotation[k, 1, 0] + pinhole.cy * rotation[k, 2, 0]) / pinhole.fx
+    h.wx = rotation[k, 2, 0] / pinhole.fx
+    h.xy = (pinhole.fx * rotation[k, 0, 1] + pinhole.cx * rotation[k, 2, 1]) / pinhole.fy
+    h.yy = (pinhole.fy * rotation[k, 1, 1] + pinhole.cy * rotation[k, 2, 1]) / pinhole.fy
+    h.wy = rotation[k, 2, 1] / pinhole.fy
+    h.xw = pinhole.fx * rotation[k, 0, 2] + pinhole.cx * rotation[k, 2, 2] - pinhole.cx * h.xx - pinhole.cy * h.xy
+    h.yw = pinhole.fy * rotation[k, 1, 2] + pinhole.cy * rotation[k, 2, 2] - pinhole.cx * h.yx - pinhole.cy * h.yy
+    h.ww = rotation[k, 2, 2] - pinhole.cx * h.wx - pinhole.cy * h.wy
 
-    def correct(self, rotation: Matrix) -> None:
-        """Apply a small rotation that the flow has shown to be missing in the last interval."""
-        self.rotation[:] = rotation @ self.rotation
-        self.displacement[:] = self.displacement @ rotation.T
 
-    def mark(self) -> int:
-        """Make this instant a key frame; answers its slot."""
-        slot = self.number % KEYS
-        self.rotation[slot] = np.eye(3)
-        self.displacement[slot] = 0
-        self.elapsed_s[slot] = 0
-        self.sigma_rad[slot] = 0
-        self.number += 1
-        self.since_s = 0.0
-        return slot
+def warp_x(h: Homography, x: float, y: float) -> float:
+    """x of an image position after a homography, px."""
+    return (h.xx * x + h.xy * y + h.xw) / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)
+
+
+def warp_y(h: Homography, x: float, y: float) -> float:
+    """y of an image position after a homography, px."""
+    return (h.yx * x + h.yy * y + h.yw) / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)

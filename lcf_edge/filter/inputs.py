@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 APPEARANCE_SAMPLES = 16
+KEYS = 16  # key frames that an edge remembers
 
 
 @dataclass(frozen=True, slots=True)

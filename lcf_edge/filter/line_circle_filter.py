@@ -4,28 +4,46 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from lcf_edge.config import Config
-from lcf_edge.filter.alpha import Alpha
+from lcf_edge.filter import (
+    alpha,
+    derotation,
+    edge_expert,
+    feedback,
+    flow,
+    key_frames,
+    line_expert,
+    matching,
+    normal_circles,
+    rebel_circles,
+    rebel_detection,
+)
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.derotation import derotate, missing_rotation
-from lcf_edge.filter.edge_equations import Estimate
-from lcf_edge.filter.edge_expert import EdgeExpert
-from lcf_edge.filter.feedback import Feedback
-from lcf_edge.filter.flow import KeyFrames, Matrix, Pinhole, carry
+from lcf_edge.filter.derotation import OffLine
+from lcf_edge.filter.feedback import Candidates
+from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import Corners, Motion
-from lcf_edge.filter.line_expert import Groups, LineExpert
-from lcf_edge.filter.matching import Found, Matcher
-from lcf_edge.filter.normal_circles import NormalCircles
-from lcf_edge.filter.rebel_circles import RebelCircles
-from lcf_edge.filter.rebel_detection import Rebels
-from lcf_edge.filter.situation import Heading, Situation, situation
-from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, Mask, PsiTable
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.matching import CornerIndex
+from lcf_edge.filter.memory import Doubles, integers, memory_of, octets
+from lcf_edge.filter.normal_circles import Flowing
+from lcf_edge.filter.rebel_circles import RebelGroups
+from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Heading, Situation, follow, turn_heading
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, PsiTable
 from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
 
+Matrix = npt.NDArray[np.float64]
+
 SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
-FORGET = 0.3
+SURPRISES = 3.0  # and by so many times what the gyro lately missed
+GYRO_SIGMAS = 3.0  # within which a rotation is looked for
+FORGET = 0.3  # share of what the gyro missed that the latest frame tells
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,25 +62,34 @@ class LineCircleFilter:
     """
 
     def __init__(self, config: Config, lens: Lens) -> None:
-        memory, settings = config.memory, config.filter
-        self._config = config
-        self._pinhole = Pinhole(lens.fx, lens.fy, lens.cx, lens.cy)
+        memory = config.memory
         self.edges = EdgeTable(memory.edges_normal, memory.edges_rebel, memory.chains)
         self.normal = CircleTable(memory.circles_normal)
         self.rebel = CircleTable(memory.circles_rebel)
         self.psi = PsiTable(memory.psi)
-        self.groups = Groups(memory.groups)
+        self.groups = GroupTable(memory.groups)
+        self.corners = CornerTable(memory.corners)
+        self._settings = Settings(config.filter)
+        self._pinhole = Pinhole(lens.fx, lens.fy, lens.cx, lens.cy)
+        self._plane = ImagePlane(lens)
+        self._index = CornerIndex(lens.width, lens.height, memory.corners)
+        self._heading = Heading(config.camera)
+        self._around = Situation(config, self._pinhole)
+        follow(self._around, self._heading, math.nan, 0.0, 1.0)
         self._keys = KeyFrames()
-        self._heading = Heading(self._pinhole, config.camera)
-        self._matcher = Matcher(lens)
-        self._line_expert = LineExpert(settings, self._matcher, self.edges, self.psi)
-        self._edge_expert = EdgeExpert(settings, self._matcher, self.edges, self.normal)
-        self._alpha = Alpha(settings, self.edges, self._keys)
-        ids = Ids()  # one count, so that an id names one circle of either kind
-        self._normal_circles = NormalCircles(settings, ids)
-        self._rebel_circles = RebelCircles(settings, config.vehicle.horizon_s, ids)
-        self._feedback = Feedback(settings, self._matcher)
-        self._missing_px = settings.leap_px  # by which the gyro lately missed the rotation
+        self._baselines = Baselines()
+        self._homography = Homography()
+        self._off_line = OffLine()
+        self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
+        capacity = self.edges.capacity
+        self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
+        self._born, self._breaking = (integers(capacity) for _ in range(2))
+        self._dead = octets(capacity)
+        self._flowing = Flowing(capacity, memory.circles_normal)
+        self._rebel_groups = RebelGroups(capacity, memory.circles_rebel)
+        self._candidates = Candidates(memory.circles_normal)
+        self._ids = Ids()  # one count, so that an id names one circle of either kind
+        self._psi_ids = Ids()
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each preallocated table."""
@@ -72,100 +99,214 @@ class LineCircleFilter:
             "circles_rebel (C_r)": self.rebel.nbytes,
             "groups (λ)": self.groups.nbytes,
             "psi (ψ)": self.psi.nbytes,
-            "corner index": self._matcher.nbytes,
+            "corners": self.corners.nbytes,
+            "corner index": self._index.nbytes,
         }
 
     @property
     def focus(self) -> tuple[float, float]:
         """O: where the vehicle is heading, px."""
-        return self._heading.focus
+        return self._around.focus_x, self._around.focus_y
 
     def step(self, corners: Corners, motion: Motion) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive."""
-        x, y = np.ascontiguousarray(corners.position.T)
-        self._matcher.fill(corners.pixel)
-        around = self._derotate(motion)
-
-        estimate = self._edge_expert.predict(around, motion.dt_s)
-        omitted = self._line_expert.omit(corners, x, y, estimate, self._keys.number)
-        evicted = self.groups.collect(self.normal, self.rebel, self._config.filter.tr_cr)
-
-        kept = (~omitted).nonzero()[0]
-        found = self._edge_expert.find(estimate, corners, kept, self._slack_px(motion))
-        estimate, sigma_rad = self._refine(estimate, found, x, y, motion)
-        taken = self._edge_expert.update(estimate, found, corners, x, y, motion, sigma_rad * self._pinhole.focal)
-        self._edge_expert.delete()
-        rows, left = self._edge_expert.add(kept[~taken[kept]], corners, x, y, around, self.groups, self._keys.number)
-        self._edge_expert.join_rebels(rows, self.rebel, self._rebel_circles, motion.dt_s)
+        self._take(corners)
+        self._derotate(motion)
+        self._predict()
+        omitted = self._omit()
+        evicted = self._collect()
+        self._find(motion)
+        sigma_rad = self._refine(motion)
+        self._update(sigma_rad)
+        evicted += self._add()
+        rebels, left = self._detect()
         evicted += left
-
-        rebels, left = self._alpha.detect(around, self._alpha.mark_key(motion.dt_s))
-        evicted += left
-        evicted += self._update_circles(around, rebels, motion.dt_s)
+        evicted += self._update_circles(rebels)
         evicted += self.edges.trim()
-        return Step(omitted, self._sizes(len(corners), omitted, evicted))
+        return Step(
+            np.asarray(self.corners.omitted[: len(corners)].copy()),
+            self._sizes(len(corners), omitted, evicted),
+        )
 
-    def _derotate(self, motion: Motion) -> Situation:
+    def _take(self, corners: Corners) -> None:
+        """The frame's corners, and the index that finds them by their place."""
+        if len(corners) > self.corners.capacity:
+            self.corners = CornerTable(len(corners))
+            self._index = CornerIndex(self._plane.width, self._plane.height, len(corners))
+        pixel = np.ascontiguousarray(corners.pixel, np.int32)
+        position = np.ascontiguousarray(corners.position, np.float32)
+        words = np.ascontiguousarray(corners.appearance).view(np.uint64)
+        matching.take_corners(self.corners.columns, memory_of(pixel), memory_of(position), memory_of(words))
+        matching.fill(self._index, self.corners.columns)
+
+    def _derotate(self, motion: Motion) -> None:
         """Step 0, and the predictions of circles and ψ."""
-        for table in (self.normal, self.rebel, self.psi):
-            table.park()
-        self._heading.turn(motion)
-        speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0  # of an unknown speed, the direction
-        self._keys.advance(motion.rotation, self._heading.forward, speed, motion.dt_s)
-        self._carry(motion.rotation)
-        self._normal_circles.predict(self.normal, self.focus, motion.dt_s)
-        self._rebel_circles.predict(self.rebel, motion.dt_s)
-        self.normal.active &= self._matcher.in_frame(self.normal.x, self.normal.y)
-        self.rebel.active &= self._matcher.in_frame(*self._rebel_circles.innermost(self.rebel, self._pinhole))
-        self._feedback.advance(self.psi, self.normal, self.focus, motion.dt_s)  # ψ ends with its circle
-        return situation(self._config, self._pinhole, self._heading, motion)
+        rotation = _memory(motion.rotation)
+        turn_heading(self._heading, rotation, motion.yaw_rate_radps, motion.dt_s)
+        follow(self._around, self._heading, motion.speed_mps, motion.yaw_rate_radps, motion.dt_s)
+        self._advance_keys(rotation, motion)
+        self._warp(rotation)
+        normal_circles.predict(self.normal.columns, self._plane, self._around)
+        rebel_circles.predict(self.rebel.columns, self._around)
+        rebel_circles.end_outside(self.rebel.columns, self._plane, self._around, self._settings)
+        feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
-    def _carry(self, rotation: Matrix) -> None:
-        derotate(self._pinhole, rotation, self.edges, (self.normal, self.rebel), self.psi)
+    def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
+        speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0  # of an unknown speed, the direction
+        x, y = self._heading.ray_x, self._heading.ray_y
+        scale = 1 / math.sqrt(x * x + y * y + 1)
+        key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, speed * motion.dt_s, motion.dt_s)
+
+    def _warp(self, rotation: Doubles) -> None:
+        """H = K·R·K⁻¹ on every stored image position."""
+        flow.set_homography(self._homography, self._pinhole, rotation, 0)
+        roll = math.atan2(rotation[0, 1, 0], rotation[0, 0, 0])
+        derotation.derotate_edges(self.edges.columns, self._homography, roll)
+        derotation.derotate_circles(self.normal.columns, self._homography, roll)
+        derotation.derotate_circles(self.rebel.columns, self._homography, roll)
+        derotation.derotate_psi(self.psi.columns, self._homography)
+
+    def _predict(self) -> None:
+        """E'."""
+        edge_expert.predict(self.edges.columns, self.normal.columns, self._around, self._settings)
+
+    def _omit(self) -> int:
+        """Corners inside ψ; how many."""
+        return line_expert.omit(
+            self.psi.columns,
+            self._index,
+            self._plane,
+            self.edges.columns,
+            self.corners.columns,
+            self._keys.number,
+            self._settings,
+        )
+
+    def _collect(self) -> int:
+        """λ; how many circles found no place."""
+        normal, rebel = self.normal.columns, self.rebel.columns
+        return line_expert.collect(self.groups.columns, normal, rebel, self._settings.tr_cr)
+
+    def _find(self, motion: Motion) -> None:
+        """Corners for edges."""
+        slack_px = self._slack_px(motion)
+        matching.find(self._index, self._plane, self.edges.columns, self.corners.columns, slack_px, self._settings)
 
     def _slack_px(self, motion: Motion) -> float:
         """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""
-        gyro_px = 3 * motion.rotation_sigma_rad * self._pinhole.focal
-        return min(gyro_px, SURPRISE_PX + 3 * self._missing_px, self._config.filter.leap_px)
+        gyro_px = GYRO_SIGMAS * motion.rotation_sigma_rad * self._pinhole.focal
+        return min(gyro_px, SURPRISE_PX + SURPRISES * self._missing_px, self._settings.leap_px)
 
-    def _refine(self, estimate: Estimate, found: Found, x: Floats, y: Floats, motion: Motion) -> tuple[Estimate, float]:
-        """Take out the rotation that the gyro missed; answers the predictions and what stays uncertain, rad."""
-        sigma_rad = motion.rotation_sigma_rad
-        told = self._edge_expert.off_line(estimate, found, x, y) if sigma_rad > 0 else None
-        if told is not None:
-            rotation, sigma_rad = missing_rotation(self._pinhole, *told, sigma_rad)
-            missed_px = math.hypot(rotation[0, 2], rotation[1, 2]) * self._pinhole.focal
-            self._missing_px += FORGET * (missed_px - self._missing_px)
-            self._keys.correct(rotation)
-            self._carry(rotation)
-            ex, ey = carry(self._pinhole.homography(rotation), estimate.x, estimate.y)
-            estimate = Estimate(ex, ey, estimate.speed, estimate.cos, estimate.sin)
+    def _refine(self, motion: Motion) -> float:
+        """Take out the rotation that the gyro missed; return what stays uncertain, rad."""
+        sigma_rad, off, edges = motion.rotation_sigma_rad, self._off_line, self.edges.columns
+        corners, settings = self.corners.columns, self._settings
+        if sigma_rad > 0 and derotation.measure_off_line(off, edges, corners, self._pinhole, settings):
+            derotation.missing_rotation(off, sigma_rad)
+            a, b, c, sigma_rad = off.turn_x, off.turn_y, off.turn_z, off.sigma
+            rotation = _memory(np.array([[1.0, -c, b], [c, 1.0, -a], [-b, a, 1.0]]))
+            self._missing_px += FORGET * (math.hypot(a, b) * self._pinhole.focal - self._missing_px)
+            key_frames.turn(self._keys, rotation)
+            self._warp(rotation)
+            derotation.derotate_predictions(edges, self._homography)
         else:
-            self._missing_px = self._config.filter.leap_px  # lost: look everywhere
-        self._keys.blur(sigma_rad)
-        return estimate, sigma_rad
+            self._missing_px = settings.leap_px  # lost: look everywhere
+        key_frames.inflate(self._keys, sigma_rad)
+        return sigma_rad
 
-    def _update_circles(self, around: Situation, rebels: Rebels | None, dt_s: float) -> int:
-        """Steps 4 and 5: circles, ψ; answers evictions."""
-        edges = self.edges
-        ignored = self._feedback.ignored(self.psi, self.normal)
-        evicted = self._normal_circles.update(edges, self.normal, around, ignored)
-        evicted += self._rebel_circles.update(edges, self.rebel, rebels, around)
-        ready = self._feedback.ready(self.psi, self.normal)
-        passing = self._normal_circles.passing_by(self.normal, around)
-        ready &= passing
-        if ready.any():
-            ready &= self._alpha.looked_at(self.normal.capacity)
-            evicted += self._feedback.write(self.psi, self.normal, ready, dt_s)
-        self._feedback.give_way(self.psi, passing, edges, self.rebel)
+    def _update(self, sigma_rad: float) -> None:
+        """Edges classified, updated, deleted."""
+        edges, settings = self.edges.columns, self._settings
+        delta_px = settings.delta_px + 2 * sigma_rad * self._pinhole.focal
+        dt_s = self._around.dt_s
+        edge_expert.update(edges, self.normal.columns, self.corners.columns, delta_px, dt_s, settings)
+        edge_expert.delete(edges, self._plane, self._dead, settings.tr_cr)
+
+    def _add(self) -> int:
+        """New landmarks; how many edges, old or new, found no place.
+
+        When the table is full, newborns take the place of edges that are trusted less than they are.
+        """
+        edges, settings = self.edges, self._settings
+        room = min(edges.normal_room(), edges.capacity - edges.count)
+        evicted = max(0, edge_expert.count_unclaimed(self.corners.columns) - room)
+        if evicted:
+            n = edges.count
+            weak = edges.least_trusted(~edges.rebel[:n] & (edges.trust[:n] < settings.tr_new), evicted)
+            dead = np.zeros(n, np.bool_)
+            dead[weak] = True
+            edges.remove(dead)
+            room = max(0, room) + len(weak)
+        start = edges.count
+        edge_expert.add(
+            edges.columns,
+            self.normal.columns,
+            self.corners.columns,
+            self.groups.columns,
+            self._around,
+            room,
+            self._keys.number,
+            settings,
+        )
+        edge_expert.join_rebels(edges.columns, start, self.rebel.columns, self._around, settings)
         return evicted
 
-    def _sizes(self, corners: int, omitted: Mask, evicted: int) -> Sizes:
+    def _detect(self) -> tuple[int, int]:
+        """α: judge every edge that was seen and has a history; return how many rebels break the flow, and evictions."""
+        edges, keys, baselines, around = self.edges.columns, self._keys, self._baselines, self._around
+        verdicts, recent, settings = self._verdicts, self._recent, self._settings
+        key = bool(alpha.key_is_due(edges, keys, around.dt_s, settings))
+        if key:
+            alpha.mark_key(edges, keys)
+        rebel_detection.measure_baselines(baselines, keys, self._homography, self._pinhole, around)
+        alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
+        alpha.release_obedient(verdicts, edges, around, settings)
+        wanted = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
+        births, evicted = self._make_room(wanted)
+        alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, settings)
+        return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
+
+    def _make_room(self, wanted: int) -> tuple[int, int]:
+        """Room for so many new rebels: weak ones go home. Return how many may be born, and how many found no place."""
+        edges, settings = self.edges, self._settings
+        room = edges.rebel_capacity - edges.rebels
+        excess = max(0, wanted - room)
+        if not excess:
+            return wanted, 0
+        n = edges.count
+        weak = edges.least_trusted(edges.rebel[:n] & (edges.trust[:n] < settings.tr_new), excess)
+        for row in weak.tolist():
+            alpha.send_home(edges.columns, row, self._around, settings)
+        return min(wanted, max(0, room) + len(weak)), excess
+
+    def _update_circles(self, rebels: int) -> int:
+        """Circles, ψ; return evictions."""
+        edges, normal, rebel, psi = self.edges.columns, self.normal.columns, self.rebel.columns, self.psi.columns
+        candidates, around, settings = self._candidates, self._around, self._settings
+        feedback.mark_ignored(candidates, psi)
+        evicted = normal_circles.update(self._flowing, edges, normal, candidates.ignored, around, settings, self._ids)
+        evicted += rebel_circles.update(
+            self._rebel_groups,
+            edges,
+            rebel,
+            self._verdicts,
+            self._breaking,
+            rebels,
+            self._baselines,
+            around,
+            settings,
+            self._ids,
+        )
+        evicted += feedback.write(psi, normal, edges, candidates, self._keys, around, settings, self._psi_ids)
+        feedback.give_way(psi, candidates, edges, rebel, self._plane)
+        return int(evicted)
+
+    def _sizes(self, corners: int, omitted: int, evicted: int) -> Sizes:
         n = self.edges.count
-        rebels = int(np.count_nonzero(self.edges.rebel[:n]))
+        rebels = self.edges.rebels
         return Sizes(
             corners=corners,
-            omitted=int(np.count_nonzero(omitted)),
+            omitted=omitted,
             edges_normal=n - rebels,
             edges_rebel=rebels,
             chains=int(np.count_nonzero(self.edges.links[:n])),
@@ -175,3 +316,8 @@ class LineCircleFilter:
             psi=self.psi.count,
             evicted=evicted,
         )
+
+
+def _memory(rotation: Matrix) -> Doubles:
+    """A rotation (3, 3) as the loops take it, (1, 3, 3)."""
+    return memory_of(np.ascontiguousarray(rotation, np.float64).reshape(1, 3, 3))

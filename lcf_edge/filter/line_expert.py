@@ -1,162 +1,196 @@
 """Line expert: omit what lies inside ψ, group the rest by λ."""
 
-import numpy as np
-import numpy.typing as npt
+import math
 
-from lcf_edge.config import Filter
-from lcf_edge.filter.edge_equations import Estimate
-from lcf_edge.filter.inputs import Corners
-from lcf_edge.filter.matching import Matcher
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, PsiTable, Rows
-from lcf_edge.records import Shape
+from lcf_edge.filter import image_plane, matching
+from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, PsiColumns
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.matching import CornerIndex
+from lcf_edge.filter.settings import Settings
 
 MISSING_SHARE = 0.4  # of the edges under ψ may have no corner where they are predicted
 NEW_SHARE = 0.4  # and so many corners, for each edge, may lie where none is
 SPARE_CORNERS = 2
+CIRCLE_SHAPE = 1  # Ty
 
 
-def inside_psi(psi: PsiTable, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
-    """Row of the ψ region that holds each point, -1: none (the paper's eq. for Ty 0, 1, 2).
+def holds(psi: PsiColumns, p: int, x: float, y: float) -> bool:
+    """Whether a point lies inside a region (the paper's eq. for Ty 1, 2)."""
+    dx, dy, reach = x - psi.x[p], y - psi.y[p], 0.5 * psi.width[p]
+    if math.fabs(dx) >= reach or math.fabs(dy) >= 0.5 * psi.height[p]:
+        return False
+    return psi.shape[p] != CIRCLE_SHAPE or dx * dx + dy * dy < reach * reach
 
-    ``x``, ``y``: float32 (n,) px. Answers int32 (n,). Where regions overlap, the last row.
+
+def psi_at(psi: PsiColumns, x: float, y: float) -> int:
+    """Row of the ψ region that holds a point, px; -1: none. Where regions overlap, the last row."""
+    for p in range(psi.capacity - 1, -1, -1):
+        if psi.active[p] and holds(psi, p, x, y):
+            return p
+    return -1
+
+
+def any_active(psi: PsiColumns) -> bool:
+    """Whether there are ψ regions at all."""
+    active = 0
+    for p in range(psi.capacity):
+        active += psi.active[p]
+    return active > 0
+
+
+def coincides(
+    index: CornerIndex, plane: ImagePlane, corners: CornerColumns, x: float, y: float, reach_px: float
+) -> bool:
+    """Whether a corner under ψ lies within ``reach_px`` of a place, whatever it looks like; such corners are expected.
+
+    ``x``, ``y``: px of the ideal pinhole; the square around it is one of the input frame.
     """
-    rows = psi.active.nonzero()[0]
-    holder = np.full(len(x), NO_CIRCLE, np.int32)
-    if not len(rows) or not len(x):
-        return holder
-    reach_x, reach_y = 0.5 * psi.width.take(rows), 0.5 * psi.height.take(rows)
-    left, right = psi.x.take(rows) - reach_x, psi.x.take(rows) + reach_x
-    # Most points are in no region's box: those go no farther.
-    point, region = ((x[:, None] > left) & (x[:, None] < right)).nonzero()
-    row = rows.take(region)
-    dx, dy = x.take(point) - psi.x.take(row), y.take(point) - psi.y.take(row)
-    round_ = psi.shape.take(row) == Shape.CIRCLE
-    reach = reach_x.take(region)
-    inside = (np.abs(dy) < reach_y.take(region)) & (~round_ | (dx * dx + dy * dy < reach * reach))
-    holder[point[inside]] = row[inside]
-    return holder
+    if not image_plane.project(plane, x, y):
+        return False
+    u, v = plane.u, plane.v
+    seen = False
+    left, right = matching.first_cell(u, reach_px), matching.last_cell(u, reach_px, index.columns)
+    for row in range(matching.first_cell(v, reach_px), matching.last_cell(v, reach_px, index.rows) + 1):
+        for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
+            corner = index.order[place]
+            beside = math.fabs(index.x[place] - u) > reach_px or math.fabs(index.y[place] - v) > reach_px
+            if corners.psi[corner] >= 0 and not beside:
+                seen = True
+                corners.expected[corner] = 1
+    return seen
 
 
-def end_surprised(
-    psi: PsiTable,
-    holder_of_edge: npt.NDArray[np.int32],
-    seen: Mask,
-    holder_of_corner: npt.NDArray[np.int32],
-    expected: Mask,
+def place_in_psi(
+    psi: PsiColumns,
+    index: CornerIndex,
+    plane: ImagePlane,
+    edges: EdgeColumns,
+    corners: CornerColumns,
+    reach_px: float,
 ) -> None:
+    """Which region holds each corner and each L', and how many of a region's are not where the others let expect."""
+    for p in range(psi.capacity):
+        psi.edges[p] = psi.missing[p] = psi.new[p] = 0
+    for k in range(corners.count):
+        corners.psi[k] = psi_at(psi, corners.x[k], corners.y[k])
+        corners.expected[k] = 0
+    for i in range(edges.count):
+        edges.psi[i] = -1 if edges.own_way(i) else psi_at(psi, edges.predicted_x[i], edges.predicted_y[i])
+        if edges.psi[i] >= 0:
+            psi.edges[edges.psi[i]] += 1
+            if not coincides(index, plane, corners, edges.predicted_x[i], edges.predicted_y[i], reach_px):
+                psi.missing[edges.psi[i]] += 1
+    for k in range(corners.count):
+        if corners.psi[k] >= 0 and not corners.expected[k]:
+            psi.new[corners.psi[k]] += 1
+
+
+def end_surprised(psi: PsiColumns) -> None:
     """End the ψ regions whose corners are not where the edges under them let expect.
 
-    ``holder_of_edge``, ``holder_of_corner``: rows of ψ. ``seen``: bool, edges that have a corner where they are
-    predicted. ``expected``: bool, corners where an edge is predicted. This look in passing costs a few places in an
-    index, and lets nothing walk through ψ unseen.
+    This look in passing costs a few places in an index, and lets nothing walk through ψ unseen.
     """
-    edges = np.bincount(holder_of_edge, minlength=psi.capacity)
-    missing = np.bincount(holder_of_edge[~seen], minlength=psi.capacity)
-    new = np.bincount(holder_of_corner[~expected], minlength=psi.capacity)
-    psi.active &= (missing <= MISSING_SHARE * edges + SPARE_CORNERS) & (new <= NEW_SHARE * edges + SPARE_CORNERS)
+    for p in range(psi.capacity):
+        if psi.missing[p] > MISSING_SHARE * psi.edges[p] + SPARE_CORNERS:
+            psi.active[p] = 0
+        if psi.new[p] > NEW_SHARE * psi.edges[p] + SPARE_CORNERS:
+            psi.active[p] = 0
 
 
-class Groups:
-    """λ: the circles whose trust is above Tr_cr gather the corners around them (eq. 1).
+def hold(edges: EdgeColumns, psi: PsiColumns, key_number: int, tr_s: float) -> None:
+    """Edges under ψ are held: predicted without being looked for.
 
-    ``row``: rows of the circle table; ``x``, ``y``, ``bs`` (BS_λ, px), ``expansion`` (1/s), ``corr``: float32 (g,).
+    What is only predicted is no history, and is trusted like its circle, so that its corner soon corrects it.
     """
-
-    def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
-        self._floats = np.zeros((5, capacity), np.float32)
-        self._row = np.zeros(capacity, np.int32)
-        self.count = 0
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes that the table occupies, for good."""
-        return self._floats.nbytes + self._row.nbytes
-
-    @property
-    def x(self) -> Floats:
-        """Centre, px."""
-        return self._floats[0, : self.count]
-
-    @property
-    def y(self) -> Floats:
-        """Centre, px."""
-        return self._floats[1, : self.count]
-
-    @property
-    def bs(self) -> Floats:
-        """BS_λ, px."""
-        return self._floats[2, : self.count]
-
-    @property
-    def row(self) -> npt.NDArray[np.int32]:
-        """Row of the normal circle behind each group; -1: a rebel circle's."""
-        return self._row[: self.count]
-
-    def collect(self, normal: CircleTable, rebel: CircleTable, tr_cr: float) -> int:
-        """λ ← C_n and C_r above Tr_cr, the least trusted first; answers how many found no place."""
-        rows_n = np.flatnonzero(normal.active & (normal.trust > tr_cr))
-        rows_r = np.flatnonzero(rebel.active & (rebel.trust > tr_cr))
-        trust = np.concatenate([normal.trust[rows_n], rebel.trust[rows_r]])
-        order = np.argsort(trust, kind="stable")
-        kept = order[max(0, len(order) - self.capacity) :]
-        self.count = len(kept)
-        for field, name in enumerate(("x", "y", "radius")):
-            both = np.concatenate([getattr(normal, name)[rows_n], getattr(rebel, name)[rows_r]])
-            self._floats[field, : self.count] = both[kept]
-        owner = np.concatenate([rows_n, np.full(len(rows_r), NO_CIRCLE)])
-        self._row[: self.count] = owner[kept]
-        return len(order) - len(kept)
-
-    def assign(self, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
-        """Group that holds each point (eq. 1: |L_λ - Edge| < BS_λ), the most trusted of several; -1: none."""
-        best = np.full(len(x), NO_CIRCLE, np.int32)
-        if not self.count or not len(x):
-            return best
-        near = np.square(x[:, None] - self.x) + np.square(y[:, None] - self.y) < np.square(self.bs)
-        last = self.count - 1 - np.argmax(near[:, ::-1], axis=1)
-        held = near[np.arange(len(x)), last]
-        best[held] = last[held]
-        return best
-
-    def circle_at(self, x: Floats, y: Floats) -> Rows:
-        """Row of the normal circle behind the group that holds each point, -1: none."""
-        group = self.assign(x, y)
-        if not self.count:
-            return group.astype(np.intp)
-        return np.where(group >= 0, self.row[np.maximum(group, 0)], NO_CIRCLE)
+    for i in range(edges.count):
+        p = edges.psi[i]
+        if p >= 0 and psi.active[p]:
+            edges.held[i] = 1
+            edges.born_key[i] = key_number
+            edges.trust[i] = min(edges.trust[i], tr_s)
 
 
-class LineExpert:
-    """Omits the corners inside ψ, and looks there in passing whether all is as predicted."""
+def omit(
+    psi: PsiColumns,
+    index: CornerIndex,
+    plane: ImagePlane,
+    edges: EdgeColumns,
+    corners: CornerColumns,
+    key_number: int,
+    settings: Settings,
+) -> int:
+    """Omit the corners inside ψ, hold the edges under it; return how many corners are omitted.
 
-    def __init__(self, settings: Filter, matcher: Matcher, edges: EdgeTable, psi: PsiTable) -> None:
-        self._settings = settings
-        self._matcher = matcher
-        self._edges = edges
-        self._psi = psi
+    Regions where corners are not where, or not as many as, the edges let expect, end first.
+    """
+    for i in range(edges.count):
+        edges.held[i] = 0
+    for k in range(corners.count):
+        corners.omitted[k] = 0
+    if not any_active(psi):
+        return 0
+    place_in_psi(psi, index, plane, edges, corners, settings.bl_min_px)
+    end_surprised(psi)
+    hold(edges, psi, key_number, settings.tr_s)
+    omitted = 0
+    for k in range(corners.count):
+        p = corners.psi[k]
+        if p >= 0 and psi.active[p]:
+            corners.omitted[k] = 1
+            corners.free[k] = 0
+            omitted += 1
+    return omitted
 
-    def omit(self, corners: Corners, x: Floats, y: Floats, estimate: Estimate, key_number: int) -> Mask:
-        """Corners inside ψ, bool (corners,); edges under ψ are held: predicted without being matched.
 
-        ``x``, ``y``: corners, px. ``estimate``: E' of all edges. Regions where corners are not where, or not as many
-        as, the edges let expect, end first.
-        """
-        edges, n, psi = self._edges, self._edges.count, self._psi
-        edges.held[:n] = False
-        if not psi.active.any():
-            return np.zeros(len(corners), np.bool_)
-        both = inside_psi(psi, np.concatenate([x, estimate.x]), np.concatenate([y, estimate.y]))
-        of_corner, of_edge = both[: len(corners)], both[len(corners) :]
-        of_edge[edges.own_way()] = NO_CIRCLE
-        held, inside = (of_edge != NO_CIRCLE).nonzero()[0], (of_corner != NO_CIRCLE).nonzero()[0]
-        seen, expected = self._matcher.coincide(
-            estimate.x.take(held), estimate.y.take(held), inside, self._settings.bl_min_px
-        )
-        end_surprised(psi, of_edge.take(held), seen, of_corner.take(inside), expected)
-        held = held[psi.active.take(of_edge.take(held))]
-        edges.held[held] = True
-        # What is only predicted is no history, and is trusted like its circle, so that its corner soon corrects it.
-        edges.born_key[held] = key_number
-        edges.trust[held] = np.minimum(edges.trust[held], self._settings.tr_s)
-        return np.asarray((of_corner != NO_CIRCLE) & psi.active.take(of_corner, mode="clip"))
+def insert_group(groups: GroupColumns, circles: CircleColumns, c: int, row: int) -> bool:
+    """Enter a circle by its trust; in a full table the least trusted leaves. Return whether one found no place."""
+    trust = circles.trust[c]
+    full = groups.count == groups.capacity
+    if full:
+        if trust < groups.trust[0]:
+            return True
+        for k in range(groups.count - 1):
+            copy_group(groups, k + 1, k)
+    else:
+        groups.count += 1
+    k = groups.count - 1
+    while k > 0 and groups.trust[k - 1] > trust:
+        copy_group(groups, k - 1, k)
+        k -= 1
+    groups.x[k], groups.y[k], groups.bs[k] = circles.x[c], circles.y[c], circles.radius[c]
+    groups.trust[k], groups.row[k] = trust, row
+    return full
+
+
+def copy_group(groups: GroupColumns, source: int, target: int) -> None:
+    """One row over another."""
+    groups.x[target], groups.y[target], groups.bs[target] = groups.x[source], groups.y[source], groups.bs[source]
+    groups.trust[target], groups.row[target] = groups.trust[source], groups.row[source]
+
+
+def collect(groups: GroupColumns, normal: CircleColumns, rebel: CircleColumns, tr_cr: float) -> int:
+    """λ ← C_n and C_r above Tr_cr, the least trusted first; return how many found no place."""
+    groups.count = 0
+    evicted = 0
+    for c in range(normal.capacity):
+        if normal.active[c] and normal.trust[c] > tr_cr and insert_group(groups, normal, c, c):
+            evicted += 1
+    for c in range(rebel.capacity):
+        if rebel.active[c] and rebel.trust[c] > tr_cr and insert_group(groups, rebel, c, -1):
+            evicted += 1
+    return evicted
+
+
+def group_at(groups: GroupColumns, x: float, y: float) -> int:
+    """Group that holds a point (eq. 1: |L_λ - Edge| < BS_λ), the most trusted of several; -1: none."""
+    for g in range(groups.count - 1, -1, -1):
+        dx, dy = x - groups.x[g], y - groups.y[g]
+        if dx * dx + dy * dy < groups.bs[g] * groups.bs[g]:
+            return g
+    return -1
+
+
+def circle_at(groups: GroupColumns, x: float, y: float) -> int:
+    """Row of the normal circle behind the group that holds a point, -1: none."""
+    g = group_at(groups, x, y)
+    return groups.row[g] if g >= 0 else -1

@@ -1,187 +1,346 @@
 """Circle expert, C_n: normal edges that go together by direction, speed and place become circles."""
 
 import math
-from dataclasses import dataclass
 
-import numpy as np
-
-from lcf_edge.config import Filter
-from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
-from lcf_edge.filter.edge_equations import change_trust, update_position
-from lcf_edge.filter.flow import wrap
-from lcf_edge.filter.rebel_detection import miss
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import edge_equations, flow, image_plane, path, rounding
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Bytes, doubles, integers
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
 
 SPEED_NOISE_PX = 0.6  # 1 sigma of an edge's V, times t_f
 PASSING_WIDTHS = 2.0  # half widths of the vehicle, beside its path
 DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
+INSIDE_RADII = 1.5  # an edge is inside a circle up to this,
+INSIDE_MARGIN_PX = 4.0  # and this
+SUDDEN_CHANGE = 10.0  # times ε_V, by which the mean expansion of an aligned circle's edges may exceed its own
+ALIGNED_SHARE = 0.2  # of ε_β, by which their mean direction may differ from its own
 SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
+SLOWEST = 0.015625  # 2**-6
 OCTAVES = 16
 CELLS = 32  # a side, of BS_λ each
+MIN_EXPANSION = 1e-3  # 1/s
+MIN_R_PX = 1.0
 
 
-@dataclass(frozen=True, slots=True)
 class Flowing:
-    """Trusted normal edges, (k,) each: rows of the table, L in px, r (px from O), direction of flow, V/r in 1/s."""
+    """Trusted normal edges that may be grouped, a row each; and what they tell about their circles.
 
-    rows: Rows
-    x: Floats
-    y: Floats
-    r: Floats
-    cos: Floats
-    sin: Floats
-    expansion: Floats
+    ``row``: of the table of edges. ``r``: px from O. ``cos``, ``sin``: of the direction of flow. ``expansion``: V/r,
+    1/s. ``cell``: of the picture and octave of expansion in which it looks for others, -1: it has a circle;
+    ``cell_size``: edges in each.
 
-    def take(self, rows: Rows) -> "Flowing":
-        """Some of them."""
-        columns = (self.x, self.y, self.r, self.cos, self.sin, self.expansion)
-        return Flowing(self.rows.take(rows), *(column.take(rows) for column in columns))
+    A row a circle: ``members``; ``before``, edges that belonged to it; ``included``, those that still lie in it;
+    ``mean_cos``, ``mean_sin``, ``mean_expansion`` of its edges; ``beta_cos``, ``beta_sin`` of its own direction.
+    ``open``: circles that an edge may join, ``open_count``.
+    """
+
+    def __init__(self, edges: int, circles: int) -> None:
+        self.count = self.open_count = 0
+        self.row, self.cell = integers(edges), integers(edges)
+        self.r, self.cos, self.sin, self.expansion = (doubles(edges) for _ in range(4))
+        self.cell_size = integers(CELLS * CELLS * OCTAVES)
+        self.members = Members(circles)
+        self.before, self.included, self.open = (integers(circles) for _ in range(3))
+        self.mean_cos, self.mean_sin, self.mean_expansion = (doubles(circles) for _ in range(3))
+        self.beta_cos, self.beta_sin = (doubles(circles) for _ in range(2))
 
 
-class NormalCircles:
-    """Groups normal edges into circles (C_n) and keeps the circles from frame to frame."""
+def predict(circles: CircleColumns, plane: ImagePlane, around: Situation) -> None:
+    """C'_n: what stands still goes out from the focus and grows, both at the rate of its expansion.
 
-    def __init__(self, settings: Filter, ids: Ids) -> None:
-        self._settings = settings
-        self._ids = ids
-        self._dt_s = 1.0
+    Circles whose centre left the frame end.
+    """
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            growth = circles.expansion[c] * around.dt_s
+            circles.x[c] += (circles.x[c] - around.focus_x) * growth
+            circles.y[c] += (circles.y[c] - around.focus_y) * growth
+            circles.radius[c] *= 1 + growth
+            if not image_plane.project(plane, circles.x[c], circles.y[c]):
+                circles.active[c] = 0
 
-    def predict(self, circles: CircleTable, focus: tuple[float, float], dt_s: float) -> None:
-        """C'_n: what stands still goes out from the focus and grows, both at the rate of its expansion."""
-        self._dt_s = dt_s
-        growth = circles.expansion * np.float32(dt_s)
-        circles.x += (circles.x - np.float32(focus[0])) * growth
-        circles.y += (circles.y - np.float32(focus[1])) * growth
-        circles.radius *= 1 + growth
 
-    def passing_by(self, circles: CircleTable, around: Situation) -> Mask:
-        """Circles that the vehicle passes at a distance; bool (capacity,). Nothing on the path may be ignored."""
-        speed = around.speed_mps
-        if not math.isfinite(speed) or speed <= 0:
-            return np.zeros(circles.capacity, np.bool_)
-        range_m = np.float32(speed) / np.maximum(circles.expansion, np.float32(1e-3))
-        focal = np.float32(around.pinhole.fx)
-        right_m = (circles.x - np.float32(around.focus[0])) / focal * range_m
-        off_path_m = np.abs(miss(right_m, range_m, around))
-        beside_m = np.minimum(np.abs(right_m), off_path_m) - circles.radius / focal * range_m  # a turn may end
-        return np.asarray((circles.expansion > 0) & (beside_m > PASSING_WIDTHS * around.half_width_m))
+def passes_by(circles: CircleColumns, c: int, around: Situation) -> bool:
+    """Whether the vehicle passes a circle at a distance. Nothing on the path may be ignored."""
+    speed, expansion = around.speed_mps, circles.expansion[c]
+    if not math.isfinite(speed) or not speed > 0 or not expansion > 0:
+        return False
+    range_m = speed / max(expansion, MIN_EXPANSION)
+    right_m = (circles.x[c] - around.focus_x) / around.pinhole.fx * range_m
+    off_path_m = math.fabs(path.miss(right_m, range_m, around))
+    radius_m = circles.radius[c] / around.pinhole.fx * range_m
+    beside_m = min(math.fabs(right_m), off_path_m) - radius_m  # a turn may end
+    return beside_m > PASSING_WIDTHS * around.half_width_m
 
-    def update(self, edges: EdgeTable, circles: CircleTable, around: Situation, ignored: Mask) -> int:
-        """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); answers evictions.
 
-        ``ignored``: bool (capacity,), circles under an active ψ, which are only predicted.
-        """
-        focus = around.focus
-        flowing = self._flowing(edges, around)
-        owner, involved = self._involve(flowing, edges.circle.take(flowing.rows), circles, ignored)
-        edges.circle[flowing.rows] = owner
-        self._compare(flowing, owner, involved, circles, ignored)
-        self._direct(circles, focus)
-        circles.active &= circles.trust >= self._settings.tr_cr
-        release(edges, circles, rebel=False)
-        left = (edges.circle.take(flowing.rows) == NO_CIRCLE).nonzero()[0]
-        evicted = self._found(edges, circles, flowing.take(left), focus)
-        self._direct(circles, focus)
-        return evicted
+def gather(flowing: Flowing, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+    """The edges that may be grouped; eq. EdgeEncompare's |V_e| ≤ ε_V·V_ν is held to the depth of the scene."""
+    fastest = settings.eps_v * around.scene_flow_pxps / around.pinhole.focal
+    flowing.count = 0
+    for i in range(edges.count):
+        if edges.trust[i] < settings.tr_s or edges.held[i] or edges.own_way(i):
+            continue
+        dx, dy = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
+        r = max(flow.length(dx, dy), MIN_R_PX)
+        if math.fabs(edges.speed[i]) > fastest * r + SPEED_NOISE_PX / around.dt_s:
+            continue
+        j = flowing.count
+        flowing.count += 1
+        flowing.row[j], flowing.r[j], flowing.cos[j], flowing.sin[j] = i, r, dx / r, dy / r
+        flowing.expansion[j] = edges.speed[i] / r
 
-    def _flowing(self, edges: EdgeTable, around: Situation) -> Flowing:
-        """The edges that may be grouped; eq. EdgeEncompare's |V_e| ≤ ε_V·V_ν is held to the depth of the scene."""
-        settings, n, focus = self._settings, edges.count, around.focus
-        free = (edges.trust[:n] >= settings.tr_s) & ~(edges.own_way() | edges.held[:n])
-        rows = free.nonzero()[0]
-        x, y, speed = edges.x.take(rows), edges.y.take(rows), edges.speed.take(rows)
-        dx, dy = x - np.float32(focus[0]), y - np.float32(focus[1])
-        r = np.maximum(np.sqrt(dx * dx + dy * dy), np.float32(1))
-        flowing = Flowing(rows, x, y, r, dx / r, dy / r, speed / r)
-        fastest = settings.eps_v * around.scene_flow_pxps / around.pinhole.focal
-        bounded = np.abs(speed) <= np.float32(fastest) * r + np.float32(SPEED_NOISE_PX / self._dt_s)
-        return flowing if bounded.all() else flowing.take(bounded.nonzero()[0])
 
-    def _involve(self, flowing: Flowing, owner: Rows, circles: CircleTable, ignored: Mask) -> tuple[Rows, Mask]:
-        """Circle of each edge, -1: none; and the circles that most of their edges still lie in (percentinvolve)."""
-        capacity = circles.capacity
-        had = (owner >= 0).nonzero()[0]
-        members, kept = flowing.take(had), owner.take(had)
-        before = np.bincount(kept, minlength=capacity)
-        fits, inside = self._fits(members, kept, circles)
-        included = np.bincount(kept[inside], minlength=capacity)
-        owner[had[~fits]] = NO_CIRCLE
-        loose, open_circles = (owner == NO_CIRCLE).nonzero()[0], (circles.active & ~ignored).nonzero()[0]
-        if len(loose) and len(open_circles):
-            alone = flowing.take(loose)
-            away = np.square(alone.x[:, None] - circles.x.take(open_circles))
-            away += np.square(alone.y[:, None] - circles.y.take(open_circles))
-            nearest = open_circles.take(away.argmin(axis=1))
-            fits, inside = self._fits(alone, nearest, circles)
-            joins = fits & inside
-            owner[loose[joins]] = nearest[joins]
-        return owner, included >= self._settings.involvement * np.maximum(before, 1)
+def lies_inside(edges: EdgeColumns, i: int, circles: CircleColumns, c: int) -> bool:
+    """Whether an edge lies in a circle, with a margin."""
+    dx, dy = edges.x[i] - circles.x[c], edges.y[i] - circles.y[c]
+    reach = circles.radius[c] * INSIDE_RADII + INSIDE_MARGIN_PX
+    return dx * dx + dy * dy < reach * reach
 
-    def _fits(self, flowing: Flowing, owner: Rows, circles: CircleTable) -> tuple[Mask, Mask]:
-        """Whether each edge agrees with its circle in direction, speed and place (EdgeEncompare); and lies inside."""
-        settings = self._settings
-        dx, dy = flowing.x - circles.x.take(owner), flowing.y - circles.y.take(owner)
+
+def fits(
+    flowing: Flowing,
+    j: int,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    c: int,
+    around: Situation,
+    settings: Settings,
+) -> bool:
+    """Whether an edge agrees with a circle in direction, speed and place (EdgeEncompare)."""
+    i = flowing.row[j]
+    dx, dy = edges.x[i] - circles.x[c], edges.y[i] - circles.y[c]
+    if not circles.active[c] or dx * dx + dy * dy >= settings.bs_px * settings.bs_px:
+        return False
+    along = flowing.cos[j] * flowing.beta_cos[c] + flowing.sin[j] * flowing.beta_sin[c]
+    if along <= math.cos(settings.eps_beta_rad):
+        return False
+    centre = circles.expansion[c]
+    slack = DEPTH_SPREAD * math.fabs(centre) + SPEED_NOISE_PX / around.dt_s / flowing.r[j]
+    return math.fabs(flowing.expansion[j] - centre) < slack
+
+
+def nearest_open(flowing: Flowing, edges: EdgeColumns, i: int, circles: CircleColumns) -> int:
+    """The open circle whose centre is nearest to an edge, -1: there is none."""
+    nearest = -1
+    least = 0.0
+    for k in range(flowing.open_count):
+        c = flowing.open[k]
+        dx, dy = edges.x[i] - circles.x[c], edges.y[i] - circles.y[c]
         away2 = dx * dx + dy * dy
-        inside = np.sqrt(away2) < (circles.radius * np.float32(1.5) + 4).take(owner)
-        beta = circles.beta
-        along = flowing.cos * np.cos(beta).take(owner) + flowing.sin * np.sin(beta).take(owner)
-        centre = circles.expansion.take(owner)
-        slack = np.float32(DEPTH_SPREAD) * np.abs(centre) + np.float32(SPEED_NOISE_PX / self._dt_s) / flowing.r
-        fits = (away2 < np.float32(settings.bs_px**2)) & (along > np.float32(math.cos(settings.eps_beta_rad)))
-        fits &= circles.active.take(owner)
-        return fits & (np.abs(flowing.expansion - centre) < slack), inside
+        if nearest < 0 or away2 < least:
+            nearest, least = c, away2
+    return nearest
 
-    def _compare(self, flowing: Flowing, owner: Rows, involved: Mask, circles: CircleTable, ignored: Mask) -> None:
-        """Groups against circles: aligned Tr +1; deviated but well included, updated and Tr -1; unmatched Tr -1."""
-        settings = self._settings
-        member = (owner >= 0).nonzero()[0]
-        edges = flowing.take(member)
-        members = Members(owner.take(member), circles.capacity, edges.x, edges.y)
-        mean_cos, mean_sin = members.mean(edges.cos), members.mean(edges.sin)
-        live = circles.active & ~ignored
-        updated = live & involved & (members.size >= settings.circle_support)
-        turn = np.abs(wrap(np.arctan2(mean_sin, mean_cos) - circles.beta))
-        mean_expansion = members.mean(edges.expansion)
-        like = np.abs(mean_expansion) <= 10 * settings.eps_v * np.abs(circles.expansion)
-        aligned = updated & like & (turn < settings.eps_beta_rad / 5)
-        rows = updated.nonzero()[0]
-        circles.expansion[rows] = update_position(
-            circles.trust[rows], settings.tr_cr, circles.expansion[rows], mean_expansion[rows]
-        )
-        blend(circles, rows, members, rows, settings)
-        circles.corr[rows] = np.hypot(mean_cos, mean_sin)[rows]
-        change = np.where(aligned, np.float32(1), np.float32(-1))
-        circles.trust[live] = change_trust(circles.trust, change, settings.tr_max)[live]
 
-    def _direct(self, circles: CircleTable, focus: tuple[float, float]) -> None:
-        """β and V of normal circles follow from their place and expansion."""
-        dx, dy = circles.x - np.float32(focus[0]), circles.y - np.float32(focus[1])
-        circles.beta[:] = np.arctan2(dy, dx)
-        circles.speed[:] = circles.expansion * np.sqrt(dx * dx + dy * dy)
+def open_circles(flowing: Flowing, circles: CircleColumns, ignored: Bytes) -> None:
+    """Those that an edge may join: in use, and not under ψ."""
+    flowing.open_count = 0
+    for c in range(circles.capacity):
+        flowing.before[c] = flowing.included[c] = 0
+        if circles.active[c]:
+            flowing.beta_cos[c], flowing.beta_sin[c] = math.cos(circles.beta[c]), math.sin(circles.beta[c])
+            if not ignored[c]:
+                flowing.open[flowing.open_count] = c
+                flowing.open_count += 1
 
-    def _found(self, edges: EdgeTable, circles: CircleTable, left: Flowing, focus: tuple[float, float]) -> int:
-        """New circles from the edges that are left: those of one cell of the picture and one octave of expansion."""
-        settings = self._settings
-        size = np.float32(settings.bs_px)
-        u = np.floor((left.x - np.float32(focus[0])) / size).astype(np.int64)
-        v = np.floor((left.y - np.float32(focus[1])) / size).astype(np.int64)
-        octave = np.rint(np.log2(np.maximum(np.abs(left.expansion), np.float32(2.0**SLOWEST_OCTAVE))))
-        key = ((v + CELLS // 2) % CELLS * CELLS + (u + CELLS // 2) % CELLS) * OCTAVES
-        key += np.minimum(octave.astype(np.int32) - SLOWEST_OCTAVE, OCTAVES - 1)
-        count = np.bincount(key, minlength=CELLS * CELLS * OCTAVES)
-        big = (count >= settings.circle_support).nonzero()[0]
-        if not len(big):
-            return 0
-        big = big[np.argsort(-count[big], kind="stable")]
-        places, evicted = claim(edges, circles, len(big), settings, rebel=False)
-        number = np.full(len(count), NO_CIRCLE)
-        number[big[: len(places)]] = np.arange(len(places))
-        group = number[key]
-        chosen = (group >= 0).nonzero()[0]
-        born, group = left.take(chosen), group.take(chosen)
-        members = Members(group, len(places), born.x, born.y)
-        give_birth(circles, places, members, np.arange(len(places)), settings, self._ids)
-        circles.expansion[places] = members.mean(born.expansion)
-        edges.circle[born.rows] = places[group]
-        return evicted
+
+def involve(
+    flowing: Flowing, edges: EdgeColumns, circles: CircleColumns, around: Situation, settings: Settings
+) -> None:
+    """Circle of each edge, -1: none; and how many edges of each circle still lie in it (percentinvolve)."""
+    for j in range(flowing.count):
+        i = flowing.row[j]
+        c = edges.circle[i]
+        if c >= 0:
+            flowing.before[c] += 1
+            if lies_inside(edges, i, circles, c):
+                flowing.included[c] += 1
+            if fits(flowing, j, edges, circles, c, around, settings):
+                continue
+            edges.circle[i] = -1
+        c = nearest_open(flowing, edges, i, circles)
+        if c >= 0 and lies_inside(edges, i, circles, c) and fits(flowing, j, edges, circles, c, around, settings):
+            edges.circle[i] = c
+
+
+def average(flowing: Flowing, members: Members, edges: EdgeColumns) -> None:
+    """What the edges of each circle show: how many, their middle and spread, mean direction and expansion."""
+    for c in range(members.capacity):
+        shared.clear(members, c)
+        flowing.mean_cos[c] = flowing.mean_sin[c] = flowing.mean_expansion[c] = 0.0
+    for j in range(flowing.count):
+        i = flowing.row[j]
+        c = edges.circle[i]
+        if c >= 0:
+            members.size[c] += 1
+            members.x[c] += edges.x[i]
+            members.y[c] += edges.y[i]
+            flowing.mean_cos[c] += flowing.cos[j]
+            flowing.mean_sin[c] += flowing.sin[j]
+            flowing.mean_expansion[c] += flowing.expansion[j]
+    for c in range(members.capacity):
+        if members.size[c] > 0:
+            members.x[c] /= members.size[c]
+            members.y[c] /= members.size[c]
+            flowing.mean_cos[c] /= members.size[c]
+            flowing.mean_sin[c] /= members.size[c]
+            flowing.mean_expansion[c] /= members.size[c]
+    for j in range(flowing.count):
+        i = flowing.row[j]
+        c = edges.circle[i]
+        if c >= 0:
+            dx, dy = edges.x[i] - members.x[c], edges.y[i] - members.y[c]
+            members.variance_x[c] += dx * dx / members.size[c]
+            members.variance_y[c] += dy * dy / members.size[c]
+
+
+def is_involved(flowing: Flowing, c: int, settings: Settings) -> bool:
+    """Whether enough of a circle's edges still lie in it (percentinvolve)."""
+    share = settings.involvement * max(flowing.before[c], 1)
+    return flowing.members.size[c] >= settings.circle_support and flowing.included[c] >= share
+
+
+def is_aligned(flowing: Flowing, circles: CircleColumns, c: int, settings: Settings) -> bool:
+    """Whether the edges of a circle go on, in the mean, as it does (EdgeCirclenormalcompare)."""
+    beta = math.atan2(flowing.mean_sin[c], flowing.mean_cos[c])
+    turn = math.fabs(flow.wrap(beta - circles.beta[c]))
+    most = SUDDEN_CHANGE * settings.eps_v * math.fabs(circles.expansion[c])
+    return math.fabs(flowing.mean_expansion[c]) <= most and turn < ALIGNED_SHARE * settings.eps_beta_rad
+
+
+def compare(flowing: Flowing, circles: CircleColumns, ignored: Bytes, settings: Settings) -> None:
+    """Groups against circles: aligned Tr +1; deviated but well included, updated and Tr -1; unmatched Tr -1."""
+    for c in range(circles.capacity):
+        if not circles.active[c] or ignored[c]:
+            continue
+        change = -1.0
+        if is_involved(flowing, c, settings):
+            if is_aligned(flowing, circles, c, settings):
+                change = 1.0
+            circles.expansion[c] = edge_equations.update_position(
+                circles.trust[c], settings.tr_cr, circles.expansion[c], flowing.mean_expansion[c]
+            )
+            shared.blend(circles, c, flowing.members, c, settings)
+            circles.corr[c] = flow.length(flowing.mean_cos[c], flowing.mean_sin[c])
+        circles.trust[c] = edge_equations.change_trust(circles.trust[c], change, settings.tr_max)
+
+
+def direct(circles: CircleColumns, around: Situation) -> None:
+    """β and V of normal circles follow from their place and expansion."""
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
+            circles.beta[c] = math.atan2(dy, dx)
+            circles.speed[c] = circles.expansion[c] * flow.length(dx, dy)
+
+
+def cell_of(x: float, y: float, expansion: float, around: Situation, size_px: float) -> int:
+    """Number of the cell of the picture, and of the octave of expansion, in which an edge looks for others."""
+    u = rounding.whole(math.floor((x - around.focus_x) / size_px)) + CELLS // 2
+    v = rounding.whole(math.floor((y - around.focus_y) / size_px)) + CELLS // 2
+    octave = rounding.whole(math.floor(math.log2(max(math.fabs(expansion), SLOWEST)) + 0.5)) - SLOWEST_OCTAVE
+    return ((v & (CELLS - 1)) * CELLS + (u & (CELLS - 1))) * OCTAVES + min(octave, OCTAVES - 1)
+
+
+def sort_left(flowing: Flowing, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+    """Count the edges without a circle by cell."""
+    for j in range(flowing.count):
+        i = flowing.row[j]
+        flowing.cell[j] = -1
+        if edges.circle[i] < 0:
+            flowing.cell[j] = cell_of(edges.x[i], edges.y[i], flowing.expansion[j], around, settings.bs_px)
+            flowing.cell_size[flowing.cell[j]] += 1
+
+
+def largest_cell(flowing: Flowing, support: int) -> int:
+    """The cell with the most edges, the first of equals; -1: none has so many as ``support``."""
+    largest = -1
+    for j in range(flowing.count):
+        cell = flowing.cell[j]
+        if cell < 0 or flowing.cell_size[cell] < support:
+            continue
+        size, most = flowing.cell_size[cell], flowing.cell_size[max(largest, 0)]
+        if largest < 0 or size > most or (size == most and cell < largest):
+            largest = cell
+    return largest
+
+
+def average_cell(flowing: Flowing, cell: int, members: Members, edges: EdgeColumns, c: int) -> None:
+    """Gather the edges of a cell as members of circle ``c``."""
+    shared.clear(members, c)
+    flowing.mean_expansion[c] = 0.0
+    for j in range(flowing.count):
+        if flowing.cell[j] == cell:
+            i = flowing.row[j]
+            edges.circle[i] = c
+            members.size[c] += 1
+            members.x[c] += edges.x[i]
+            members.y[c] += edges.y[i]
+            flowing.mean_expansion[c] += flowing.expansion[j]
+    members.x[c] /= members.size[c]
+    members.y[c] /= members.size[c]
+    flowing.mean_expansion[c] /= members.size[c]
+    for j in range(flowing.count):
+        if flowing.cell[j] == cell:
+            i = flowing.row[j]
+            dx, dy = edges.x[i] - members.x[c], edges.y[i] - members.y[c]
+            members.variance_x[c] += dx * dx / members.size[c]
+            members.variance_y[c] += dy * dy / members.size[c]
+
+
+def found(
+    flowing: Flowing, edges: EdgeColumns, circles: CircleColumns, around: Situation, settings: Settings, ids: Ids
+) -> int:
+    """New circles from the edges that are left, those of one cell and octave, the largest groups first.
+
+    Return how many circles, old or new, found no place.
+    """
+    evicted = 0
+    sort_left(flowing, edges, around, settings)
+    cell = largest_cell(flowing, settings.circle_support)
+    while cell >= 0:
+        c = shared.free_row(circles)
+        if c < 0:
+            evicted += 1
+            c = shared.make_room(edges, circles, False, settings)
+        if c >= 0:
+            average_cell(flowing, cell, flowing.members, edges, c)
+            shared.give_birth(circles, c, flowing.members, c, settings, ids)
+            circles.expansion[c] = flowing.mean_expansion[c]
+        flowing.cell_size[cell] = 0
+        cell = largest_cell(flowing, settings.circle_support)
+    for j in range(flowing.count):
+        if flowing.cell[j] >= 0:
+            flowing.cell_size[flowing.cell[j]] = 0
+    return evicted
+
+
+def update(
+    flowing: Flowing,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    ignored: Bytes,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); return evictions.
+
+    ``ignored``: (capacity,), circles under an active ψ, which are only predicted.
+    """
+    gather(flowing, edges, around, settings)
+    open_circles(flowing, circles, ignored)
+    involve(flowing, edges, circles, around, settings)
+    average(flowing, flowing.members, edges)
+    compare(flowing, circles, ignored, settings)
+    for c in range(circles.capacity):
+        if circles.trust[c] < settings.tr_cr:
+            circles.active[c] = 0
+    shared.release(edges, circles, False)
+    evicted = found(flowing, edges, circles, around, settings, ids)
+    direct(circles, around)
+    return evicted

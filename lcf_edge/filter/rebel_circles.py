@@ -2,289 +2,564 @@
 
 import math
 
-import numpy as np
-import numpy.typing as npt
-
-from lcf_edge.config import Filter
-from lcf_edge.filter.circles import Ids, Members, blend, claim, give_birth, release
-from lcf_edge.filter.edge_equations import change_trust, update_position
-from lcf_edge.filter.flow import Pinhole, wrap
-from lcf_edge.filter.matching import one_to_one
-from lcf_edge.filter.rebel_detection import Rebels, miss
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Integers, doubles, integers, octets
+from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, EdgeTable, Floats, Mask, Rows
-from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
 LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
 MEMBER_MARGIN_PX = 8.0
 SIDEWAYS = 0.2  # what leads moves to the side with no more than this share of the vehicle's speed
-LEAST_RANGE_M = 0.01
-LEAST_RATE = 1e-6  # 1/s, slower expansions are none
+MIN_RANGE_M = 0.01
+MIN_RATE = 1e-6  # 1/s, slower expansions are none
+RATE_SIGMAS = 2.0  # by which an expansion is above its noise
+MAX_GROWTH = 1.5  # of a circle, in one frame
+MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
-LOOMS = 4.0  # fastest expansion of one object, over one horizon
+FASTEST_EXPANSION = 4.0  # of one object, over one horizon
 LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
-COAST_LEAST_PX = 40.0  # what is that near is not small
-LEAST_TTC_SHARE = 0.0125
+MIN_COAST_PX = 40.0  # what is that near is not small
+MIN_TTC_SHARE = 0.0125
+CROSSING = 1
+INCOMING = 2
+LEADING = 3
+INFINITY = float("inf")
+NAN = float("nan")
 
 
-class RebelCircles:
-    """Groups rebel edges into circles (C_r) and keeps the circles from frame to frame."""
+class RebelGroups:
+    """The rebel edges of a frame, gathered into groups.
 
-    def __init__(self, settings: Filter, horizon_s: float, ids: Ids) -> None:
-        self._settings = settings
-        self._horizon_s = horizon_s
-        self._least_ttc_s = np.float32(LEAST_TTC_SHARE * horizon_s)
-        self._ids = ids
+    A row a rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s; ``elapsed_s``, over which it was seen;
+    ``label``, the lowest of its group; ``group``, its number, -1: too few go with it.
 
-    def predict(self, circles: CircleTable, dt_s: float) -> None:
-        """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
-
-        Without a time to contact, the centre goes on as it went.
-        """
-        dt = np.float32(dt_s)
-        ttc = circles.ttc
-        looming = np.isfinite(ttc) & (ttc > self._least_ttc_s) & circles.active
-        tau = np.where(looming, ttc, np.float32(1e6))
-        grow = np.minimum(tau / np.maximum(tau - dt, self._least_ttc_s), np.float32(1.5))
-        step = circles.speed * dt * grow
-        circles.x += step * np.cos(circles.beta)
-        circles.y += step * np.sin(circles.beta)
-        circles.speed *= grow * grow
-        for size in (circles.radius, circles.width, circles.height):
-            size[:] = np.where(looming, size * grow, size)
-        circles.ttc -= dt
-
-    def coasting(self, circles: CircleTable) -> Mask:
-        """Trusted circles so near to contact that they grow too fast to be followed; bool (capacity,)."""
-        near = np.abs(circles.ttc) < COAST_SHARE * self._horizon_s
-        large = np.maximum(circles.width, circles.height) > np.float32(COAST_LEAST_PX)
-        return circles.active & near & large & (circles.trust >= self._settings.tr_s)
-
-    def innermost(self, circles: CircleTable, pinhole: Pinhole) -> tuple[Floats, Floats]:
-        """The point of each circle that must leave the frame for the circle to end, px.
-
-        What is about to be met fills the picture, and is not gone because its middle has left.
-        """
-        half = np.where(self.coasting(circles), np.float32(0.5), np.float32(0))
-        most_x, most_y = half * circles.width, half * circles.height
-        x = circles.x + np.clip(np.float32(pinhole.cx) - circles.x, -most_x, most_x)
-        y = circles.y + np.clip(np.float32(pinhole.cy) - circles.y, -most_y, most_y)
-        return x, y
-
-    def motion_at(self, circles: CircleTable, x: Floats, y: Floats) -> tuple[npt.NDArray[np.intp], Floats, Floats]:
-        """Circle that holds each point (-1: none) and the image velocity there, px/s: the circle's own plus looming.
-
-        Only circles from Tr_s up speak for what is inside them.
-        """
-        rows = np.flatnonzero(circles.active & (circles.trust >= self._settings.tr_s))
-        if not len(rows) or not len(x):
-            none = np.zeros(len(x), np.float32)
-            return np.full(len(x), NO_CIRCLE), none, none
-        dx, dy = x[:, None] - circles.x[rows], y[:, None] - circles.y[rows]
-        away = np.hypot(dx, dy) - circles.radius[rows] - np.float32(MEMBER_MARGIN_PX)
-        nearest = np.argmin(away, axis=1)
-        pick = np.arange(len(x))
-        held = away[pick, nearest] < 0
-        row = rows[nearest]
-        rate = np.where(circles.ttc[row] > self._least_ttc_s, 1 / np.maximum(circles.ttc[row], self._least_ttc_s), 0)
-        vx = circles.speed[row] * np.cos(circles.beta[row]) + rate * dx[pick, nearest]
-        vy = circles.speed[row] * np.sin(circles.beta[row]) + rate * dy[pick, nearest]
-        return np.where(held, row, NO_CIRCLE), vx.astype(np.float32), vy.astype(np.float32)
-
-    def update(self, edges: EdgeTable, circles: CircleTable, rebels: Rebels | None, around: Situation) -> int:
-        """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); answers evictions."""
-        live = circles.active.nonzero()[0]
-        if rebels is None and not len(live):
-            return 0
-        updated: Rows = np.empty(0, np.intp)
-        evicted = 0
-        if rebels is not None and len(rebels.rows):
-            rebels, label, size = self._group(rebels, around)
-            if len(size):
-                updated, evicted = self._meet(edges, circles, rebels, label, size, around)
-        was_updated = np.zeros(circles.capacity, np.bool_)
-        was_updated[updated] = True
-        missed = live[circles.active[live] & ~was_updated[live]]
-        waits = self.coasting(circles)[missed] | self._hidden(circles, missed)
-        circles.trust[missed[~waits]] -= 1
-        circles.active &= (circles.ttc > 0) & (circles.trust >= self._settings.tr_cr)
-        release(edges, circles, rebel=True)
-        return evicted
-
-    def _hidden(self, circles: CircleTable, rows: Rows) -> Mask:
-        """Whether each circle lies behind another one that will be met earlier; bool (rows,)."""
-        dx, dy = np.abs(circles.x[rows, None] - circles.x), np.abs(circles.y[rows, None] - circles.y)
-        reach = circles.radius + np.float32(MEMBER_MARGIN_PX)
-        covers = (dx < np.maximum(circles.width / 2, reach)) & (dy < np.maximum(circles.height / 2, reach))
-        nearer = circles.active & (circles.trust >= self._settings.tr_s) & (circles.ttc < circles.ttc[rows, None])
-        trusted = circles.trust[rows] >= self._settings.tr_s
-        return np.asarray((covers & nearer).any(axis=1) & trusted & np.isfinite(circles.ttc[rows]))
-
-    def _group(self, rebels: Rebels, around: Situation) -> tuple[Rebels, Rows, Rows]:
-        """The rebels in groups with support, the group of each, and the groups' sizes."""
-        label = link(rebels, self._settings, around)
-        size = np.bincount(label)
-        big = size >= self._settings.rebel_support
-        number = np.where(big, np.cumsum(big) - 1, NO_CIRCLE).take(label)
-        chosen = (number >= 0).nonzero()[0]
-        return rebels.take(chosen), number.take(chosen), size[big]
-
-    def _meet(
-        self, edges: EdgeTable, circles: CircleTable, rebels: Rebels, label: Rows, size: Rows, around: Situation
-    ) -> tuple[Rows, int]:
-        """Groups update the circles that they are involved in, and found new ones; answers the rows and evictions."""
-        settings = self._settings
-        members = Members(label, len(size), rebels.x, rebels.y)
-        vx, vy = members.mean(rebels.vx), members.mean(rebels.vy)
-        beta, speed = np.arctan2(vy, vx), np.hypot(vx, vy)
-        still = np.float32(STILL_PX) / members.mean(rebels.links.elapsed_s)
-        radius = members.radius(settings.bs_px)
-        odd = size < settings.rebel_share * (size + self._normal_inside(edges, members, radius))
-
-        away = np.hypot(rebels.x[:, None] - circles.x, rebels.y[:, None] - circles.y)
-        inside = circles.active & (away < circles.radius + np.float32(MEMBER_MARGIN_PX))
-        row = involve(label, edges.circle[rebels.rows], inside, size, settings.involvement)
-        row[odd] = NO_CIRCLE  # a few odd ones in a crowd that flows are mistakes, not an object
-        known = np.flatnonzero(row >= 0)
-        new = np.flatnonzero((row < 0) & ~odd)
-        new = new[np.argsort(-size[new], kind="stable")]
-
-        rows = row[known]
-        turn = np.abs(wrap(beta[known] - circles.beta[rows]))
-        like = speed[known] <= circles.speed[rows] + settings.eps_v_circle_rebel * around.scene_flow_pxps
-        aligned = like & (turn < settings.eps_beta_circle_rebel_rad + np.arctan2(still[known], speed[known]))
-        extents = circles.width[rows], circles.height[rows]
-        blend(circles, rows, members, known, settings)
-        self._remember_extents(circles, rows, *extents)
-        change = np.where(aligned, np.float32(1), np.float32(-1))
-        circles.trust[rows] = change_trust(circles.trust[rows], change, settings.tr_max)
-
-        places, evicted = claim(edges, circles, len(new), settings, rebel=True)
-        new = new[: len(places)]
-        give_birth(circles, places, members, new, settings, self._ids)
-        row[new] = places
-
-        groups = np.concatenate([known, new])
-        rows = row[groups]
-        circles.beta[rows], circles.speed[rows] = beta[groups], speed[groups]
-        self._contact(circles, rows, groups, rebels, members, around)
-        edges.circle[rebels.rows] = row[label]
-        return rows, evicted
-
-    def _remember_extents(self, circles: CircleTable, rows: Rows, width: Floats, height: Floats) -> None:
-        """An object shows ever other parts of itself: its extent grows at once and shrinks slowly."""
-        for column, before in ((circles.width, width), (circles.height, height)):
-            seen = column[rows]
-            column[rows] = np.maximum(seen, update_position(circles.trust[rows], self._settings.tr_cr, before, seen))
-
-    def _normal_inside(self, edges: EdgeTable, members: Members, radius: Floats) -> Rows:
-        """Edges that were seen to follow the flow inside the circle of each group; int (groups,)."""
-        n = edges.count
-        flows = edges.matched[:n] & ~edges.rebel[:n] & (edges.links[:n] == 0) & (edges.trust[:n] > self._settings.tr_s)
-        rows = np.flatnonzero(flows)
-        away2 = np.square(edges.x[rows, None] - members.centre_x) + np.square(edges.y[rows, None] - members.centre_y)
-        return np.asarray(np.count_nonzero(away2 < radius * radius, axis=0))
-
-    def _contact(
-        self, circles: CircleTable, rows: Rows, groups: Rows, rebels: Rebels, members: Members, around: Situation
-    ) -> None:
-        """Cause, time to contact, range and lateral miss of circles; ``groups``: the group of members of each.
-
-        What stands still expands about the focus, what moves about the horizon: 1/TTC = V_e/r, fitted over the members.
-        """
-        links, verdict = rebels.links, rebels.verdict
-        stands = members.mean(verdict.incoming)[groups] >= 0.5
-        expanding = standing_expansion(rebels, members)[groups]
-        range_m = members.mean(links.depth_m / links.elapsed_s)[groups] / np.maximum(expanding, LEAST_RATE)
-        speed = around.speed_mps
-        closing = max(speed, 0.0) / np.maximum(range_m, LEAST_RANGE_M) if math.isfinite(speed) else expanding
-        rate = np.where(stands, closing, own_expansion(rebels, members, around.horizon_y)[groups])
-        before = np.where(np.isfinite(circles.ttc[rows]), 1 / np.maximum(circles.ttc[rows], self._least_ttc_s), rate)
-        rate = update_position(circles.trust[rows], self._settings.tr_cr, before, rate)
-        ttc = np.where(rate > LEAST_RATE, 1 / np.maximum(rate, LEAST_RATE), np.inf)
-
-        right = (circles.x[rows] - around.focus[0]) / around.pinhole.fx
-        on_ground_m = around.ground_range_m(circles.y[rows] + 0.5 * circles.height[rows])
-        drift = members.mean(rebels.vx)[groups] / around.pinhole.fx  # of its bearing, 1/s
-        moving_miss = on_ground_m * drift * np.where(np.isfinite(ttc), ttc, np.nan)
-        lateral = np.where(stands, miss(right * range_m, range_m, around), moving_miss)
-        if not math.isfinite(speed):
-            range_m, lateral = np.full_like(range_m, np.nan), np.full_like(lateral, np.nan)
-        inwards = members.mean(verdict.mover & (verdict.short > np.abs(verdict.drift)))[groups] > 0.5
-        inwards &= ~(np.abs(on_ground_m * drift) > SIDEWAYS * abs(speed))  # who walks in from the side crosses
-        meets = stands | ((ttc < around.horizon_s) & ~(np.abs(lateral) > around.half_width_m))
-        circles.cause[rows] = np.where(meets, Cause.INCOMING, np.where(inwards, Cause.LEADING, Cause.CROSSING))
-        circles.ttc[rows], circles.lateral[rows] = ttc, lateral
-        circles.range[rows] = np.where(stands, range_m, on_ground_m)
-
-
-def standing_expansion(rebels: Rebels, members: Members) -> Floats:
-    """V_e/r about the focus, 1/s, float32 (groups,): least squares over the members, so that far ones count more."""
-    links = rebels.links
-    weight = np.square(links.x - links.focus_x) + np.square(links.y - links.focus_y)
-    return members.mean(rebels.verdict.expansion * weight) / np.maximum(members.mean(weight), 1)
-
-
-def own_expansion(rebels: Rebels, members: Members, horizon_y: float) -> Floats:
-    """V_e/r of what moves on the ground, 1/s, float32 (groups,); 0 where it is not above its noise.
-
-    Fitted to the vertical motion about the horizon, at ``horizon_y`` px, which motion to the side does not touch.
+    A row a group: ``members``; means of ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, ``inwards``, how many
+    stand still and are incoming, and how many fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
+    ``focus_r2``, means of μ/t·r² and r²; ``below2`` and ``below_vy``, of the height under the horizon squared, and
+    times V; ``flowing``, normal edges inside; ``odd``, too few of those inside are rebels; ``circle``, row of C_r, -1:
+    none; ``votes`` for each circle.
     """
-    below = rebels.links.y - np.float32(horizon_y)
-    extent2 = np.maximum(members.mean(below * below), 1)
-    rate = members.mean(below * rebels.vy) / extent2
-    sigma = np.float32(VELOCITY_NOISE_PX) / members.mean(rebels.links.elapsed_s) / np.sqrt(extent2 * members.size)
-    return np.where(rate > 2 * sigma, rate, 0).astype(np.float32)
+
+    def __init__(self, rebels: int, circles: int) -> None:
+        self.count = self.groups = 0
+        self.verdict, self.label, self.group = (integers(rebels) for _ in range(3))
+        self.vx, self.vy, self.elapsed_s = (doubles(rebels) for _ in range(3))
+        self.members = Members(rebels)
+        self.mean_vx, self.mean_vy, self.mean_s = (doubles(rebels) for _ in range(3))
+        self.closing_mps, self.focus_rate = (doubles(rebels) for _ in range(2))
+        self.focus_r2, self.below2, self.below_vy = (doubles(rebels) for _ in range(3))
+        self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
+        self.odd = octets(rebels)
+        self.votes = integers(rebels, circles)
+        self.best_circle, self.best_group = (
+            integers(rebels),
+            integers(circles),
+        )
+        self.updated, self.missed = (octets(circles) for _ in range(2))
 
 
-def link(rebels: Rebels, settings: Filter, around: Situation) -> Rows:
-    """Label of each rebel edge's group (eq. EdgeErcompareER, and by place); int (k,), k at most E_r's capacity.
+# Prediction
 
-    Two rebels are linked when they are near and move in the same direction with a like speed, or differ in velocity
-    by no more than the parts of an object that grows in the picture do.
+
+def predict(circles: CircleColumns, around: Situation) -> None:
+    """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
+
+    Without a time to contact, the centre goes on as it went.
     """
-    x, y, vx, vy = rebels.x, rebels.y, rebels.vx, rebels.vy
-    distance = np.hypot(x[:, None] - x, y[:, None] - y)
-    difference = np.hypot(vx[:, None] - vx, vy[:, None] - vy)
-    noise = np.float32(VELOCITY_NOISE_PX) / rebels.links.elapsed_s
-    speed = np.hypot(vx, vy)
-    faster = np.maximum(speed[:, None], speed)
-    along = vx[:, None] * vx + vy[:, None] * vy
-    together = along > np.cos(settings.eps_beta_rebel_rad) * speed[:, None] * speed
-    together &= difference < np.float32(LIKE_SPEED) * faster
-    together &= faster <= np.minimum(speed[:, None], speed) + settings.eps_v_rebel * around.scene_flow_pxps
-    looms = difference < noise[:, None] + noise + np.float32(LOOMS / around.horizon_s) * distance
-    reach = np.maximum(np.float32(settings.rebel_link_px), np.float32(LINK_SHARE * around.horizon_s) * faster)
-    linked = (distance < reach) & (together | looms)
-    label = np.arange(len(x))
-    while True:
-        lowest = np.where(linked, label, len(x)).min(axis=1)
-        lowest = lowest[lowest]
-        if np.array_equal(lowest, label):
-            return label
-        label = lowest
+    least_s = MIN_TTC_SHARE * around.horizon_s
+    for c in range(circles.capacity):
+        if not circles.active[c]:
+            continue
+        grow = 1.0
+        if math.isfinite(circles.ttc[c]) and circles.ttc[c] > least_s:
+            grow = min(circles.ttc[c] / max(circles.ttc[c] - around.dt_s, least_s), MAX_GROWTH)
+        step = circles.speed[c] * around.dt_s * grow
+        circles.x[c] += step * math.cos(circles.beta[c])
+        circles.y[c] += step * math.sin(circles.beta[c])
+        circles.speed[c] *= grow * grow
+        circles.radius[c] *= grow
+        circles.width[c] *= grow
+        circles.height[c] *= grow
+        circles.ttc[c] -= around.dt_s
+
+
+def coasts(circles: CircleColumns, c: int, horizon_s: float, tr_s: float) -> bool:
+    """Whether a trusted circle is so near to contact that it grows too fast to be followed."""
+    return (
+        circles.active[c] != 0
+        and math.fabs(circles.ttc[c]) < COAST_SHARE * horizon_s
+        and max(circles.width[c], circles.height[c]) > MIN_COAST_PX
+        and circles.trust[c] >= tr_s
+    )
+
+
+def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
+    """Circles that left the frame end.
+
+    What is about to be met fills the picture, and is not gone because its middle has left: there the innermost point of
+    its extent must leave.
+    """
+    for c in range(circles.capacity):
+        if not circles.active[c]:
+            continue
+        half = 0.5 if coasts(circles, c, around.horizon_s, settings.tr_s) else 0.0
+        across, down = half * circles.width[c], half * circles.height[c]
+        x = circles.x[c] + min(max(around.pinhole.cx - circles.x[c], -across), across)
+        y = circles.y[c] + min(max(around.pinhole.cy - circles.y[c], -down), down)
+        if not image_plane.project(plane, x, y):
+            circles.active[c] = 0
+
+
+# Motion of what is inside
+
+
+def circle_at(circles: CircleColumns, x: float, y: float, tr_s: float) -> int:
+    """Circle that holds a point, the nearest; -1: none. Only circles from Tr_s up speak for what is inside them."""
+    nearest = -1
+    least = 0.0
+    for c in range(circles.capacity):
+        if circles.active[c] and circles.trust[c] >= tr_s:
+            away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - MEMBER_MARGIN_PX
+            if away < least:
+                nearest, least = c, away
+    return nearest
+
+
+def looming_rate(circles: CircleColumns, c: int, horizon_s: float) -> float:
+    """1/TTC, 1/s; 0 where nothing is met, or as good as now."""
+    return 1 / circles.ttc[c] if circles.ttc[c] > MIN_TTC_SHARE * horizon_s else 0.0
+
+
+def velocity_x(circles: CircleColumns, c: int, x: float, horizon_s: float) -> float:
+    """Image velocity to the right at ``x`` inside a circle, px/s: the circle's own plus looming."""
+    own = circles.speed[c] * math.cos(circles.beta[c])
+    return own + looming_rate(circles, c, horizon_s) * (x - circles.x[c])
+
+
+def velocity_y(circles: CircleColumns, c: int, y: float, horizon_s: float) -> float:
+    """Image velocity down at ``y`` inside a circle, px/s: the circle's own plus looming."""
+    own = circles.speed[c] * math.sin(circles.beta[c])
+    return own + looming_rate(circles, c, horizon_s) * (y - circles.y[c])
+
+
+# Groups
+
+
+def take_rebels(
+    groups: RebelGroups,
+    rebels: int,
+    breaking: Integers,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+) -> None:
+    """The rebels of this frame: the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``."""
+    groups.count = rebels
+    for k in range(rebels):
+        j = breaking[k]
+        i = verdicts.row[j]
+        elapsed_s = baselines.elapsed_s[verdicts.slot[j]]
+        groups.verdict[k], groups.elapsed_s[k], groups.label[k] = j, elapsed_s, k
+        groups.vx[k] = (edges.x[i] - verdicts.x[j]) / elapsed_s
+        groups.vy[k] = (edges.y[i] - verdicts.y[j]) / elapsed_s
+
+
+def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings) -> bool:
+    """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
+
+    They are near, and move in the same direction with a like speed, or differ in velocity by no more than the parts of
+    an object that grows in the picture do.
+    """
+    ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
+    one, other = flow.length(ax, ay), flow.length(bx, by)
+    slower, faster = min(one, other), max(one, other)
+    if distance >= max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster):
+        return False
+    difference = flow.length(ax - bx, ay - by)
+    noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+    if difference < noise + FASTEST_EXPANSION / around.horizon_s * distance:
+        return True
+    return (
+        ax * bx + ay * by > math.cos(settings.eps_beta_rebel_rad) * one * other
+        and difference < LIKE_SPEED * faster
+        and faster <= slower + settings.eps_v_rebel * around.scene_flow_pxps
+    )
+
+
+def lowest_label(groups: RebelGroups, k: int) -> int:
+    """The lowest of the group that a rebel belongs to; the way there gets shorter."""
+    while groups.label[k] != k:
+        groups.label[k] = groups.label[groups.label[k]]
+        k = groups.label[k]
+    return k
+
+
+def join(groups: RebelGroups, a: int, b: int) -> None:
+    """Two rebels are of one group."""
+    one, other = lowest_label(groups, a), lowest_label(groups, b)
+    groups.label[max(one, other)] = min(one, other)
+
+
+def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+    """Rebels that are linked are of one group, and so are those that others link."""
+    for a in range(groups.count):
+        i = verdicts.row[groups.verdict[a]]
+        for b in range(a):
+            k = verdicts.row[groups.verdict[b]]
+            distance = flow.length(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
+            if are_linked(groups, a, b, distance, around, settings):
+                join(groups, a, b)
+
+
+def number_groups(groups: RebelGroups, support: int) -> None:
+    """Number the groups of at least ``support`` rebels."""
+    groups.groups = 0
+    for k in range(groups.count):
+        groups.group[k] = 0
+    for k in range(groups.count):
+        groups.group[lowest_label(groups, k)] += 1  # sizes, for now
+    for k in range(groups.count):
+        lowest = lowest_label(groups, k)
+        if lowest < k:
+            groups.group[k] = groups.group[lowest]  # it came first
+        elif groups.group[k] >= support:
+            groups.group[k] = groups.groups
+            groups.groups += 1
+        else:
+            groups.group[k] = -1
+
+
+def clear_group(groups: RebelGroups, g: int) -> None:
+    """A group without rebels."""
+    shared.clear(groups.members, g)
+    groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
+    groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
+    groups.flowing[g] = groups.standing[g] = groups.inwards[g] = 0
+
+
+def average(
+    groups: RebelGroups,
+    members: Members,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """Means over the members of each group of all that its circle takes from them."""
+    for g in range(groups.groups):
+        clear_group(groups, g)
+    for k in range(groups.count):
+        if groups.group[k] >= 0:
+            members.size[groups.group[k]] += 1
+    for k in range(groups.count):
+        g, j = groups.group[k], groups.verdict[k]
+        if g < 0:
+            continue
+        i, slot = verdicts.row[j], verdicts.slot[j]
+        share = 1.0 / members.size[g]
+        from_x, from_y = verdicts.x[j] - baselines.focus_x[slot], verdicts.y[j] - baselines.focus_y[slot]
+        r2 = from_x * from_x + from_y * from_y
+        below = verdicts.y[j] - around.horizon_y
+        members.x[g] += share * edges.x[i]
+        members.y[g] += share * edges.y[i]
+        groups.mean_vx[g] += share * groups.vx[k]
+        groups.mean_vy[g] += share * groups.vy[k]
+        groups.mean_s[g] += share * groups.elapsed_s[k]
+        groups.closing_mps[g] += share * baselines.depth_m[slot] / groups.elapsed_s[k]
+        groups.focus_rate[g] += share * verdicts.expansion[j] * r2
+        groups.focus_r2[g] += share * r2
+        groups.below2[g] += share * below * below
+        groups.below_vy[g] += share * below * groups.vy[k]
+        if verdicts.incoming[j]:
+            groups.standing[g] += 1
+        if verdicts.mover[j] and verdicts.short[j] > math.fabs(verdicts.drift[j]):
+            groups.inwards[g] += 1
+    for k in range(groups.count):
+        g = groups.group[k]
+        if g >= 0:
+            i = verdicts.row[groups.verdict[k]]
+            dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
+            members.variance_x[g] += dx * dx / members.size[g]
+            members.variance_y[g] += dy * dy / members.size[g]
+
+
+def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, settings: Settings) -> None:
+    """A few odd ones among edges that were seen to follow the flow are mistakes, not an object."""
+    for g in range(groups.groups):
+        radius = shared.radius_of(members, g, settings.bs_px)
+        for i in range(edges.count):
+            if edges.matched[i] and edges.trust[i] > settings.tr_s and not edges.own_way(i):
+                dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
+                if dx * dx + dy * dy < radius * radius:
+                    groups.flowing[g] += 1
+        few = members.size[g] < settings.rebel_share * (members.size[g] + groups.flowing[g])
+        groups.odd[g] = 1 if few else 0
+
+
+# Groups and circles
+
+
+def vote(
+    groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, circles: CircleColumns, settings: Settings
+) -> None:
+    """Rebels vote for the circles that hold them, or held them; too small a share of a group does not count."""
+    for g in range(groups.groups):
+        for c in range(circles.capacity):
+            groups.votes[g, c] = 0
+    for k in range(groups.count):
+        g, i = groups.group[k], verdicts.row[groups.verdict[k]]
+        if g < 0:
+            continue
+        for c in range(circles.capacity):
+            away = flow.length(edges.x[i] - circles.x[c], edges.y[i] - circles.y[c])
+            inside = circles.active[c] != 0 and away < circles.radius[c] + MEMBER_MARGIN_PX
+            if inside or c == edges.circle[i]:
+                groups.votes[g, c] += 1
+    for g in range(groups.groups):
+        for c in range(circles.capacity):
+            if groups.votes[g, c] < max(settings.involvement * groups.members.size[g], 1.0):
+                groups.votes[g, c] = 0
+
+
+def choose(groups: RebelGroups, circles: CircleColumns) -> None:
+    """The circle with the most votes of each group that has none, and the group of each circle that has none."""
+    for c in range(circles.capacity):
+        groups.best_group[c] = -1
+    for g in range(groups.groups):
+        groups.best_circle[g] = -1
+        if groups.circle[g] >= 0:
+            continue
+        for c in range(circles.capacity):
+            votes = groups.votes[g, c]
+            if groups.updated[c] or votes == 0:
+                continue
+            if groups.best_circle[g] < 0 or votes > groups.votes[g, groups.best_circle[g]]:
+                groups.best_circle[g] = c
+            if groups.best_group[c] < 0 or votes > groups.votes[groups.best_group[c], c]:
+                groups.best_group[c] = g
 
 
 def involve(
-    label: npt.NDArray[np.intp],
-    owner: npt.NDArray[np.int32],
-    inside: npt.NDArray[np.bool_],
-    size: npt.NDArray[np.intp],
-    involvement: float,
-) -> npt.NDArray[np.intp]:
-    """Rebel circle of each group by share of involvement (eq. percentinvolve); int (groups,), -1: none.
+    groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, circles: CircleColumns, settings: Settings
+) -> None:
+    """Rebel circle of each group by share of involvement (eq. percentinvolve), one to one, by mutual best choice."""
+    vote(groups, verdicts, edges, circles, settings)
+    for g in range(groups.groups):
+        groups.circle[g] = -1
+    for _ in range(2):
+        choose(groups, circles)
+        for g in range(groups.groups):
+            c = groups.best_circle[g]
+            if c >= 0 and groups.best_group[c] == g:
+                groups.circle[g] = c
+                groups.updated[c] = 1
+    for g in range(groups.groups):
+        if groups.odd[g] and groups.circle[g] >= 0:
+            groups.updated[groups.circle[g]] = 0
+            groups.circle[g] = -1
 
-    ``label``: group of each edge. ``owner``: circle that it belonged to, -1: none. ``inside``: bool (edges, circles).
+
+def is_aligned(
+    groups: RebelGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
+) -> bool:
+    """Whether a group goes on as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction."""
+    beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), flow.length(groups.mean_vx[g], groups.mean_vy[g])
+    still = STILL_PX / groups.mean_s[g]
+    turn = math.fabs(flow.wrap(beta - circles.beta[c]))
+    most = circles.speed[c] + settings.eps_v_circle_rebel * around.scene_flow_pxps
+    return speed <= most and turn < settings.eps_beta_circle_rebel_rad + math.atan2(still, speed)
+
+
+def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
+    """A group updates the circle that it is involved in: aligned Tr +1, else -1.
+
+    An object shows ever other parts of itself: its extent grows at once and shrinks slowly.
     """
-    capacity = inside.shape[1]
-    belongs = inside | (owner[:, None] == np.arange(capacity))
-    votes = np.zeros((len(size), capacity), np.float32)
-    np.add.at(votes, label, belongs.astype(np.float32))
-    group, circle = np.nonzero(votes >= np.maximum(involvement * size[:, None], 1))
-    best = one_to_one(group, circle, -votes[group, circle], len(size), capacity)
-    answer = np.full(len(size), NO_CIRCLE)
-    answer[group[best]] = circle[best]
-    return answer
+    c = groups.circle[g]
+    trust, width, height = circles.trust[c], circles.width[c], circles.height[c]
+    change = 1.0 if is_aligned(groups, g, circles, c, around, settings) else -1.0
+    shared.blend(circles, c, groups.members, g, settings)
+    slow_width = edge_equations.update_position(trust, settings.tr_cr, width, circles.width[c])
+    slow_height = edge_equations.update_position(trust, settings.tr_cr, height, circles.height[c])
+    circles.width[c] = max(circles.width[c], slow_width)
+    circles.height[c] = max(circles.height[c], slow_height)
+    circles.trust[c] = edge_equations.change_trust(trust, change, settings.tr_max)
+
+
+def largest_new(groups: RebelGroups) -> int:
+    """The largest group without a circle, -1: there is none."""
+    largest = -1
+    for g in range(groups.groups):
+        if groups.circle[g] >= 0 or groups.odd[g]:
+            continue
+        if largest < 0 or groups.members.size[g] > groups.members.size[largest]:
+            largest = g
+    return largest
+
+
+def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, settings: Settings, ids: Ids) -> int:
+    """New circles from the groups that have none, the largest first; return how many, old or new, found no place."""
+    evicted = 0
+    g = largest_new(groups)
+    while g >= 0:
+        c = shared.free_row(circles)
+        if c < 0:
+            evicted += 1
+            c = shared.make_room(edges, circles, True, settings)
+        if c >= 0:
+            shared.give_birth(circles, c, groups.members, g, settings, ids)
+            groups.circle[g] = c
+            groups.updated[c] = 1
+        else:
+            groups.odd[g] = 1
+        g = largest_new(groups)
+    return evicted
+
+
+# Contact
+
+
+def standing_expansion(groups: RebelGroups, g: int) -> float:
+    """V_e/r about the focus, 1/s: least squares over the members, so that far ones count more."""
+    return groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
+
+
+def own_expansion(groups: RebelGroups, g: int) -> float:
+    """V_e/r of what moves on the ground, 1/s; 0 where it is not above its noise.
+
+    Fitted to the vertical motion about the horizon, which motion to the side does not touch.
+    """
+    extent2 = max(groups.below2[g], MIN_EXTENT2_PX)
+    rate = groups.below_vy[g] / extent2
+    sigma = VELOCITY_NOISE_PX / groups.mean_s[g] / math.sqrt(extent2 * groups.members.size[g])
+    return rate if rate > RATE_SIGMAS * sigma else 0.0
+
+
+def expansion_of(groups: RebelGroups, g: int, stands: bool, range_m: float, around: Situation) -> float:
+    """1/TTC that a group shows, 1/s: what stands still closes with V_ν, what moves expands about the horizon."""
+    if not stands:
+        return own_expansion(groups, g)
+    if not math.isfinite(around.speed_mps):
+        return standing_expansion(groups, g)
+    return max(around.speed_mps, 0.0) / max(range_m, MIN_RANGE_M)
+
+
+def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
+    """Cause, time to contact, range and lateral miss of a group's circle.
+
+    What stands still expands about the focus, what moves about the horizon: 1/TTC = V_e/r, fitted over the members.
+    """
+    c = groups.circle[g]
+    stands = 2 * groups.standing[g] >= groups.members.size[g]
+    range_m = groups.closing_mps[g] / max(standing_expansion(groups, g), MIN_RATE)
+    rate = expansion_of(groups, g, stands, range_m, around)
+    before = rate
+    if math.isfinite(circles.ttc[c]):
+        before = 1 / max(circles.ttc[c], MIN_TTC_SHARE * around.horizon_s)
+    rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, before, rate)
+    circles.ttc[c] = 1 / rate if rate > MIN_RATE else INFINITY
+
+    on_ground_m = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
+    aside_mps = on_ground_m * groups.mean_vx[g] / around.pinhole.fx
+    right_m = (circles.x[c] - around.focus_x) / around.pinhole.fx * range_m
+    circles.range[c] = range_m if stands else on_ground_m
+    circles.lateral[c] = path.miss(right_m, range_m, around) if stands else aside_mps * finite(circles.ttc[c])
+    if not math.isfinite(around.speed_mps):
+        circles.lateral[c] = NAN
+        circles.range[c] = NAN if stands else on_ground_m
+    circles.cause[c] = cause_of(groups, g, circles, stands, aside_mps, around)
+
+
+def finite(value: float) -> float:
+    """The value, NaN where it is infinite."""
+    return value if math.isfinite(value) else NAN
+
+
+def cause_of(
+    groups: RebelGroups, g: int, circles: CircleColumns, stands: bool, aside_mps: float, around: Situation
+) -> int:
+    """Why a group's circle is a rebel. ``aside_mps``: speed to the side, of what moves on the ground; NaN: unknown."""
+    c = groups.circle[g]
+    beside = math.fabs(circles.lateral[c]) > around.half_width_m
+    if stands or (circles.ttc[c] < around.horizon_s and not beside):
+        return INCOMING
+    crosses = math.fabs(aside_mps) > SIDEWAYS * math.fabs(around.speed_mps)  # who walks in from the side crosses
+    return LEADING if 2 * groups.inwards[g] > groups.members.size[g] and not crosses else CROSSING
+
+
+# Circles without a group
+
+
+def is_hidden(circles: CircleColumns, c: int, tr_s: float) -> bool:
+    """Whether a circle lies behind another one that will be met earlier."""
+    if circles.trust[c] < tr_s or not math.isfinite(circles.ttc[c]):
+        return False
+    for o in range(circles.capacity):
+        if circles.active[o] and circles.trust[o] >= tr_s and circles.ttc[o] < circles.ttc[c]:
+            reach = circles.radius[o] + MEMBER_MARGIN_PX
+            across = math.fabs(circles.x[c] - circles.x[o]) < max(0.5 * circles.width[o], reach)
+            if across and math.fabs(circles.y[c] - circles.y[o]) < max(0.5 * circles.height[o], reach):
+                return True
+    return False
+
+
+def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
+    """Unmatched circles lose trust, except those that coast and those that are hidden; they end without it."""
+    for c in range(circles.capacity):
+        waits = coasts(circles, c, around.horizon_s, settings.tr_s) or is_hidden(circles, c, settings.tr_s)
+        groups.missed[c] = 1 if circles.active[c] and not groups.updated[c] and not waits else 0
+    for c in range(circles.capacity):
+        if groups.missed[c]:
+            circles.trust[c] -= 1
+        if not circles.ttc[c] > 0 or circles.trust[c] < settings.tr_cr:
+            circles.active[c] = 0
+
+
+def update(
+    groups: RebelGroups,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    verdicts: Verdicts,
+    breaking: Integers,
+    rebels: int,
+    baselines: Baselines,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); return evictions.
+
+    The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
+    """
+    for c in range(circles.capacity):
+        groups.updated[c] = 0
+    take_rebels(groups, rebels, breaking, verdicts, edges, baselines)
+    cluster(groups, verdicts, edges, around, settings)
+    number_groups(groups, settings.rebel_support)
+    average(groups, groups.members, verdicts, edges, baselines, around)
+    find_odd(groups, groups.members, edges, settings)
+    involve(groups, verdicts, edges, circles, settings)
+    for g in range(groups.groups):
+        if groups.circle[g] >= 0:
+            meet(groups, g, circles, around, settings)
+    evicted = found(groups, edges, circles, settings, ids)
+    for g in range(groups.groups):
+        c = groups.circle[g]
+        if c >= 0:
+            circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
+            circles.speed[c] = flow.length(groups.mean_vx[g], groups.mean_vy[g])
+            contact(groups, g, circles, around, settings)
+    for k in range(groups.count):
+        if groups.group[k] >= 0:
+            edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
+    lose_trust(groups, circles, around, settings)
+    shared.release(edges, circles, True)
+    return evicted

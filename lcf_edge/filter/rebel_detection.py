@@ -7,263 +7,289 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 """
 
 import math
-from dataclasses import dataclass, fields
-from typing import Self
 
-import numpy as np
-
-from lcf_edge.filter.flow import KeyFrames, wrap
+from lcf_edge.filter import flow, path
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import doubles, integers, octets
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import KEYS, EdgeTable, Floats, Mask, Rows
 
+ROOT_2 = 1.4142135623730951
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
-MOST_ASTRAY = 0.5  # share of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
-ASKEW = 0.25  # share of its way outwards that a corner between two things at different depths drifts
+MAX_FOCUS_SHARE = 0.5  # of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
+PARALLAX_DRIFT = 0.25  # share of its way outwards that a corner between two things at different depths drifts
 STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
 GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
 NEIGHBOUR_PX = 28.0  # edges nearer than this, at a like depth, tell it together
+ALIKE_SIGMAS = 2.0  # of both, by which neighbours at a like depth differ in inverse range
 NEAR_PATH = 1.5  # half widths from the path, within which edges are looked at
-MOST_CANDIDATES = 200  # edges in the way; all pairs are compared
-NEWCOMER = 0.97  # share of the horizon within which a threat begins, so that it does not flicker at its end
-CERTAIN = 1.0  # standard deviations above the ground
-DOUBT = 1.5  # time to contact, a standard deviation slower, may exceed the horizon by this factor
-
-
-@dataclass(frozen=True, slots=True)
-class Columns:
-    """Columns of one length, taken together."""
-
-    def take(self, rows: Rows) -> Self:
-        """Some of the rows."""
-        parts = (getattr(self, field.name) for field in fields(self))
-        return type(self)(*(part.take(rows) for part in parts))  # a column is an array or columns
-
-
-@dataclass(frozen=True, slots=True)
-class Links(Columns):
-    """Edges seen from a key frame; float32 (n,): where they were (``x``, ``y``, derotated to now, px), the focus of
-    the displacement since (``focus_x``, ``focus_y``, px), its forward part (``depth_m``), time and uncertainty."""
-
-    x: Floats
-    y: Floats
-    focus_x: Floats
-    focus_y: Floats
-    depth_m: Floats
-    elapsed_s: Floats
-    sigma_px: Floats
+NEAR_SIGMAS = 2.0  # by which such an edge may move slower than it should
+MAX_CANDIDATES = 200  # edges in the way; all pairs are compared
+NEW_THREAT = 0.97  # share of the horizon within which a threat begins, so that it does not flicker at its end
+RANGE_SIGMAS = 3.0  # by which the inverse range of what is incoming is above zero
+GROUND_SIGMAS = 1.0  # and above that of the ground
+SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
+MIN_INVERSE_RANGE = 1e-6  # 1/m
+MIN_OUTWARD_PX = 1e-3
+MIN_R_PX = 1.0
+LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover's recent link
+CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the recent link
+MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
+MAX_DEVIATION_RAD = 0.5  # DL is bounded
 
 
 class Baselines:
-    """What the displacement since each key frame implies for a picture; one column a slot of ``KeyFrames``."""
+    """What the displacement since each key frame implies for a picture; a row a slot of ``KeyFrames``.
 
-    def __init__(self, keys: KeyFrames, around: Situation) -> None:
-        pinhole = around.pinhole
-        ahead = keys.displacement[:, 2]
-        moves = np.abs(ahead) > STILL_M
-        focus = keys.displacement[:, :2] / np.where(moves, ahead, 1.0)[:, None]
-        focus = np.where(moves[:, None], focus * (pinhole.fx, pinhole.fy) + (pinhole.cx, pinhole.cy), around.focus)
-        self._columns = np.empty((14, KEYS), np.float32)
-        self._columns[:9] = pinhole.homography(keys.rotation).reshape(KEYS, 9).T
-        self._columns[9:11] = focus.T
-        self._columns[11] = ahead
-        self._columns[12] = keys.elapsed_s
-        self._columns[13] = keys.sigma_rad * pinhole.focal
-
-    def links(self, edges: EdgeTable, rows: Rows, key: Rows) -> Links:
-        """Links of ``rows`` from key frame number ``key`` (int (n,)), which each edge must have seen, to now."""
-        slot = key % KEYS
-        h0, h1, h2, h3, h4, h5, h6, h7, h8, focus_x, focus_y, ahead, elapsed, sigma = self._columns.take(slot, axis=1)
-        place = slot * edges.capacity + rows
-        x, y = edges.key_x.take(place), edges.key_y.take(place)
-        scale = 1 / (h6 * x + h7 * y + h8)
-        then_x, then_y = (h0 * x + h1 * y + h2) * scale, (h3 * x + h4 * y + h5) * scale
-        return Links(then_x, then_y, focus_x, focus_y, ahead, elapsed, sigma)
-
-
-@dataclass(frozen=True, slots=True)
-class Verdict(Columns):
-    """What the links say; (n,) each.
-
-    ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
-    it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
-    per second, 1/s. ``mover``, ``incoming``: bool, the latter as ``find_incoming`` finds.
+    ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
+    ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: uncertainty of the rotation since.
     """
 
-    r: Floats
-    drift: Floats
-    short: Floats
-    over: Floats
-    outward: Floats
-    expansion: Floats
-    mover: Mask
-    incoming: Mask
+    def __init__(self) -> None:
+        self.h = doubles(KEYS, 9)
+        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (doubles(KEYS) for _ in range(5))
 
 
-@dataclass(frozen=True, slots=True)
-class Rebels(Columns):
-    """Rebel edges as the circles see them; (k,) each. ``rows``: of the edge table; ``vx``, ``vy``: px/s."""
+def measure_baselines(
+    baselines: Baselines, keys: KeyFrames, h: Homography, pinhole: Pinhole, around: Situation
+) -> None:
+    """What the key frames tell about this frame. ``h``: room for a homography."""
+    for k in range(KEYS):
+        flow.set_homography(h, pinhole, keys.rotation, k)
+        baselines.h[k, 0], baselines.h[k, 1], baselines.h[k, 2] = h.xx, h.xy, h.xw
+        baselines.h[k, 3], baselines.h[k, 4], baselines.h[k, 5] = h.yx, h.yy, h.yw
+        baselines.h[k, 6], baselines.h[k, 7], baselines.h[k, 8] = h.wx, h.wy, h.ww
+        ahead = keys.displacement[k, 2]
+        baselines.focus_x[k], baselines.focus_y[k] = around.focus_x, around.focus_y
+        if math.fabs(ahead) > STILL_M:
+            baselines.focus_x[k] = keys.displacement[k, 0] / ahead * pinhole.fx + pinhole.cx
+            baselines.focus_y[k] = keys.displacement[k, 1] / ahead * pinhole.fy + pinhole.cy
+        baselines.depth_m[k], baselines.elapsed_s[k] = ahead, keys.elapsed_s[k]
+        baselines.sigma_px[k] = keys.sigma_rad[k] * pinhole.focal
 
-    rows: Rows
-    x: Floats
-    y: Floats
-    vx: Floats
-    vy: Floats
-    links: Links
-    verdict: Verdict
+
+class Verdicts:
+    """Edges held against the flow of what stands still, over their history since a key frame; a row an edge.
+
+    ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: where the edge was then, derotated to now,
+    px. ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
+    it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
+    per second, 1/s. ``mover``, ``incoming``: the verdict.
+
+    ``near``: rows that may stand near the path, with the inverse range of each (``inverse``, 1/m) and its sigma
+    (``doubt``). ``shared``, ``ground``, ``total``: what the neighbours of one of them tell together, see
+    ``ask_neighbours``.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self.count = 0
+        self.row, self.slot, self.oldest, self.near = (integers(capacity) for _ in range(4))
+        self.x, self.y, self.r, self.drift = (doubles(capacity) for _ in range(4))
+        self.short, self.over, self.outward, self.expansion = (doubles(capacity) for _ in range(4))
+        self.mover, self.incoming = (octets(capacity) for _ in range(2))
+        self.inverse, self.doubt = (doubles(capacity) for _ in range(2))
+        self.near_count = 0
+        self.shared = self.ground = self.total = 0.0
 
 
-def judge(links: Links, x: Floats, y: Floats, around: Situation) -> Verdict:
-    """Hold edges at ``x``, ``y`` (float32 (n,), px) against the flow of what stands still.
+def link(verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines) -> None:
+    """Where edge ``i`` was at the key frame in ``slot``, derotated to now."""
+    key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
+    scale = 1 / (baselines.h[slot, 6] * key_x + baselines.h[slot, 7] * key_y + baselines.h[slot, 8])
+    verdicts.row[j], verdicts.slot[j] = i, slot
+    verdicts.x[j] = (baselines.h[slot, 0] * key_x + baselines.h[slot, 1] * key_y + baselines.h[slot, 2]) * scale
+    verdicts.y[j] = (baselines.h[slot, 3] * key_x + baselines.h[slot, 4] * key_y + baselines.h[slot, 5]) * scale
+
+
+def judge(
+    verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+) -> None:
+    """Hold a linked edge against the flow of what stands still.
 
     From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r.
     """
-    ax, ay = links.x - links.focus_x, links.y - links.focus_y
-    r = np.maximum(np.sqrt(ax * ax + ay * ay), np.float32(1))
-    inverse = 1 / r
-    mx, my = x - links.x, y - links.y
-    outward = (mx * ax + my * ay) * inverse
-    drift = (my * ax - mx * ay) * inverse
-    expansion = outward * inverse / links.elapsed_s
-    backwards = links.depth_m < 0
-    if backwards.any():
-        outward = np.where(backwards, -outward, outward)
-    way_out = np.abs(outward)
-
-    if math.isfinite(around.speed_mps):
-        lever = r * np.abs(links.depth_m)
-        over = outward - lever * np.float32(1 / NEAREST_M)
-        short = -outward
-        if around.camera_height_m > 0:
-            deepest_m = np.float32(around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
-            # px below the horizon if the camera looks as far down as it may
-            below = y - np.float32(around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad)
-            short += lever * np.maximum(below, 0) / deepest_m
-    else:  # then ΔZ has a direction and no size: only what leaves its line moves
-        short, over = np.zeros_like(r), np.zeros_like(r)
-    astray = np.float32(around.focus_sigma_px) * np.minimum(way_out * inverse, np.float32(MOST_ASTRAY))
-    tolerance = links.sigma_px + astray + np.float32(around.delta_px)
-    mover = np.abs(drift) > tolerance + np.float32(ASKEW) * way_out
-    mover |= np.maximum(short, over) > tolerance
-    return Verdict(r, drift, short, over, outward, expansion, mover, np.zeros(len(x), np.bool_))
+    i, slot = verdicts.row[j], verdicts.slot[j]
+    ax, ay = verdicts.x[j] - baselines.focus_x[slot], verdicts.y[j] - baselines.focus_y[slot]
+    mx, my = edges.x[i] - verdicts.x[j], edges.y[i] - verdicts.y[j]
+    r = max(flow.length(ax, ay), MIN_R_PX)
+    outward = (mx * ax + my * ay) / r
+    drift = (my * ax - mx * ay) / r
+    depth_m = baselines.depth_m[slot]
+    verdicts.r[j], verdicts.drift[j] = r, drift
+    verdicts.expansion[j] = outward / r / baselines.elapsed_s[slot]
+    if depth_m < 0:
+        outward = -outward
+    verdicts.outward[j] = outward
+    verdicts.short[j] = verdicts.over[j] = 0.0
+    if math.isfinite(around.speed_mps):  # else ΔZ has a direction and no size: only what leaves its line moves
+        verdicts.over[j] = outward - r * math.fabs(depth_m) / NEAREST_M
+        verdicts.short[j] = ground_outward(edges.y[i], r * math.fabs(depth_m), around) - outward
+    astray = settings.focus_sigma_px * min(math.fabs(outward) / r, MAX_FOCUS_SHARE)
+    tolerance = baselines.sigma_px[slot] + astray + settings.delta_rebel_px
+    drifts = math.fabs(drift) > tolerance + PARALLAX_DRIFT * math.fabs(outward)
+    verdicts.mover[j] = 1 if drifts or max(verdicts.short[j], verdicts.over[j]) > tolerance else 0
+    verdicts.incoming[j] = 0
 
 
-def near_path(verdict: Verdict, links: Links, x: Floats, around: Situation) -> Rows:
-    """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MOST_CANDIDATES``."""
-    reach_m = np.float32(around.speed_mps * around.horizon_s)
-    sigma = sigma_px(links, around)
-    lever = verdict.r * links.depth_m  # px m, negative: backwards
-    rows = (((verdict.outward + 2 * sigma) * reach_m > lever) & (lever > 0) & ~verdict.mover).nonzero()[0]
-    range_m = np.minimum(lever.take(rows) / np.maximum(verdict.outward.take(rows), np.float32(1e-3)), reach_m)
-    right_m = (x.take(rows) - np.float32(around.focus[0])) * np.float32(1 / around.pinhole.fx) * range_m
-    near = (np.abs(miss(right_m, range_m, around)) < np.float32(NEAR_PATH * around.half_width_m)).nonzero()[0]
-    return rows.take(near[:: 1 + len(near) // MOST_CANDIDATES])
+def ground_outward(y: float, lever: float, around: Situation) -> float:
+    """How far outward the deepest ground at image row ``y`` goes, px; 0 above the horizon. ``lever``: r·ΔZ, px m."""
+    if not around.camera_height_m > 0:
+        return 0.0
+    # px below the horizon if the camera looks as far down as it may
+    below = y - (around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad)
+    return lever * max(below, 0.0) / (around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
 
 
-def sigma_px(links: Links, around: Situation) -> Floats:
+def sigma_px(verdicts: Verdicts, j: int, baselines: Baselines, settings: Settings) -> float:
     """1 sigma of how far an edge went, px: of its two places, and of the rotation between."""
-    return links.sigma_px + np.float32(math.sqrt(2) * around.noise_px)
+    return baselines.sigma_px[verdicts.slot[j]] + ROOT_2 * settings.edge_noise_px
 
 
-def find_incoming(verdict: Verdict, links: Links, x: Floats, y: Floats, known: Mask, around: Situation) -> None:
+def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
+    """r·ΔZ, px m: outward/lever is 1/Z. Negative: backwards."""
+    return verdicts.r[j] * baselines.depth_m[verdicts.slot[j]]
+
+
+def near_path(
+    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+) -> None:
+    """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MAX_CANDIDATES``."""
+    near = 0
+    reach_m = around.speed_mps * around.horizon_s
+    for j in range(verdicts.count):
+        sigma = sigma_px(verdicts, j, baselines, settings)
+        lever = lever_of(verdicts, j, baselines)
+        outward = verdicts.outward[j]
+        if verdicts.mover[j] or lever <= 0 or (outward + NEAR_SIGMAS * sigma) * reach_m <= lever:
+            continue
+        range_m = min(lever / max(outward, MIN_OUTWARD_PX), reach_m)
+        right_m = (edges.x[verdicts.row[j]] - around.focus_x) / around.pinhole.fx * range_m
+        if math.fabs(path.miss(right_m, range_m, around)) < NEAR_PATH * around.half_width_m:
+            verdicts.near[near] = j
+            near += 1
+    stride = 1 + near // MAX_CANDIDATES
+    verdicts.near_count = (near + stride - 1) // stride
+    for a in range(verdicts.near_count):
+        j = verdicts.near[a * stride]
+        lever = lever_of(verdicts, j, baselines)
+        verdicts.near[a] = j
+        verdicts.inverse[a] = verdicts.outward[j] / lever
+        verdicts.doubt[a] = sigma_px(verdicts, j, baselines, settings) / lever
+
+
+def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation) -> None:
+    """1/Z of a candidate, and of the ground below, by least squares over its neighbours at a like depth.
+
+    ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
+    """
+    i = verdicts.row[verdicts.near[a]]
+    lowest_y = around.horizon_y - around.pinhole.focal * around.pitch_sigma_rad
+    verdicts.total = verdicts.shared = verdicts.ground = 0.0
+    for b in range(verdicts.near_count):
+        k = verdicts.row[verdicts.near[b]]
+        dx, dy = edges.x[i] - edges.x[k], edges.y[i] - edges.y[k]
+        if dx * dx + dy * dy >= NEIGHBOUR_PX * NEIGHBOUR_PX:
+            continue
+        apart = math.fabs(verdicts.inverse[a] - verdicts.inverse[b])
+        if apart >= ALIKE_SIGMAS * (verdicts.doubt[a] + verdicts.doubt[b]):
+            continue
+        weight = 1 / (verdicts.doubt[b] * verdicts.doubt[b])
+        verdicts.total += weight
+        verdicts.shared += weight * verdicts.inverse[b]
+        verdicts.ground += weight * max(edges.y[k] - lowest_y, 0.0)
+    verdicts.shared /= verdicts.total
+    verdicts.ground /= verdicts.total
+
+
+def will_be_met(
+    verdicts: Verdicts, a: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+) -> bool:
+    """Whether a candidate, with what its neighbours tell, stands in the way, above the ground, within the horizon."""
+    j = verdicts.near[a]
+    i, shared = verdicts.row[j], verdicts.shared
+    focal = around.pinhole.focal
+    reach_m = around.speed_mps * around.horizon_s
+    doubt = 1 / math.sqrt(verdicts.total) + baselines.sigma_px[verdicts.slot[j]] / lever_of(verdicts, j, baselines)
+    range_m = 1 / max(shared, MIN_INVERSE_RANGE)
+    right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
+    excess = shared
+    if around.camera_height_m > 0:
+        excess -= verdicts.ground * (1 + settings.ground_margin) / (around.camera_height_m * focal)
+    soon_m = reach_m if edges.rebel[i] else reach_m * NEW_THREAT
+    return (
+        path.way_to(right_m, range_m, around) < soon_m
+        and math.fabs(path.miss(right_m, range_m, around)) < around.half_width_m
+        and around.camera_height_m - (edges.y[i] - around.horizon_y) / focal * range_m < around.height_m
+        and (shared - doubt) * SLOWER_HORIZONS * reach_m > 1
+        and shared > RANGE_SIGMAS * doubt
+        and excess > GROUND_SIGMAS * doubt
+    )
+
+
+def find_incoming(
+    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+) -> None:
     """Mark the edges of what stands in the way.
 
     Near the focus a single edge hardly moves; its neighbours at a like depth lend it their evidence. 1/Z = V_e/(r V),
-    by least squares over the neighbours, with its standard deviation. ``known``: bool (n,), rebels already.
+    by least squares over the neighbours, with its standard deviation.
     """
-    rows = near_path(verdict, links, x, around) if around.speed_mps > 0 else np.empty(0, np.intp)
-    if not len(rows):
+    if not around.speed_mps > 0:
         return
-    focal = np.float32(around.pinhole.focal)
-    reach_m = np.float32(around.speed_mps * around.horizon_s)
-    x, y = x.take(rows), y.take(rows)
-    lever = verdict.r.take(rows) * links.depth_m.take(rows)
-    inverse = verdict.outward.take(rows) / lever  # 1/Z
-    doubt = sigma_px(links, around).take(rows) / lever
-    below = y - np.float32(around.horizon_y)
-    away2 = np.square(x[:, None] - x)
-    away2 += np.square(y[:, None] - y)
-    alike = np.abs(inverse[:, None] - inverse) < 2 * (doubt[:, None] + doubt)
-    weight = ((away2 < np.float32(NEIGHBOUR_PX**2)) & alike) / (doubt * doubt)
-    total = weight.sum(axis=1)
-    shared = (weight @ inverse) / total
-    excess = shared
-    if around.camera_height_m > 0:
-        lowest = np.maximum(below + np.float32(around.pinhole.focal * around.pitch_sigma_rad), 0)
-        ground = lowest * np.float32((1 + around.ground_margin) / (around.camera_height_m * around.pinhole.focal))
-        excess = shared - (weight @ ground) / total
-    doubt = 1 / np.sqrt(total) + links.sigma_px.take(rows) / lever
-    range_m = 1 / np.maximum(shared, np.float32(1e-6))
-    right_m = (x - np.float32(around.focus[0])) * np.float32(1 / around.pinhole.fx) * range_m
-    soon = reach_m * np.where(known.take(rows), np.float32(1), np.float32(NEWCOMER))
-    meets = (way_to(right_m, range_m, around) < soon) & (np.abs(miss(right_m, range_m, around)) < around.half_width_m)
-    meets &= np.float32(around.camera_height_m) - below / focal * range_m < around.height_m
-    meets &= (shared - doubt) * np.float32(DOUBT) * reach_m > 1
-    meets &= (shared > 3 * doubt) & (excess > np.float32(CERTAIN) * doubt)
-    verdict.incoming[rows] = meets
+    near_path(verdicts, edges, baselines, around, settings)
+    for a in range(verdicts.near_count):
+        ask_neighbours(verdicts, a, edges, around)
+        verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, baselines, around, settings) else 0
 
 
-def miss(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
-    """Distance of points from the vehicle's path, m, right positive: from the arc of speed and yaw rate."""
-    radius = arc_radius_m(around)
-    if radius is None:
-        return right_m
-    distance = np.hypot(right_m + radius, ahead_m)
-    return np.asarray((distance - np.abs(radius)) * np.sign(radius))
-
-
-def way_to(right_m: Floats, ahead_m: Floats, around: Situation) -> Floats:
-    """How far the vehicle goes along its arc until points are beside it, m."""
-    radius = arc_radius_m(around)
-    if radius is None:
-        return ahead_m
-    return np.asarray(np.abs(radius) * np.arctan2(ahead_m, (right_m + radius) * np.sign(radius)))
-
-
-def arc_radius_m(around: Situation) -> np.float32 | None:
-    """Radius of the path, m, its centre to the left when positive; None: as good as straight."""
-    speed = around.speed_mps
-    if not np.isfinite(speed) or abs(around.yaw_rate_radps) < 1e-3 * max(abs(speed), 0.05):
-        return None
-    return np.float32(speed / around.yaw_rate_radps)
-
-
-def agree(whole: Verdict, whole_s: Floats, recent: Verdict, recent_s: Floats, noise_px: float) -> Mask:
-    """Whether the younger link of each chain says the same as the whole chain (bounded, consistent deviation).
+def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines, settings: Settings) -> bool:
+    """Whether the younger link of a chain says the same as the whole chain (bounded, consistent deviation).
 
     The rate of the deviation over the recent link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
     """
-    verdict = np.ones(len(whole_s), np.bool_)
-    mover = whole.mover
-    slack = np.float32(2 * noise_px) / recent_s
-    strongest = np.argmax(np.stack([np.abs(whole.drift), whole.short, whole.over]), axis=0)
-    pick = np.arange(len(whole_s))
-    old = np.stack([whole.drift, whole.short, whole.over])[strongest, pick] / whole_s
-    new = np.stack([recent.drift, recent.short, recent.over])[strongest, pick] / recent_s
-    sign = np.sign(old)
-    old, new = old * sign, new * sign
-    same = (new + slack > old / LINK_RATIO) & (new - slack < old * LINK_RATIO)
-    verdict[mover] = same[mover]
-    slack = np.float32(3 * noise_px) / (recent_s * recent.r)
-    closing = (recent.expansion + slack > whole.expansion / LINK_RATIO) & (
-        recent.expansion - slack < whole.expansion * LINK_RATIO
-    )
-    verdict[~mover] = closing[~mover]
-    return verdict
+    whole_s, recent_s = baselines.elapsed_s[whole.slot[j]], baselines.elapsed_s[recent.slot[k]]
+    if not whole.mover[j]:
+        slack = CLOSING_NOISE_SIGMAS * settings.edge_noise_px / (recent_s * recent.r[k])
+        return rates_agree(whole.expansion[j], recent.expansion[k], slack)
+    slack = LINK_NOISE_SIGMAS * settings.edge_noise_px / recent_s
+    drift = math.fabs(whole.drift[j])
+    if drift >= whole.short[j] and drift >= whole.over[j]:
+        sign = -1.0 if whole.drift[j] < 0 else 1.0
+        return rates_agree(drift / whole_s, sign * recent.drift[k] / recent_s, slack)
+    if whole.short[j] >= whole.over[j]:
+        return rates_agree(whole.short[j] / whole_s, recent.short[k] / recent_s, slack)
+    return rates_agree(whole.over[j] / whole_s, recent.over[k] / recent_s, slack)
 
 
-def give_birth(edges: EdgeTable, rows: Rows, first: Links, second: Links) -> None:
+def rates_agree(old: float, new: float, slack: float) -> bool:
+    """Whether two rates differ by no more than ``LINK_RATIO``, plus noise."""
+    return new + slack > old / LINK_RATIO and new - slack < old * LINK_RATIO
+
+
+def give_birth(
+    edges: EdgeColumns, first: Verdicts, j: int, second: Verdicts, k: int, elapsed_s: float, settings: Settings
+) -> None:
     """A chain becomes a rebel edge (eq. Intialrebelpara): DL, V, β, O from the key positions L1, L2, L3 = L.
 
-    DL = ∠(L3-L1) - ∠(L2-L1), V = |L3-L2|/t, β = ∠(L3-L1), O = L1.
+    DL = ∠(L3-L1) - ∠(L2-L1), V = |L3-L2|/t, β = ∠(L3-L1), O = L1. ``elapsed_s``: t, since the second.
     """
-    x, y = edges.x[rows], edges.y[rows]
-    beta = np.arctan2(y - first.y, x - first.x)
-    before = np.arctan2(second.y - first.y, second.x - first.x)
-    long_enough = np.hypot(second.x - first.x, second.y - first.y) > 2
-    edges.deviation[rows] = np.where(long_enough, np.clip(wrap(beta - before), -0.5, 0.5), 0)
-    edges.speed[rows] = np.hypot(x - second.x, y - second.y) / second.elapsed_s
-    edges.beta[rows] = beta
-    edges.origin_x[rows], edges.origin_y[rows] = first.x, first.y
-    edges.rebel[rows] = True
-    edges.links[rows] = 0
+    i = first.row[j]
+    x1, y1, x2, y2 = first.x[j], first.y[j], second.x[k], second.y[k]
+    x3, y3 = edges.x[i], edges.y[i]
+    beta = math.atan2(y3 - y1, x3 - x1)
+    edges.deviation[i] = 0.0
+    if flow.length(x2 - x1, y2 - y1) > MIN_FIRST_LINK_PX:
+        turn = flow.wrap(beta - math.atan2(y2 - y1, x2 - x1))
+        edges.deviation[i] = min(max(turn, -MAX_DEVIATION_RAD), MAX_DEVIATION_RAD)
+    edges.speed[i] = flow.length(x3 - x2, y3 - y2) / elapsed_s
+    edges.beta[i] = beta
+    edges.origin_x[i], edges.origin_y[i] = x1, y1
+    edges.rebel[i] = 1
+    edges.links[i] = 0
+    edges.circle[i] = -1
+    edges.trust[i] = settings.tr_new
+    edges.bl[i] = max(edges.bl[i], 2 * settings.bl_min_px)

@@ -1,98 +1,73 @@
 """The vehicle at this instant: where it heads in the picture, what it is, how it moves."""
 
 import math
-from dataclasses import dataclass
-
-import numpy as np
 
 from lcf_edge.config import Camera, Config
-from lcf_edge.filter.flow import Matrix, Pinhole
-from lcf_edge.filter.inputs import Motion
-from lcf_edge.filter.tables import Floats
+from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.memory import Doubles
 
 PITCH_MEMORY_S = 1.0  # shaking faster than this turns the camera, not the way of the vehicle
 YAW_MEMORY_S = 0.3
-
-
-@dataclass(frozen=True, slots=True)
-class Situation:
-    """``focus``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps`` NaN: unknown.
-
-    ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal length from
-    O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``noise_px``: 1 sigma of
-    an edge's position. ``delta_px``: δ over a chain of key frames.
-    """
-
-    pinhole: Pinhole
-    focus: tuple[float, float]
-    horizon_y: float
-    camera_height_m: float
-    half_width_m: float
-    height_m: float
-    horizon_s: float
-    speed_mps: float
-    yaw_rate_radps: float
-    scene_flow_pxps: float
-    noise_px: float
-    delta_px: float
-    focus_sigma_px: float
-    ground_margin: float
-    pitch_sigma_rad: float
-
-    def ground_range_m(self, y: Floats) -> Floats:
-        """Range at which the ground is seen at image rows ``y``, px; NaN at the horizon, above it, or unknown."""
-        focal = self.pinhole.focal
-        below = y - self.horizon_y
-        seen = (below > focal * self.pitch_sigma_rad) & (self.camera_height_m > 0)
-        return np.where(seen, self.camera_height_m * focal / np.maximum(below, 1), np.nan)
+INFINITY = float("inf")
+NAN = float("nan")
 
 
 class Heading:
-    """The direction of travel in the camera's axes: the mounting, and on top of it how the camera shakes."""
+    """The direction of travel in the camera's axes: the mounting, and on top of it how the camera shakes.
 
-    def __init__(self, pinhole: Pinhole, camera: Camera) -> None:
-        self._pinhole = pinhole
-        self._mounted = np.array([-math.tan(camera.yaw_rad), math.tan(camera.pitch_rad), 1.0])
-        self._ray = self._mounted.copy()  # third component 1
+    ``ray_x``, ``ray_y``: x/z and y/z of it, now; ``mounted_x``, ``mounted_y``: at rest.
+    """
 
-    @property
-    def forward(self) -> Matrix:
-        """Unit vector (3,), camera axes."""
-        return np.asarray(self._ray / np.linalg.norm(self._ray))
-
-    @property
-    def focus(self) -> tuple[float, float]:
-        """O: where the vehicle is heading, px."""
-        pinhole = self._pinhole
-        return pinhole.cx + pinhole.fx * float(self._ray[0]), pinhole.cy + pinhole.fy * float(self._ray[1])
-
-    def turn(self, motion: Motion) -> None:
-        """Shaking turns the camera and not the heading, a turn of the vehicle both."""
-        shaken = motion.rotation @ self._ray
-        shaken /= shaken[2]
-        shaken[0] -= motion.yaw_rate_radps * motion.dt_s  # a left turn moves the picture to the right
-        keep = np.exp(-motion.dt_s / np.array([YAW_MEMORY_S, PITCH_MEMORY_S, 1.0]))
-        self._ray = self._mounted + keep * (shaken - self._mounted)
+    def __init__(self, camera: Camera) -> None:
+        self.mounted_x = self.ray_x = -math.tan(camera.yaw_rad)
+        self.mounted_y = self.ray_y = math.tan(camera.pitch_rad)
 
 
-def situation(config: Config, pinhole: Pinhole, heading: Heading, motion: Motion) -> Situation:
-    """What the experts need to know about this frame."""
-    settings, vehicle = config.filter, config.vehicle
-    focus, speed = heading.focus, motion.speed_mps
-    return Situation(
-        pinhole=pinhole,
-        focus=focus,
-        horizon_y=focus[1],
-        camera_height_m=config.camera.height_m,
-        half_width_m=vehicle.half_width_m,
-        height_m=vehicle.height_m,
-        horizon_s=vehicle.horizon_s,
-        speed_mps=speed,
-        yaw_rate_radps=motion.yaw_rate_radps,
-        scene_flow_pxps=abs(speed) * pinhole.focal / settings.scene_depth_m if math.isfinite(speed) else math.inf,
-        noise_px=settings.edge_noise_px,
-        delta_px=settings.delta_rebel_px,
-        focus_sigma_px=settings.focus_sigma_px,
-        ground_margin=settings.ground_margin,
-        pitch_sigma_rad=settings.pitch_sigma_rad,
-    )
+def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_s: float) -> None:
+    """Shaking turns the camera and not the heading, a turn of the vehicle both. ``rotation``: (1, 3, 3)."""
+    x = rotation[0, 0, 0] * heading.ray_x + rotation[0, 0, 1] * heading.ray_y + rotation[0, 0, 2]
+    y = rotation[0, 1, 0] * heading.ray_x + rotation[0, 1, 1] * heading.ray_y + rotation[0, 1, 2]
+    z = rotation[0, 2, 0] * heading.ray_x + rotation[0, 2, 1] * heading.ray_y + rotation[0, 2, 2]
+    shaken_x = x / z - yaw_rate_radps * dt_s  # a left turn moves the picture to the right
+    shaken_y = y / z
+    heading.ray_x = heading.mounted_x + math.exp(-dt_s / YAW_MEMORY_S) * (shaken_x - heading.mounted_x)
+    heading.ray_y = heading.mounted_y + math.exp(-dt_s / PITCH_MEMORY_S) * (shaken_y - heading.mounted_y)
+
+
+class Situation:
+    """What the experts need to know about this frame.
+
+    ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
+    unknown. ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal
+    length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``:
+    t_f.
+    """
+
+    def __init__(self, config: Config, pinhole: Pinhole) -> None:
+        self.pinhole = pinhole
+        self.scene_depth_m = config.filter.scene_depth_m
+        self.camera_height_m = config.camera.height_m
+        self.half_width_m, self.height_m = config.vehicle.half_width_m, config.vehicle.height_m
+        self.horizon_s = config.vehicle.horizon_s
+        self.pitch_sigma_rad = config.filter.pitch_sigma_rad
+        self.focus_x, self.focus_y, self.horizon_y = pinhole.cx, pinhole.cy, pinhole.cy
+        self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
+
+
+def follow(around: Situation, heading: Heading, speed_mps: float, yaw_rate_radps: float, dt_s: float) -> None:
+    """Take the heading and the motion of this frame."""
+    around.focus_x = around.pinhole.cx + around.pinhole.fx * heading.ray_x
+    around.focus_y = around.horizon_y = around.pinhole.cy + around.pinhole.fy * heading.ray_y
+    around.dt_s, around.speed_mps, around.yaw_rate_radps = dt_s, speed_mps, yaw_rate_radps
+    around.scene_flow_pxps = INFINITY
+    if math.isfinite(speed_mps):
+        around.scene_flow_pxps = math.fabs(speed_mps) * around.pinhole.focal / around.scene_depth_m
+
+
+def ground_range_m(around: Situation, y: float) -> float:
+    """Range at which the ground is seen at image row ``y``, px; NaN at the horizon, above it, or unknown."""
+    focal = around.pinhole.focal
+    below = y - around.horizon_y
+    if below > focal * around.pitch_sigma_rad and around.camera_height_m > 0:
+        return around.camera_height_m * focal / max(below, 1.0)
+    return NAN

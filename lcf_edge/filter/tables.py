@@ -1,113 +1,240 @@
 """The tables that the filter keeps: preallocated, structure of arrays, a fixed capacity each.
 
-Edges stand packed in the first ``count`` rows. Circles and ψ keep their row for life (``active`` tells which are in
-use), because edges refer to a circle by its row.
+Each table is a list of columns: what it means, its unit, and which modules write it. Edges stand packed in the first
+``count`` rows. Circles and ψ keep their row for life (``active`` tells which are in use), because edges refer to a
+circle by its row.
+
+A column is a NumPy array here, for whoever reads a table, and a typed memory in ``columns``, for the loops.
 """
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
+from lcf_edge.filter import edge_rows
+from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, PsiColumns
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, KEYS
+from lcf_edge.filter.line_expert import group_at
+from lcf_edge.filter.memory import memory_of
 
 Rows = npt.NDArray[np.signedinteger[Any]]
 Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.floating[Any]]
 
-KEYS = 16  # key frames that an edge remembers
 NO_CIRCLE = -1
 
-_EDGE_FIELDS = ("x", "y", "beta", "speed", "bl", "trust", "deviation", "origin_x", "origin_y")
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """One column. ``writers``: the modules of the filter that change it, besides moving whole rows (``edge_rows``)."""
+
+    name: str
+    meaning: str
+    unit: str
+    writers: tuple[str, ...]
+    dtype: type[np.generic] = np.float64
+    shape: tuple[int, ...] = ()
+    empty: int = 0  # value of a row that nobody has written yet
 
 
-class EdgeTable:
-    """Normal and rebel edges (E_n, E_r) and the chains of α, in one table.
+EDGE_COLUMNS = (
+    Column("x", "L, to the right", "px", ("derotation", "edge_expert")),
+    Column("y", "L, down", "px", ("derotation", "edge_expert")),
+    Column(
+        "beta",
+        "β: of rebels and chains; the others go along their flow line",
+        "rad",
+        ("derotation", "edge_expert", "alpha", "rebel_detection"),
+    ),
+    Column("speed", "V along β", "px/s", ("edge_expert", "alpha", "rebel_detection")),
+    Column("bl", "BL, radius of the gate around the prediction", "px", ("edge_expert", "rebel_detection")),
+    Column("trust", "Tr", "1", ("edge_expert", "line_expert", "alpha", "rebel_detection")),
+    Column("deviation", "DL: turn of β a frame, of rebels and chains", "rad", ("edge_expert", "rebel_detection")),
+    Column(
+        "origin_x",
+        "O of a rebel or chain: where it was first seen within the window of key frames",
+        "px",
+        ("derotation", "edge_expert", "alpha", "rebel_detection"),
+    ),
+    Column("origin_y", "as origin_x", "px", ("derotation", "edge_expert", "alpha", "rebel_detection")),
+    Column("key_x", "L at the last key frames, by slot, in their own axes", "px", ("alpha",), shape=(KEYS,)),
+    Column("key_y", "as key_x", "px", ("alpha",), shape=(KEYS,)),
+    Column(
+        "born_key",
+        "number of the first key frame that it has seen",
+        "1",
+        ("edge_expert", "line_expert", "alpha"),
+        np.int32,
+    ),
+    Column(
+        "circle",
+        "row of its circle, -1: none; of C_r where `rebel` is set, else of C_n",
+        "row",
+        ("edge_expert", "alpha", "rebel_detection", "circles", "normal_circles", "rebel_circles"),
+        np.int32,
+        empty=NO_CIRCLE,
+    ),
+    Column(
+        "links",
+        "ℓ: key frames for which it has broken the flow; above 0 it is in α",
+        "1",
+        ("edge_expert", "alpha", "rebel_detection"),
+        np.int32,
+    ),
+    Column("rebel", "E_r, else E_n", "", ("alpha", "rebel_detection"), np.bool_),
+    Column("held", "inside ψ: predicted without being looked for", "", ("line_expert",), np.bool_),
+    Column("matched", "its corner was found in this frame, or it is new", "", ("edge_expert",), np.bool_),
+    Column("appearance", "grey samples around its corner", "grey", ("edge_expert",), np.uint8, (APPEARANCE_SAMPLES,)),
+    Column("predicted_x", "L', in this frame", "px", ("edge_expert", "derotation")),
+    Column("predicted_y", "L', in this frame", "px", ("edge_expert", "derotation")),
+    Column("predicted_speed", "V', in this frame", "px/s", ("edge_expert",)),
+    Column("cos", "cos of the direction of the prediction", "1", ("edge_expert",)),
+    Column("sin", "sin of the direction of the prediction", "1", ("edge_expert",)),
+    Column("corner", "row of its corner in this frame, -1: none", "row", ("matching",), np.int32),
+    Column("best", "row of the corner that it would choose, -1: none", "row", ("matching",), np.int32),
+    Column("cost", "of that choice", "grey", ("matching",)),
+    Column("psi", "row of the ψ region that holds L', -1: none", "row", ("line_expert",), np.int32),
+)
+"""E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
-    One table, because an edge changes sides and one matching must serve both. ``rebel`` tells E_r from E_n, ``links``
-    > 0 marks an edge in α (ℓ, key frames for which it has broken the flow).
+CIRCLE_COLUMNS = (
+    Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles"), np.bool_),
+    Column("id", "identity, never 0", "1", ("circles",), np.uint32),
+    Column("x", "centre, to the right", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
+    Column("y", "centre, down", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
+    Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles")),
+    Column("beta", "β of its motion in the picture", "rad", ("derotation", "normal_circles", "rebel_circles")),
+    Column("speed", "V along β", "px/s", ("normal_circles", "rebel_circles")),
+    Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
+    Column("trust", "Tr", "1", ("circles", "normal_circles", "rebel_circles", "feedback")),
+    Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
+    Column("support", "edges behind it", "1", ("circles",), np.int32),
+    Column("width", "extent of its edges", "px", ("circles", "rebel_circles")),
+    Column("height", "extent of its edges", "px", ("circles", "rebel_circles")),
+    Column("cause", "`records.Cause` of C_r", "", ("circles", "rebel_circles"), np.uint8),
+    Column("ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles")),
+    Column("range", "of C_r, NaN: unknown", "m", ("circles", "rebel_circles")),
+    Column("lateral", "miss to the side of the path, right positive, NaN: unknown", "m", ("circles", "rebel_circles")),
+)
+"""C_n and C_r, a table each."""
 
-    float32 columns: ``x``, ``y`` (L, px), ``beta`` (β, rad, of rebels and chains; others have their flow line),
-    ``speed`` (V, px/s along β), ``bl`` (BL, px), ``trust`` (Tr), ``deviation`` (DL, rad), ``origin_x``, ``origin_y``
-    (O of a rebel, px), and ``key_x``, ``key_y`` (KEYS, capacity): L at the last key frames, in their own axes.
-    """
+PSI_COLUMNS = (
+    Column("active", "row in use", "", ("feedback", "line_expert"), np.bool_),
+    Column("id", "identity, never 0", "1", ("feedback",), np.uint32),
+    Column("shape", "Ty: `records.Shape`", "", ("feedback",), np.uint8),
+    Column("x", "centre, to the right", "px", ("derotation", "feedback")),
+    Column("y", "centre, down", "px", ("derotation", "feedback")),
+    Column("width", "full width", "px", ("feedback",)),
+    Column("height", "full height", "px", ("feedback",)),
+    Column("trust", "Tr of its circle when it was written", "1", ("feedback",)),
+    Column("expansion", "V/r of its circle then", "1/s", ("feedback",)),
+    Column("life_s", "time left", "s", ("feedback",)),
+    Column("circle", "row of C_n that wrote it", "row", ("feedback",), np.int32, empty=NO_CIRCLE),
+    Column("edges", "edges under it, in this frame", "1", ("line_expert",), np.int32),
+    Column("missing", "those without a corner", "1", ("line_expert",), np.int32),
+    Column("new", "corners without an edge", "1", ("line_expert",), np.int32),
+)
+"""ψ, regions that are ignored."""
 
-    def __init__(self, normal_capacity: int, rebel_capacity: int, chain_capacity: int) -> None:
-        self.normal_capacity = normal_capacity
-        self.rebel_capacity = rebel_capacity
-        self.chain_capacity = chain_capacity
-        capacity = normal_capacity + rebel_capacity
+GROUP_COLUMNS = (
+    Column("x", "centre, to the right", "px", ("line_expert",)),
+    Column("y", "centre, down", "px", ("line_expert",)),
+    Column("bs", "BS_λ, radius", "px", ("line_expert",)),
+    Column("trust", "Tr of its circle", "1", ("line_expert",)),
+    Column("row", "row of C_n behind it, -1: it is a rebel circle's", "row", ("line_expert",), np.int32),
+)
+"""λ, the circles above Tr_cr, the least trusted first; packed in the first ``count`` rows."""
+
+CORNER_COLUMNS = (
+    Column("x", "place in the ideal pinhole, to the right", "px", ("matching",)),
+    Column("y", "place in the ideal pinhole, down", "px", ("matching",)),
+    Column("pixel_x", "place in the input frame", "px", ("matching",), np.int32),
+    Column("pixel_y", "place in the input frame", "px", ("matching",), np.int32),
+    Column("appearance", "grey samples around it", "grey", ("matching",), np.uint8, (APPEARANCE_SAMPLES,)),
+    Column("omitted", "inside ψ", "", ("line_expert",), np.bool_),
+    Column("free", "may still be found by an edge", "", ("line_expert", "matching"), np.bool_),
+    Column("taken", "an edge has made it its own", "", ("matching", "edge_expert"), np.bool_),
+    Column("expected", "under ψ, and an edge is predicted there", "", ("line_expert",), np.bool_),
+    Column("edge", "row of the edge that would choose it at the least cost, -1: none", "row", ("matching",), np.int32),
+    Column("cost", "of that choice", "grey", ("matching",)),
+    Column("psi", "row of the ψ region that holds it, -1: none", "row", ("line_expert",), np.int32),
+)
+"""The corners of this frame."""
+
+
+class Table:
+    """Arrays of one length by the name of their column, which are attributes too."""
+
+    def __init__(self, columns: tuple[Column, ...], capacity: int) -> None:
         self.capacity = capacity
-        self.count = 0
-        self._floats = np.zeros((len(_EDGE_FIELDS) + 2 * KEYS, capacity), np.float32)
-        (
-            self.x,
-            self.y,
-            self.beta,
-            self.speed,
-            self.bl,
-            self.trust,
-            self.deviation,
-            self.origin_x,
-            self.origin_y,
-        ) = self._floats[: len(_EDGE_FIELDS)]
-        self.key_x = self._floats[len(_EDGE_FIELDS) : len(_EDGE_FIELDS) + KEYS]
-        self.key_y = self._floats[len(_EDGE_FIELDS) + KEYS :]
-        self._shorts = np.zeros((4, capacity), np.int32)
-        self.born_key, self.circle, self.links, self.cause = self._shorts  # born_key: first key frame it has seen
-        self._flags = np.zeros((3, capacity), np.bool_)
-        self.rebel, self.held, self.matched = self._flags  # held: inside ψ, predicted without being looked at
-        self.appearance = np.zeros((capacity, APPEARANCE_SAMPLES), np.uint8)
+        self.arrays = {
+            column.name: np.full((capacity, *column.shape), column.empty, column.dtype) for column in columns
+        }
+        self._empty = {column.name: column.empty for column in columns}
+
+    def __getattr__(self, name: str) -> npt.NDArray[Any]:
+        try:
+            return self.__dict__["arrays"][name]
+        except KeyError:
+            raise AttributeError(f"{type(self).__name__} has no column {name}") from None
+
+    def memory(self) -> dict[str, Any]:
+        """The columns as the loops take them: numbers of Python where they run uncompiled, which do not wrap."""
+        memory = {name: memory_of(array) for name, array in self.arrays.items()}
+        if "appearance" in self.arrays:  # the same samples, eight at a time
+            memory["words"] = memory_of(self.arrays["appearance"].view(np.uint64))
+        return memory
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the table occupies, for good."""
-        return self._floats.nbytes + self._shorts.nbytes + self._flags.nbytes + self.appearance.nbytes
+        """Bytes that the table occupies from start to end."""
+        return sum(array.nbytes for array in self.arrays.values())
+
+
+class EdgeTable(Table):
+    """``EDGE_COLUMNS``, with a capacity for each of E_n, E_r and α."""
+
+    def __init__(self, normal_capacity: int, rebel_capacity: int, chain_capacity: int) -> None:
+        super().__init__(EDGE_COLUMNS, normal_capacity + rebel_capacity)
+        self.normal_capacity = normal_capacity
+        self.rebel_capacity = rebel_capacity
+        self.chain_capacity = chain_capacity
+        self.columns = EdgeColumns(self.memory())
+
+    @property
+    def count(self) -> int:
+        """Rows in use."""
+        return int(self.columns.count)
+
+    @property
+    def rebels(self) -> int:
+        """Rows of E_r."""
+        return int(np.count_nonzero(self.rebel[: self.count]))
 
     def own_way(self) -> Mask:
         """Edges that follow no flow line: rebels and chains; bool (count,)."""
-        return self.rebel[: self.count] | (self.links[: self.count] > 0)
+        return np.asarray(self.rebel[: self.count] | (self.links[: self.count] > 0))
+
+    def append(self, number: int) -> slice:
+        """Claim ``number`` empty rows behind the last one; the caller sees to it that they fit."""
+        rows = slice(self.count, self.count + number)
+        for name, array in self.arrays.items():
+            array[rows] = self._empty[name]
+        self.columns.count += number
+        return rows
 
     def remove(self, dead: Mask) -> None:
         """Delete rows; ``dead``: bool (count,). The last rows move into the gaps."""
-        count = self.count
-        alive = count - int(np.count_nonzero(dead))
-        if alive == count:
-            return
-        gaps = dead[:alive].nonzero()[0]
-        movers = alive + (~dead[alive:]).nonzero()[0]
-        self._copy(movers, gaps)
-        self.count = alive
-
-    def append(self, number: int) -> slice:
-        """Claim ``number`` rows behind the last one; the caller sees to it that they fit, and fills them."""
-        rows = slice(self.count, self.count + number)
-        self._floats[:, rows] = 0
-        self._shorts[:, rows] = 0
-        self.circle[rows] = NO_CIRCLE
-        self._flags[:, rows] = False
-        self.count += number
-        return rows
-
-    def duplicate(self, rows: Rows) -> slice:
-        """Append copies of ``rows``, with their history."""
-        copies = slice(self.count, self.count + len(rows))
-        self._copy(rows, copies)
-        self.count += len(rows)
-        return copies
-
-    def _copy(self, source: Rows, target: Rows | slice) -> None:
-        self._floats[:, target] = self._floats[:, source]
-        self._shorts[:, target] = self._shorts[:, source]
-        self._flags[:, target] = self._flags[:, source]
-        self.appearance[target] = self.appearance[source]
+        edge_rows.remove(self.columns, memory_of(dead))
 
     def normal_room(self) -> int:
         """Rows that E_n may still take."""
-        return self.normal_capacity - (self.count - int(np.count_nonzero(self.rebel[: self.count])))
+        return self.normal_capacity - (self.count - self.rebels)
 
     def trim(self) -> int:
-        """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; how many."""
+        """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; return how many."""
         n = self.count
         chains = (self.links[:n] > 0) & ~self.rebel[:n]
         excess_chains = max(0, int(np.count_nonzero(chains)) - self.chain_capacity)
@@ -126,45 +253,12 @@ class EdgeTable:
         return rows[order[:number]]
 
 
-class CircleTable:
-    """Normal or rebel circles (C_n, C_r); rows keep their place.
-
-    float32 columns: ``x``, ``y``, ``radius`` (px), ``beta`` (β, rad), ``speed`` (V, px/s), ``expansion`` (V/r, 1/s:
-    the inverse of the time to contact of what stands still), ``trust``, ``ttc`` (s), ``lateral`` (m), ``range`` (m),
-    ``corr`` (coherence of the group, (0, 1]), ``width``, ``height`` (px, extent of the members).
-    """
+class CircleTable(Table):
+    """``CIRCLE_COLUMNS``: C_n or C_r; rows keep their place."""
 
     def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
-        self._floats = np.zeros((13, capacity), np.float32)
-        (
-            self.x,
-            self.y,
-            self.radius,
-            self.beta,
-            self.speed,
-            self.expansion,
-            self.trust,
-            self.ttc,
-            self.lateral,
-            self.range,
-            self.corr,
-            self.width,
-            self.height,
-        ) = self._floats
-        self.active = np.zeros(capacity, np.bool_)
-        self.id = np.zeros(capacity, np.uint32)
-        self.support = np.zeros(capacity, np.int32)
-        self.cause = np.zeros(capacity, np.uint8)
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes that the table occupies, for good."""
-        return sum(a.nbytes for a in (self._floats, self.active, self.id, self.support, self.cause))
-
-    def park(self) -> None:
-        """Zero the rows that are not in use, so that predictions of nothing stay nothing."""
-        self._floats[:, ~self.active] = 0
+        super().__init__(CIRCLE_COLUMNS, capacity)
+        self.columns = CircleColumns(self.memory())
 
     @property
     def count(self) -> int:
@@ -172,28 +266,40 @@ class CircleTable:
         return int(np.count_nonzero(self.active))
 
 
-class PsiTable:
-    """Regions that are ignored (ψ). ``shape``: Ty, 1 circle, 2 rectangle; sizes are full widths in px."""
+class PsiTable(Table):
+    """``PSI_COLUMNS``; rows keep their place."""
 
     def __init__(self, capacity: int) -> None:
-        self.capacity = capacity
-        self._floats = np.zeros((7, capacity), np.float32)
-        self.x, self.y, self.width, self.height, self.trust, self.life_s, self.expansion = self._floats
-        self.active = np.zeros(capacity, np.bool_)
-        self.id = np.zeros(capacity, np.uint32)
-        self.shape = np.zeros(capacity, np.uint8)
-        self.circle = np.full(capacity, NO_CIRCLE, np.int32)  # the normal circle that wrote it
-
-    @property
-    def nbytes(self) -> int:
-        """Bytes that the table occupies, for good."""
-        return sum(a.nbytes for a in (self._floats, self.active, self.id, self.shape, self.circle))
-
-    def park(self) -> None:
-        """Zero the rows that are not in use, so that predictions of nothing stay nothing."""
-        self._floats[:, ~self.active] = 0
+        super().__init__(PSI_COLUMNS, capacity)
+        self.columns = PsiColumns(self.memory())
 
     @property
     def count(self) -> int:
         """Rows in use."""
         return int(np.count_nonzero(self.active))
+
+
+class GroupTable(Table):
+    """``GROUP_COLUMNS``."""
+
+    def __init__(self, capacity: int) -> None:
+        super().__init__(GROUP_COLUMNS, capacity)
+        self.columns = GroupColumns(self.memory())
+
+    @property
+    def count(self) -> int:
+        """Rows in use."""
+        return int(self.columns.count)
+
+    def assign(self, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
+        """Group that holds each point (eq. 1), -1: none; for those who draw it. ``x``, ``y``: (n,) px."""
+        places = zip(x.tolist(), y.tolist(), strict=True)
+        return np.array([group_at(self.columns, *place) for place in places], np.int32)
+
+
+class CornerTable(Table):
+    """``CORNER_COLUMNS``."""
+
+    def __init__(self, capacity: int) -> None:
+        super().__init__(CORNER_COLUMNS, capacity)
+        self.columns = CornerColumns(self.memory())

@@ -10,11 +10,11 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Config
-from lcf_edge.filter import Corners, LineCircleFilter, Motion
+from lcf_edge.filter import Corners, LineCircleFilter, Motion, line_expert
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
-from lcf_edge.filter.situation import Heading, Situation
-from lcf_edge.filter.situation import situation as situation_of
+from lcf_edge.filter.situation import Heading, Situation, follow
+from lcf_edge.filter.tables import PsiTable
 from lcf_edge.lens import Lens
 
 LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
@@ -132,10 +132,18 @@ def _clutter(landmarks: int = 300, seed: int = 1) -> Metres:
 
 def _situation(*, speed_mps: float = 2.0, yaw_rate_radps: float = 0.0, **changes: Any) -> Situation:
     """A rover on its way that looks straight ahead; ``changes``: fields of ``Situation``."""
-    pinhole = Pinhole(LENS.fx, LENS.fy, LENS.cx, LENS.cy)
     config = Config()
-    motion = Motion(0.05, np.eye(3), 0.0, speed_mps, yaw_rate_radps)
-    return replace(situation_of(config, pinhole, Heading(pinhole, config.camera), motion), **changes)
+    around = Situation(config, Pinhole(LENS.fx, LENS.fy, LENS.cx, LENS.cy))
+    follow(around, Heading(config.camera), speed_mps, yaw_rate_radps, 0.05)
+    for name, value in changes.items():
+        setattr(around, name, value)
+    return around
+
+
+def _psi_at(psi: PsiTable, x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.int32]:
+    """Row of the ψ region that holds each point, -1: none."""
+    places = zip(x.tolist(), y.tolist(), strict=True)
+    return np.array([line_expert.psi_at(psi.columns, *place) for place in places], np.int32)
 
 
 def _driven(drive: Drive, config: Config | None = None) -> LineCircleFilter:
@@ -169,6 +177,11 @@ def clutter() -> Callable[..., Metres]:
 @pytest.fixture(scope="session")
 def situation() -> Callable[..., Situation]:
     return _situation
+
+
+@pytest.fixture(scope="session")
+def psi_at() -> Callable[..., npt.NDArray[np.int32]]:
+    return _psi_at
 
 
 @pytest.fixture(scope="session")

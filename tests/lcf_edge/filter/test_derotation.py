@@ -1,6 +1,7 @@
 """Step 0: the rotation is taken out of everything; what the gyro missed, the flow tells."""
 
 import math
+from typing import Any
 
 import cv2
 import numpy as np
@@ -9,18 +10,45 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.filter.derotation import derotate, missing_rotation
-from lcf_edge.filter.flow import Pinhole, carry, line_distance
-from lcf_edge.filter.tables import CircleTable, EdgeTable, PsiTable
+from lcf_edge.config import Filter
+from lcf_edge.filter import derotation
+from lcf_edge.filter.derotation import OffLine
+from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography, warp_x, warp_y
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SIGMA_RAD = 0.01
+SETTINGS = Settings(Filter())
 
 angle = st.floats(-0.006, 0.006)
 
 
 def rotation_of(axis: tuple[float, float, float]) -> npt.NDArray[np.float64]:
     return np.asarray(cv2.Rodrigues(np.array(axis))[0])
+
+
+def homography(rotation: npt.NDArray[np.float64]) -> Homography:
+    h = Homography()
+    set_homography(h, PINHOLE, np.ascontiguousarray(rotation)[None], 0)
+    return h
+
+
+def warp(rotation: npt.NDArray[np.float64], x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
+    """(2, n) places after a rotation."""
+    h = homography(rotation)
+    places = list(zip(x.tolist(), y.tolist(), strict=True))
+    return np.array([[warp_x(h, *place) for place in places], [warp_y(h, *place) for place in places]])
+
+
+def derotate(
+    rotation: npt.NDArray[np.float64], edges: EdgeTable, circles: tuple[CircleTable, ...], psi: PsiTable
+) -> None:
+    h, roll = homography(rotation), math.atan2(rotation[1, 0], rotation[0, 0])
+    derotation.derotate_edges(edges.columns, h, roll)
+    for table in circles:
+        derotation.derotate_circles(table.columns, h, roll)
+    derotation.derotate_psi(psi.columns, h)
 
 
 def spread(number: int, seed: int = 0) -> npt.NDArray[np.float32]:
@@ -31,7 +59,7 @@ def spread(number: int, seed: int = 0) -> npt.NDArray[np.float32]:
 # Everything stored
 
 
-def test_every_stored_position_is_carried() -> None:
+def test_every_stored_position_is_warped() -> None:
     edges, circles, psi = EdgeTable(20, 10, 10), (CircleTable(5), CircleTable(3)), PsiTable(4)
     edges.append(20)
     edges.rebel[:20:2], edges.links[1:20:4] = True, 1  # the origin of others means nothing
@@ -40,12 +68,13 @@ def test_every_stored_position_is_carried() -> None:
     edges.origin_x[:20], edges.origin_y[:20] = before[::-1]
     for table in (*circles, psi):
         table.x[:], table.y[:] = before[:, : table.capacity]
+        table.active[:] = True
     rotation = rotation_of((0.0, 0.0, 0.1)) @ rotation_of((0.01, -0.02, 0.0))
-    derotate(PINHOLE, rotation, edges, circles, psi)
+    derotate(rotation, edges, circles, psi)
 
-    after = np.stack(carry(PINHOLE.homography(rotation), *before))
+    after = warp(rotation, *before)
     assert np.allclose([edges.x[:20], edges.y[:20]], after, atol=1e-3)
-    origins = np.stack(carry(PINHOLE.homography(rotation), *before[::-1]))
+    origins = warp(rotation, *before[::-1])
     own_way = edges.own_way()
     assert np.count_nonzero(own_way) == 15
     assert np.allclose(np.stack([edges.origin_x[:20], edges.origin_y[:20]])[:, own_way], origins[:, own_way], atol=1e-3)
@@ -69,7 +98,8 @@ def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float
     edges.beta[:4], edges.rebel[:2], edges.links[2:4] = 0.5, True, 1
     for table in circles:
         table.beta[:] = -1.0
-    derotate(PINHOLE, rotation_of(axis), edges, circles, PsiTable(2))
+        table.active[:] = True
+    derotate(rotation_of(axis), edges, circles, PsiTable(2))
     assert edges.beta[:4] == pytest.approx(0.5 + roll, abs=2e-3)
     for table in circles:
         assert table.beta == pytest.approx(-1.0 + roll, abs=2e-3)
@@ -78,46 +108,79 @@ def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float
 # What the gyro missed
 
 
-def off_the_lines(
-    missed: npt.NDArray[np.float64], outliers: float, number: int = 200, seed: int = 0
-) -> tuple[npt.NDArray[np.float32], ...]:
-    """x, y, px off the flow line, cos β, sin β: edges anywhere on their lines, corners where ``missed`` puts them."""
+Edges = tuple[EdgeTable, CornerTable]
+
+
+def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int = 200, seed: int = 0) -> Edges:
+    """Trusted edges predicted anywhere on their lines, and their corners where ``missed`` puts them."""
     random = np.random.default_rng(seed)
+    edges, corners = EdgeTable(number, 1, 1), CornerTable(number)
+    edges.append(number)
     x, y = spread(number, seed)
-    beta = np.arctan2(y - PINHOLE.cy, x - PINHOLE.cx).astype(np.float32)
+    beta = np.arctan2(y - PINHOLE.cy, x - PINHOLE.cx)
     along = random.uniform(-6, 6, number)  # the depth is not known
-    seen_x, seen_y = carry(PINHOLE.homography(missed), x + along * np.cos(beta), y + along * np.sin(beta))
+    seen = warp(missed, x + along * np.cos(beta), y + along * np.sin(beta))
     noise = random.normal(0, 0.4, (2, number))
     odd = random.random(number) < outliers
     noise[:, odd] += random.choice([-1, 1], (2, np.count_nonzero(odd))) * random.uniform(8, 30)
-    seen_x, seen_y = seen_x + noise[0], seen_y + noise[1]
-    off = line_distance(seen_x - x, seen_y - y, np.cos(beta), np.sin(beta))
-    return tuple(np.asarray(part, np.float32) for part in (seen_x, seen_y, off, np.cos(beta), np.sin(beta)))
+    corners.x[:], corners.y[:] = seen + noise
+    corners.columns.count = number
+    edges.predicted_x[:number], edges.predicted_y[:number] = x, y
+    edges.cos[:number], edges.sin[:number] = np.cos(beta), np.sin(beta)
+    edges.trust[:number], edges.corner[:number] = SETTINGS.tr_max, np.arange(number)
+    return edges, corners
+
+
+def missing_rotation(edges: EdgeTable, corners: CornerTable, sigma_rad: float) -> tuple[npt.NDArray[np.float64], float]:
+    """The rotation that the gyro missed, (3, 3), and what stays uncertain of it."""
+    off = OffLine()
+    for row in range(edges.count):
+        derotation.off_line(off, edges.columns, row, corners.columns, PINHOLE)
+    derotation.missing_rotation(off, sigma_rad)
+    return np.eye(3) + np.cross(np.eye(3), [off.turn_x, off.turn_y, off.turn_z]), off.sigma
 
 
 @given(st.tuples(angle, angle, angle), st.integers(0, 1000))
 def test_a_small_rotation_is_recovered_although_a_third_moves(axis: tuple[float, float, float], seed: int) -> None:
     missed = rotation_of(axis)
-    found, sigma_rad = missing_rotation(PINHOLE, *off_the_lines(missed, 0.3, seed=seed), SIGMA_RAD)
+    found, sigma_rad = missing_rotation(*off_the_lines(missed, 0.3, seed=seed), SIGMA_RAD)
     assert found == pytest.approx(missed, abs=1.2e-3)
     assert 0 < sigma_rad < 0.1 * SIGMA_RAD
 
 
 def test_edges_on_their_lines_ask_for_no_rotation() -> None:
-    found, _ = missing_rotation(PINHOLE, *off_the_lines(np.eye(3), 0.0), SIGMA_RAD)
+    found, _ = missing_rotation(*off_the_lines(np.eye(3), 0.0), SIGMA_RAD)
     assert found == pytest.approx(np.eye(3), abs=2e-4)
 
 
 def test_a_gyro_that_is_sure_is_believed() -> None:
-    told = off_the_lines(rotation_of((0.004, 0.004, 0.0)), 0.0)
-    found, sigma_rad = missing_rotation(PINHOLE, *told, 1e-6)
+    found, sigma_rad = missing_rotation(*off_the_lines(rotation_of((0.004, 0.004, 0.0)), 0.0), 1e-6)
     assert found == pytest.approx(np.eye(3), abs=1e-5)
     assert sigma_rad == pytest.approx(1e-6, rel=0.1)
 
 
 def test_more_edges_leave_less_uncertain() -> None:
-    sigmas = [
-        missing_rotation(PINHOLE, *off_the_lines(np.eye(3), 0.0, number), SIGMA_RAD)[1] for number in (25, 100, 200)
-    ]
+    sigmas = [missing_rotation(*off_the_lines(np.eye(3), 0.0, number), SIGMA_RAD)[1] for number in (25, 100, 200)]
     assert sigmas == sorted(sigmas, reverse=True)
     assert all(math.isfinite(sigma) for sigma in sigmas)
+
+
+def test_a_few_edges_tell_no_rotation() -> None:
+    edges, corners = off_the_lines(np.eye(3), 0.0, 24)
+    assert not derotation.measure_off_line(OffLine(), edges.columns, corners.columns, PINHOLE, SETTINGS)
+
+
+def test_of_many_edges_an_even_sample_is_enough() -> None:
+    edges, corners = off_the_lines(np.eye(3), 0.0, 900)
+    off = OffLine()
+    assert derotation.measure_off_line(off, edges.columns, corners.columns, PINHOLE, SETTINGS)
+    assert off.count == 180  # every fifth
+
+
+def test_the_distance_from_the_flow_line_is_that_of_the_corner() -> None:
+    edges, corners = off_the_lines(rotation_of((0.0, 0.004, 0.0)), 0.0, 25)
+    off = OffLine()
+    derotation.measure_off_line(off, edges.columns, corners.columns, PINHOLE, SETTINGS)
+    for row in range(25):
+        dx, dy = corners.x[row] - edges.predicted_x[row], corners.y[row] - edges.predicted_y[row]
+        assert np.asarray(off.px)[row] == pytest.approx(line_distance(dx, dy, edges.cos[row], edges.sin[row]))

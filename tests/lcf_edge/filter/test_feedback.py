@@ -9,9 +9,8 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Config, Filter, Vehicle
-from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter import LineCircleFilter, line_expert
 from lcf_edge.filter.line_circle_filter import Step
-from lcf_edge.filter.line_expert import inside_psi
 from lcf_edge.records import Shape
 
 DEFAULTS = Config()
@@ -35,7 +34,7 @@ def ids(tables: LineCircleFilter) -> dict[int, int]:
 
 def inside(tables: LineCircleFilter, at: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
     """Which places (n, 2) lie inside ψ."""
-    return np.asarray(inside_psi(tables.psi, *at.T) >= 0)
+    return np.array([line_expert.psi_at(tables.psi.columns, *place) >= 0 for place in at.tolist()], np.bool_)
 
 
 @pytest.fixture(scope="session")
@@ -118,12 +117,12 @@ def test_nothing_is_omitted_unless_the_vehicle_is_known_to_drive_forward(crowd: 
 # Kept
 
 
-def test_a_region_goes_along_with_what_it_was_written_on(crowd: Any) -> None:
+def test_a_region_goes_along_with_what_it_was_written_on(crowd: Any, psi_at: Callable[..., Any]) -> None:
     held: dict[int, npt.NDArray[np.intp]] = {}
     compared = 0
     for seq, tables, _ in steps(crowd):
         at = crowd.in_picture(seq)
-        holder = inside_psi(tables.psi, *at.T)
+        holder = psi_at(tables.psi, *at.T)
         for number, row in ids(tables).items():
             before = held.setdefault(number, np.flatnonzero(holder == row))
             if len(before) >= 6:

@@ -9,9 +9,13 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Filter
+from lcf_edge.filter import normal_circles
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.normal_circles import NormalCircles
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.normal_circles import Flowing
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable
+from lcf_edge.lens import Lens
 
 FOCUS = (319.5, 239.5)
 SETTINGS = Filter()
@@ -37,9 +41,10 @@ class Scene:
 
     def __init__(self, around: Any, capacity: int = 16, **settings: Any) -> None:
         self.around = around
+        around.dt_s = 1.0
         self.edges = EdgeTable(200, 10, 10)
         self.circles = CircleTable(capacity)
-        self.expert = NormalCircles(Filter(**settings), Ids())
+        self.flowing, self.settings, self.ids = Flowing(210, capacity), Settings(Filter(**settings)), Ids()
         self.evicted = 0
 
     def add(self, places: Places, expansion: float = 0.5) -> slice:
@@ -60,9 +65,17 @@ class Scene:
         self.edges.remove(dead)
 
     def update(self, times: int = 1) -> "Scene":
-        nobody = np.zeros(self.circles.capacity, np.bool_)
+        nobody = np.zeros(self.circles.capacity, np.uint8)
         for _ in range(times):
-            self.evicted += self.expert.update(self.edges, self.circles, self.around, nobody)
+            self.evicted += normal_circles.update(
+                self.flowing,
+                self.edges.columns,
+                self.circles.columns,
+                memoryview(nobody),
+                self.around,
+                self.settings,
+                self.ids,
+            )
         return self
 
     def of(self, rows: slice) -> set[int]:
@@ -225,11 +238,12 @@ def test_identities_are_new_and_kept(scene: Scene) -> None:
 # Prediction, and what passes by
 
 
-def test_the_prediction_goes_out_from_the_focus_and_grows() -> None:
+def test_the_prediction_goes_out_from_the_focus_and_grows(situation: Situation, lens: Lens) -> None:
     circles = CircleTable(2)
+    circles.active[0] = True
     circles.x[0], circles.y[0] = FOCUS[0] + 100, FOCUS[1] - 50
     circles.radius[0], circles.expansion[0] = 20, 0.5
-    NormalCircles(SETTINGS, Ids()).predict(circles, FOCUS, 0.1)
+    normal_circles.predict(circles.columns, ImagePlane(lens), situation(dt_s=0.1))
     assert (circles.x[0], circles.y[0]) == pytest.approx((FOCUS[0] + 105, FOCUS[1] - 52.5))
     assert circles.radius[0] == pytest.approx(21)
 
@@ -246,9 +260,9 @@ def test_only_what_lies_beside_the_path_passes_by(
     ahead_m = 4.0
     circles = CircleTable(1)
     circles.active[0] = True
-    circles.x[0], circles.y[0] = around.focus[0] + 500 * right_m / ahead_m, 200
+    circles.x[0], circles.y[0] = around.focus_x + 500 * right_m / ahead_m, 200
     circles.radius[0], circles.expansion[0] = 25, around.speed_mps / ahead_m
-    assert NormalCircles(SETTINGS, Ids()).passing_by(circles, around).tolist() == [passes]
+    assert bool(normal_circles.passes_by(circles.columns, 0, around)) is passes
 
 
 @pytest.mark.parametrize("speed_mps", [math.nan, 0.0, -1.0])
@@ -257,4 +271,4 @@ def test_nothing_is_known_to_pass_by_when_the_vehicle_does_not_drive_forward(
 ) -> None:
     circles = CircleTable(1)
     circles.active[0], circles.x[0], circles.expansion[0], circles.radius[0] = True, 600, 0.5, 20
-    assert not NormalCircles(SETTINGS, Ids()).passing_by(circles, situation(speed_mps=speed_mps)).any()
+    assert not normal_circles.passes_by(circles.columns, 0, situation(speed_mps=speed_mps))

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,14 +10,17 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Config, Filter, Vehicle
-from lcf_edge.filter import LineCircleFilter
-from lcf_edge.filter.circles import Ids, Members
-from lcf_edge.filter.rebel_circles import RebelCircles, link, own_expansion
-from lcf_edge.filter.rebel_detection import Links, Rebels, Verdict, judge
+from lcf_edge.filter import LineCircleFilter, rebel_circles, rebel_detection
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.rebel_circles import RebelGroups
+from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable
+from lcf_edge.lens import Lens
 from lcf_edge.records import Cause
 
-SETTINGS = Filter()
+SETTINGS = Settings(Filter())
 TR_CR, TR_S, TR_MAX = SETTINGS.tr_cr, SETTINGS.tr_s, SETTINGS.tr_max
 NEWBORN = 0.5 * (TR_CR + TR_S)
 HORIZON_S = 4.0
@@ -29,41 +32,71 @@ Situation = Callable[..., Any]
 Floats = npt.NDArray[np.float32]
 
 
-def rebels_at(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> Rebels:
-    """Rebel edges that moved so for a while, px and px/s."""
-    one = np.ones(len(x), np.float32)
-    focus_x, focus_y, depth_m = (one * value for value in (*around.focus, SEEN_S * around.speed_mps))
-    links = Links(x - SEEN_S * vx, y - SEEN_S * vy, focus_x, focus_y, depth_m, SEEN_S * one, 0 * one)
-    links = Links(*(np.asarray(getattr(links, each.name), np.float32) for each in fields(Links)))
-    return Rebels(np.arange(len(x)), x, y, vx, vy, links, judge(links, x, y, around))
+class Seen:
+    """Rebel edges at ``x``, ``y`` (px) that moved so (px/s) for a while: first rows of a table, and verdicts."""
+
+    def __init__(
+        self, edges: EdgeTable, x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any, seen_s: float = SEEN_S
+    ) -> None:
+        self.edges, self.count = edges, len(x)
+        self.verdicts, self.baselines = Verdicts(self.count), Baselines()
+        self.breaking = memoryview(np.arange(self.count, dtype=np.int32))
+        rows = edges.append(self.count)
+        edges.x[rows], edges.y[rows], edges.rebel[rows], edges.trust[rows] = x, y, True, TR_S
+        for name, value in (
+            ("focus_x", around.focus_x),
+            ("focus_y", around.focus_y),
+            ("depth_m", seen_s * around.speed_mps),
+            ("elapsed_s", seen_s),
+        ):
+            np.asarray(getattr(self.baselines, name))[:] = value
+        self.verdicts.count = self.count
+        np.asarray(self.verdicts.row)[:] = np.arange(self.count)
+        np.asarray(self.verdicts.x)[:], np.asarray(self.verdicts.y)[:] = x - seen_s * vx, y - seen_s * vy
+        for row in range(self.count):
+            rebel_detection.judge(self.verdicts, row, edges.columns, self.baselines, around, SETTINGS)
+
+    def taken(self) -> RebelGroups:
+        """In groups, which are still to be made."""
+        groups = RebelGroups(self.edges.capacity, 4)
+        columns = self.edges.columns
+        rebel_circles.take_rebels(groups, self.count, self.breaking, self.verdicts, columns, self.baselines)
+        return groups
 
 
 class Scene:
-    """Rebel edges that move as told, and the circles that they make."""
+    """Rebel edges that move as described, and the circles that they make."""
 
     def __init__(self, around: Any, **settings: Any) -> None:
         self.around = around
         self.edges = EdgeTable(50, 50, 10)
         self.circles = CircleTable(4)
-        self.expert = RebelCircles(Filter(**settings), around.horizon_s, Ids())
+        self.groups, self.settings, self.ids = RebelGroups(100, 4), Settings(Filter(**settings)), Ids()
 
     def update(self, *groups: tuple[float, float, float, float], number: int = 8, flowing: int = 0) -> "Scene":
         """One frame with groups of rebels (x, y, direction in rad, px/s), and normal edges among the first of them."""
         self.edges.remove(np.ones(self.edges.count, np.bool_))
-        if not groups:
-            self.expert.update(self.edges, self.circles, None, self.around)
-            return self
         off = np.random.default_rng(0).uniform(-12, 12, (len(groups), number, 2))
-        where = np.array([group[:2] for group in groups])
+        where = np.array([group[:2] for group in groups]).reshape(-1, 2)
         x, y = (where[:, None] + off).reshape(-1, 2).astype(np.float32).T
-        beta, speed = np.repeat(np.array([group[2:] for group in groups], np.float32), number, axis=0).T
-        rows = self.edges.append(len(x))
-        self.edges.x[rows], self.edges.y[rows], self.edges.rebel[rows], self.edges.trust[rows] = x, y, True, TR_S
+        how = np.array([group[2:] for group in groups], np.float32).reshape(-1, 2)
+        beta, speed = np.repeat(how, number, axis=0).T
+        seen = Seen(self.edges, x, y, speed * np.cos(beta), speed * np.sin(beta), self.around)
         crowd = self.edges.append(flowing)
         self.edges.x[crowd], self.edges.y[crowd] = np.resize(x[:number], flowing), np.resize(y[:number], flowing)
         self.edges.trust[crowd], self.edges.matched[crowd] = TR_MAX, True
-        rebels = rebels_at(x, y, speed * np.cos(beta), speed * np.sin(beta), self.around)
-        self.expert.update(self.edges, self.circles, rebels, self.around)
+        rebel_circles.update(
+            self.groups,
+            self.edges.columns,
+            self.circles.columns,
+            seen.verdicts,
+            seen.breaking,
+            seen.count,
+            seen.baselines,
+            self.around,
+            self.settings,
+            self.ids,
+        )
         return self
 
     @property
@@ -113,7 +146,10 @@ def test_too_few_rebels_make_no_circle(scene: Scene, number: int) -> None:
 
 def linked(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> list[int]:
     """Group of each rebel."""
-    return [int(label) for label in link(rebels_at(x, y, vx, vy, around), SETTINGS, around)]
+    seen = Seen(EdgeTable(50, 50, 10), x, y, vx, vy, around)
+    groups = seen.taken()
+    rebel_circles.cluster(groups, seen.verdicts, seen.edges.columns, around, SETTINGS)
+    return [rebel_circles.lowest_label(groups, row) for row in range(seen.count)]
 
 
 def test_parts_of_an_object_that_grows_are_linked_though_they_fly_apart(situation: Situation) -> None:
@@ -176,17 +212,22 @@ def test_what_is_about_to_be_met_coasts_when_it_is_large(situation: Situation) -
         assert (scene.update().trust == before) == keeps
 
 
-def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation) -> None:
+def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation, lens: Lens) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
-    circles, pinhole = scene.circles, scene.around.pinhole
+    circles = scene.circles
     row = int(np.flatnonzero(circles.active)[0])
-    circles.ttc[row], circles.width[row], circles.height[row] = 0.2 * HORIZON_S, 100.0, 60.0
-    circles.x[row], circles.y[row] = 680.0, pinhole.cy
-    x, y = scene.expert.innermost(circles, pinhole)
-    assert (x[row], y[row]) == pytest.approx((630.0, pinhole.cy))
-    circles.ttc[row] = HORIZON_S
-    assert scene.expert.innermost(circles, pinhole)[0][row] == 680.0
+
+    def stays(x: float, ttc_s: float) -> bool:
+        circles.active[row], circles.ttc[row], circles.width[row], circles.height[row] = True, ttc_s, 100.0, 60.0
+        circles.x[row], circles.y[row] = x, 240.0
+        rebel_circles.end_outside(circles.columns, ImagePlane(lens), scene.around, SETTINGS)
+        return bool(circles.active[row])
+
+    assert stays(680.0, 0.2 * HORIZON_S)
+    assert not stays(695.0, 0.2 * HORIZON_S)
+    assert not stays(680.0, HORIZON_S)
+    assert stays(630.0, HORIZON_S)
 
 
 def test_what_a_nearer_circle_hides_waits_behind_it(situation: Situation) -> None:
@@ -229,24 +270,23 @@ def test_a_circle_keeps_its_identity_and_another_has_another(scene: Scene) -> No
 # Prediction
 
 
-def test_without_a_time_to_contact_the_centre_goes_on_as_it_went() -> None:
+def test_without_a_time_to_contact_the_centre_goes_on_as_it_went(situation: Situation) -> None:
     circles = CircleTable(1)
     circles.active[0], circles.x[0], circles.y[0], circles.radius[0] = True, 100, 50, 20
     circles.speed[0], circles.beta[0], circles.ttc[0] = 60, math.pi / 2, math.inf
-    RebelCircles(SETTINGS, HORIZON_S, Ids()).predict(circles, 0.5)
+    rebel_circles.predict(circles.columns, situation(dt_s=0.5))
     assert (circles.x[0], circles.y[0], circles.radius[0]) == pytest.approx((100, 80, 20), abs=1e-3)
 
 
 @pytest.mark.parametrize(("dt_s", "steps"), [(0.05, 10), (0.01, 50)])
-def test_what_looms_grows_as_its_range_shrinks(dt_s: float, steps: int) -> None:
+def test_what_looms_grows_as_its_range_shrinks(dt_s: float, steps: int, situation: Situation) -> None:
     """A disc of 0.5 m that comes at constant velocity from 4 m away, 2 s before contact, 0.4 m to the right."""
     circles = CircleTable(1)
     circles.active[0], circles.radius[0], circles.ttc[0] = True, 500 * 0.25 / 4, 2.0
     circles.x[0], circles.y[0] = 320 + 500 * 0.4 / 4, 240
     circles.speed[0], circles.beta[0] = 500 * 0.4 / 4 / 2.0, 0.0  # x/τ
-    expert = RebelCircles(SETTINGS, HORIZON_S, Ids())
     for _ in range(steps):
-        expert.predict(circles, dt_s)
+        rebel_circles.predict(circles.columns, situation(dt_s=dt_s))
     left_m = 4 * (1 - 0.5 / 2.0)
     assert circles.ttc[0] == pytest.approx(1.5, rel=1e-3)
     assert circles.radius[0] == pytest.approx(500 * 0.25 / left_m, rel=1e-3)
@@ -343,15 +383,17 @@ def test_with_the_speed_unknown_nothing_is_said_in_metres(drive: Drive, box: Lan
 
 
 @pytest.mark.parametrize("aside_pxps", [-200.0, 0.0, 200.0])
-def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(aside_pxps: float) -> None:
+def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(
+    aside_pxps: float, situation: Situation
+) -> None:
     """Motion to the side does not touch it."""
-    y = np.linspace(160, 320, 9, dtype=np.float32)
-    x = np.full(9, 400, np.float32)
-    ones = np.ones(9, np.float32)
-    links = Links(x, y, 320 * ones, 240 * ones, ones, 0.5 * ones, 0 * ones)
-    verdict = Verdict(*[ones] * 6, ones > 0, ones < 0)
-    vx, vy = aside_pxps * ones, np.float32(0.5) * (y - 240)
-    rebels = Rebels(np.arange(9), x, y, vx, vy, links, verdict)
-    members = Members(np.zeros(9, np.intp), 1, x, y)
-    assert own_expansion(rebels, members, 240.0) == pytest.approx([0.5], rel=1e-5)
-    assert own_expansion(replace(rebels, vy=0 * vy), members, 240.0) == [0]
+    below = np.linspace(-80, 80, 9)
+    for rate in (0.5, 0.0):
+        around, vy, vx = situation(horizon_y=240.0), rate * below, np.full(9, aside_pxps)
+        seen = Seen(EdgeTable(50, 50, 10), 400 + 0.5 * vx, 240 + below + 0.5 * vy, vx, vy, around, seen_s=0.5)
+        groups = seen.taken()
+        np.asarray(groups.label)[:9] = 0
+        rebel_circles.number_groups(groups, 1)
+        columns = seen.edges.columns
+        rebel_circles.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
+        assert rebel_circles.own_expansion(groups, 0) == pytest.approx(rate)

@@ -11,27 +11,36 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from lcf_edge.filter.flow import KeyFrames
-from lcf_edge.filter.rebel_detection import (
-    Baselines,
-    Links,
-    Verdict,
-    agree,
-    find_incoming,
-    give_birth,
-    judge,
-    miss,
-    way_to,
-)
+from lcf_edge.config import Filter
+from lcf_edge.filter import key_frames, rebel_detection
+from lcf_edge.filter.flow import Homography
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.path import miss, way_to
+from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import EdgeTable
 
-AHEAD = np.array([0.0, 0.0, 1.0])
+AHEAD = (0.0, 0.0, 1.0)
+SETTINGS = Settings(Filter())
 STEPS = 8  # of 0.05 s
 HEIGHT_M = 0.3  # of the camera
 
 Around = Callable[..., Situation]
 Drive = Callable[..., Any]
+
+
+class Judged:
+    """Edges with the verdicts on them, a column each."""
+
+    def __init__(self, verdicts: Verdicts) -> None:
+        self.verdicts = verdicts
+        for name in ("r", "drift", "short", "over", "outward", "expansion"):
+            setattr(self, name, np.asarray(getattr(verdicts, name)))
+        self.mover, self.incoming = (np.asarray(part) > 0 for part in (verdicts.mover, verdicts.incoming))
+
+    def __getattr__(self, name: str) -> Any:
+        raise AttributeError(name)
 
 
 @dataclass(frozen=True)
@@ -42,40 +51,48 @@ class Watched:
     around: Situation
     rounded: bool = False
 
-    def links(self, key: int = 0) -> Links:
-        """From key frame 0 (the start) or 1 (the middle) to the end."""
+    def seen(self, *, known: bool = False) -> tuple[EdgeTable, Baselines]:
+        """The edges at the end, with their key positions; and the baselines since key frames 0 (the start) and 1."""
         keys, number = KeyFrames(), len(self.drive.points_m)
-        edges = EdgeTable(number, 1, 1)
+        edges, baselines = EdgeTable(number, 1, 1), Baselines()
         edges.append(number)
+        edges.rebel[:number] = known
         for seq, (_, motion) in enumerate(self.drive):
             if seq:
-                keys.advance(motion.rotation, AHEAD, motion.speed_mps, motion.dt_s)
+                rotation = np.ascontiguousarray(motion.rotation)[None]
+                key_frames.advance(keys, rotation, *AHEAD, motion.speed_mps * motion.dt_s, motion.dt_s)
             if seq in {0, STEPS // 2}:
-                slot = keys.mark()
-                edges.key_x[slot, :number], edges.key_y[slot, :number] = self.place(seq)
-        return Baselines(keys, self.around).links(edges, np.arange(number), np.full(number, key))
+                slot = key_frames.mark(keys)
+                edges.key_x[:number, slot], edges.key_y[:number, slot] = self.place(seq)
+        edges.x[:number], edges.y[:number] = self.place(STEPS)
+        rebel_detection.measure_baselines(baselines, keys, Homography(), self.around.pinhole, self.around)
+        return edges, baselines
 
     def place(self, seq: int) -> npt.NDArray[np.float32]:
         """(2, n) px."""
         at = self.drive.in_picture(seq).T
         return np.asarray(np.rint(at) if self.rounded else at, np.float32)
 
-    def verdict(self, *, known: bool = False) -> Verdict:
-        links, (x, y) = self.links(), self.place(STEPS)
-        verdict = judge(links, x, y, self.around)
-        find_incoming(verdict, links, x, y, np.full(len(x), known), self.around)
-        return verdict
+    def judged(self, edges: EdgeTable, baselines: Baselines, slot: int) -> Verdicts:
+        verdicts = Verdicts(edges.count)
+        verdicts.count = edges.count
+        for row in range(edges.count):
+            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines)
+            rebel_detection.judge(verdicts, row, edges.columns, baselines, self.around, SETTINGS)
+        return verdicts
 
-    def agreed(self) -> npt.NDArray[np.bool_]:
-        whole, recent = self.links(0), self.links(1)
-        place = self.place(STEPS)
-        return agree(
-            judge(whole, *place, self.around),
-            whole.elapsed_s,
-            judge(recent, *place, self.around),
-            recent.elapsed_s,
-            0.8,
-        )
+    def verdict(self, *, known: bool = False, sigma_px: float = 0.0) -> Judged:
+        edges, baselines = self.seen(known=known)
+        np.asarray(baselines.sigma_px)[:] += sigma_px
+        verdicts = self.judged(edges, baselines, 0)
+        rebel_detection.find_incoming(verdicts, edges.columns, baselines, self.around, SETTINGS)
+        return Judged(verdicts)
+
+    def agreed(self) -> list[bool]:
+        edges, baselines = self.seen()
+        whole, recent = (self.judged(edges, baselines, slot) for slot in (0, 1))
+        noisy = Settings(Filter(edge_noise_px=0.8))
+        return [bool(rebel_detection.agree(whole, row, recent, row, baselines, noisy)) for row in range(whole.count)]
 
 
 @pytest.fixture(scope="session")
@@ -192,14 +209,12 @@ def test_the_miss_is_the_distance_from_the_arc_to_the_right(situation: Around, y
     for off in (-0.8, 0.0, 0.8):  # right of the path
         radius = arc_m + off
         right, ahead = radius * math.cos(turn) - arc_m, abs(radius) * math.sin(turn)
-        found = miss(np.array([right], np.float32), np.array([ahead], np.float32), around)
-        assert found == pytest.approx(off, abs=1e-5)
+        assert miss(right, ahead, around) == pytest.approx(off, abs=1e-9)
 
 
 def test_the_miss_of_a_straight_drive_is_the_offset(situation: Around) -> None:
-    right, ahead = np.array([-2.0, 0.5], np.float32), np.array([3.0, 9.0], np.float32)
     for around in (situation(), situation(speed_mps=math.nan, yaw_rate_radps=1.0), situation(speed_mps=0.0)):
-        assert miss(right, ahead, around).tolist() == right.tolist()
+        assert (miss(-2.0, 3.0, around), miss(0.5, 9.0, around)) == (-2.0, 0.5)
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5, 0.0])
@@ -210,16 +225,15 @@ def test_the_way_to_a_point_is_as_long_as_the_arc_that_ends_beside_it(situation:
         if yaw_rate_radps:
             arc_m, turn = 2.0 / yaw_rate_radps, 0.7  # 2.8 m on the arc
             right, ahead = (arc_m + off) * math.cos(turn) - arc_m, abs(arc_m + off) * math.sin(turn)
-        found = way_to(np.array([right], np.float32), np.array([ahead], np.float32), around)
-        assert found == pytest.approx(2.8, abs=1e-5)
+        assert way_to(right, ahead, around) == pytest.approx(2.8, abs=1e-9)
 
 
 def test_neighbours_tell_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
     """10 px from the focus an edge moves by a pixel or so; a dozen of them leave no doubt."""
     few = [(0.06, -0.08, 6.5)]
     many = [(x, y, 6.5) for x in (-0.08, 0.0, 0.08) for y in (-0.16, -0.12, -0.08, -0.04)]
-    assert not watch(few, noise_px=0.4).verdict().incoming.any()
-    assert watch(many, noise_px=0.4).verdict().incoming.sum() >= 9
+    assert not watch(few).verdict().incoming.any()
+    assert watch(many).verdict().incoming.sum() >= 9
 
 
 def test_a_threat_begins_a_little_inside_the_horizon_and_ends_at_it(watch: Watch) -> None:
@@ -279,61 +293,64 @@ def test_faster_than_anything_that_stands_still_can_go_out_is_a_mover(watch: Wat
 
 def test_uncertain_rotation_and_noise_widen_the_error_span(watch: Watch) -> None:
     watched = watch((0.0, -0.8, 4.0), (0.25, 0, 0))
-    links, place = watched.links(), watched.place(STEPS)
-    assert judge(links, *place, watched.around).mover
-    links.sigma_px[:] = 30
-    assert not judge(links, *place, watched.around).mover
+    assert watched.verdict().mover
+    assert not watched.verdict(sigma_px=30.0).mover
 
 
 # Chains
 
 
 def test_a_steady_crossing_agrees_with_itself(watch: Watch) -> None:
-    assert watch([(0, -0.8, 4.0), (0.5, -0.5, 5.0)], (1.0, 0, 0)).agreed().all()
+    assert watch([(0, -0.8, 4.0), (0.5, -0.5, 5.0)], (1.0, 0, 0)).agreed() == [True, True]
 
 
 def test_a_wall_ahead_agrees_with_itself(watch: Watch) -> None:
-    assert watch(WALL).agreed().all()
-    assert watch(WALL, rounded=True).agreed().all()
+    assert all(watch(WALL).agreed())
+    assert all(watch(WALL, rounded=True).agreed())
 
 
-def told(mover: bool, drift: float = 0.0, expansion: float = 0.0) -> Verdict:
-    """A verdict of one edge 100 px from the focus."""
-    column = [np.array([value], np.float32) for value in (100.0, drift, -50.0, -50.0, 0.0, expansion)]
-    return Verdict(*column, np.array([mover]), np.array([not mover]))
+def verdict_of(*, mover: bool, drift: float = 0.0, expansion: float = 0.0, slot: int = 0) -> Verdicts:
+    """A verdict on one edge 100 px from the focus."""
+    verdicts = Verdicts(1)
+    verdicts.count = 1
+    columns = {"r": 100.0, "drift": drift, "short": -50.0, "over": -50.0, "expansion": expansion}
+    for name, value in (columns | {"slot": slot, "mover": mover, "incoming": not mover}).items():
+        np.asarray(getattr(verdicts, name))[0] = value
+    return verdicts
 
 
-def agrees(whole: Verdict, recent: Verdict) -> bool:
+def agrees(whole: Verdicts, recent: Verdicts) -> bool:
     """A chain of 0.4 s of which the recent link took 0.2 s."""
-    return bool(agree(whole, np.float32([0.4]), recent, np.float32([0.2]), 0.8)[0])
+    baselines = Baselines()
+    np.asarray(baselines.elapsed_s)[:2] = 0.4, 0.2
+    np.asarray(recent.slot)[0] = 1
+    return bool(rebel_detection.agree(whole, 0, recent, 0, baselines, Settings(Filter(edge_noise_px=0.8))))
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
 def test_a_jump_is_no_motion(sign: int) -> None:
-    assert agrees(told(True, sign * 60), told(True, sign * 30))
-    assert not agrees(told(True, sign * 60), told(True, sign * 60))  # all of it in the recent link
-    assert not agrees(told(True, sign * 60), told(False, 0.0))  # all of it before
-    assert not agrees(told(True, sign * 60), told(True, sign * -30))
+    assert agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * 30))
+    assert not agrees(
+        verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * 60)
+    )  # all of it in the recent link
+    assert not agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=False))  # all of it before
+    assert not agrees(verdict_of(mover=True, drift=sign * 60), verdict_of(mover=True, drift=sign * -30))
 
 
 def test_an_expansion_that_jumps_comes_from_no_wall() -> None:
-    assert agrees(told(False, expansion=0.5), told(False, expansion=0.5))
-    assert not agrees(told(False, expansion=0.5), told(False, expansion=1.5))
-    assert not agrees(told(False, expansion=0.5), told(False, expansion=0.0))
+    assert agrees(verdict_of(mover=False, expansion=0.5), verdict_of(mover=False, expansion=0.5))
+    assert not agrees(verdict_of(mover=False, expansion=0.5), verdict_of(mover=False, expansion=1.5))
+    assert not agrees(verdict_of(mover=False, expansion=0.5), verdict_of(mover=False, expansion=0.0))
 
 
 def born(*l123: tuple[float, float]) -> EdgeTable:
     """E_r from key positions L1, L2, L3, the last two 0.1 s apart."""
-    edges = EdgeTable(4, 2, 2)
+    edges, first, second = EdgeTable(4, 2, 2), Verdicts(1), Verdicts(1)
     edges.append(1)
-    first, second, last = (tuple(np.float32([value]) for value in place) for place in l123)
     edges.x[0], edges.y[0], edges.links[0] = *l123[2], 2
-
-    def link(place: tuple[npt.NDArray[np.float32], ...], elapsed_s: float) -> Links:
-        return Links(*place, *np.zeros((3, 1), np.float32), np.float32([elapsed_s]), np.zeros(1, np.float32))
-
-    give_birth(edges, np.array([0]), link(first, 0.2), link(second, 0.1))
-    assert len(last) == 2
+    for verdicts, (x, y) in zip((first, second), l123[:2], strict=True):
+        np.asarray(verdicts.x)[0], np.asarray(verdicts.y)[0] = x, y
+    rebel_detection.give_birth(edges.columns, first, 0, second, 0, 0.1, SETTINGS)
     return edges
 
 

@@ -1,0 +1,31 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport edge_equations
+from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
+from lcf_edge.filter.settings cimport Settings
+
+cdef double RADIUS_SIGMAS
+cdef double MIN_RADIUS_PX
+cdef double EXTENT_SIGMAS
+cdef unsigned long long LAST_ID
+cdef double INFINITY
+cdef double NAN
+
+cdef class Ids:
+    cdef public unsigned long long next
+
+cdef class Members:
+    cdef public Py_ssize_t capacity
+    cdef public int[::1] size
+    cdef public double[::1] x, y, variance_x, variance_y
+
+cdef unsigned int new_id(Ids ids) noexcept nogil
+cdef void clear(Members members, Py_ssize_t g) noexcept nogil
+cdef double radius_of(Members members, Py_ssize_t g, double most_px) noexcept nogil
+cdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
+cdef void describe(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g) noexcept nogil
+cdef void give_birth(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings, Ids ids) noexcept nogil
+cdef int free_row(CircleColumns circles) noexcept nogil
+cdef int weakest_row(CircleColumns circles, Settings settings) noexcept nogil
+cdef void release(EdgeColumns edges, CircleColumns circles, bint rebel) noexcept nogil
+cdef int make_room(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil

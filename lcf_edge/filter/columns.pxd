@@ -1,0 +1,37 @@
+cdef class EdgeColumns:
+    cdef public Py_ssize_t count, capacity
+    cdef double[::1] x, y, beta, speed, bl, trust, deviation, origin_x, origin_y
+    cdef double[:, ::1] key_x, key_y
+    cdef int[::1] born_key, circle, links
+    cdef unsigned char[::1] rebel, held, matched
+    cdef unsigned char[:, ::1] appearance
+    cdef unsigned long long[:, ::1] words
+    cdef double[::1] predicted_x, predicted_y, predicted_speed, cos, sin, cost
+    cdef int[::1] corner, best, psi
+    cdef bint own_way(self, Py_ssize_t i) noexcept nogil
+
+cdef class CircleColumns:
+    cdef public Py_ssize_t capacity
+    cdef unsigned char[::1] active, cause
+    cdef unsigned int[::1] id
+    cdef int[::1] support
+    cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral
+
+cdef class PsiColumns:
+    cdef public Py_ssize_t capacity
+    cdef unsigned char[::1] active, shape
+    cdef unsigned int[::1] id
+    cdef double[::1] x, y, width, height, trust, expansion, life_s
+    cdef int[::1] circle, edges, missing, new
+
+cdef class GroupColumns:
+    cdef public Py_ssize_t count, capacity
+    cdef double[::1] x, y, bs, trust
+    cdef int[::1] row
+
+cdef class CornerColumns:
+    cdef public Py_ssize_t count
+    cdef double[::1] x, y, cost
+    cdef int[::1] pixel_x, pixel_y, edge, psi
+    cdef unsigned long long[:, ::1] words
+    cdef unsigned char[::1] omitted, free, taken, expected

@@ -1,0 +1,82 @@
+"""The tables' columns as the loops see them: typed memory, taken once. ``tables`` tells what each column means."""
+
+from collections.abc import Mapping
+from typing import Any
+
+Memory = Mapping[str, Any]
+
+
+class EdgeColumns:
+    """Of an ``EdgeTable``; the first ``count`` rows are in use."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.count = 0
+        self.capacity = len(memory["x"])
+        self.x, self.y, self.beta, self.speed = memory["x"], memory["y"], memory["beta"], memory["speed"]
+        self.bl, self.trust, self.deviation = memory["bl"], memory["trust"], memory["deviation"]
+        self.origin_x, self.origin_y = memory["origin_x"], memory["origin_y"]
+        self.key_x, self.key_y, self.born_key = memory["key_x"], memory["key_y"], memory["born_key"]
+        self.circle, self.links = memory["circle"], memory["links"]
+        self.rebel, self.held, self.matched = memory["rebel"], memory["held"], memory["matched"]
+        self.appearance, self.words = memory["appearance"], memory["words"]
+        self.predicted_x, self.predicted_y = memory["predicted_x"], memory["predicted_y"]
+        self.predicted_speed, self.cos, self.sin = memory["predicted_speed"], memory["cos"], memory["sin"]
+        self.corner, self.best, self.cost, self.psi = memory["corner"], memory["best"], memory["cost"], memory["psi"]
+
+    def own_way(self, i: int) -> bool:
+        """Whether an edge follows no flow line: rebels and chains."""
+        return self.rebel[i] != 0 or self.links[i] > 0
+
+
+class CircleColumns:
+    """Of a ``CircleTable``."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.capacity = len(memory["x"])
+        self.active, self.id, self.support, self.cause = (
+            memory["active"],
+            memory["id"],
+            memory["support"],
+            memory["cause"],
+        )
+        self.x, self.y, self.radius, self.beta = memory["x"], memory["y"], memory["radius"], memory["beta"]
+        self.speed, self.expansion, self.trust = memory["speed"], memory["expansion"], memory["trust"]
+        self.corr, self.width, self.height = memory["corr"], memory["width"], memory["height"]
+        self.ttc, self.range, self.lateral = memory["ttc"], memory["range"], memory["lateral"]
+
+
+class PsiColumns:
+    """Of a ``PsiTable``."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.capacity = len(memory["x"])
+        self.active, self.id, self.shape, self.circle = (
+            memory["active"],
+            memory["id"],
+            memory["shape"],
+            memory["circle"],
+        )
+        self.x, self.y, self.width, self.height = memory["x"], memory["y"], memory["width"], memory["height"]
+        self.trust, self.expansion, self.life_s = memory["trust"], memory["expansion"], memory["life_s"]
+        self.edges, self.missing, self.new = memory["edges"], memory["missing"], memory["new"]
+
+
+class GroupColumns:
+    """Of a ``GroupTable``; the first ``count`` rows are in use."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.count = 0
+        self.capacity = len(memory["x"])
+        self.x, self.y, self.bs = memory["x"], memory["y"], memory["bs"]
+        self.trust, self.row = memory["trust"], memory["row"]
+
+
+class CornerColumns:
+    """Of a ``CornerTable``; the first ``count`` rows are in use."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.count = 0
+        self.x, self.y, self.pixel_x, self.pixel_y = memory["x"], memory["y"], memory["pixel_x"], memory["pixel_y"]
+        self.words, self.psi = memory["words"], memory["psi"]
+        self.omitted, self.free, self.taken = memory["omitted"], memory["free"], memory["taken"]
+        self.expected, self.edge, self.cost = memory["expected"], memory["edge"], memory["cost"]

@@ -1,0 +1,30 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport edge_equations, edge_rows, flow, image_plane, line_expert, rebel_circles
+from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns
+from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef double MIN_CORR
+cdef double SWING_SHARE
+cdef double MAX_DEVIATION_RAD
+cdef double MIN_ORIGIN_PX
+cdef double MIN_RADIUS_PX
+cdef double STRAY_GATE_SHARE
+cdef double JOIN_GATE_SHARE
+
+cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
+cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
+cdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
+cdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
+cpdef void update(EdgeColumns edges, CircleColumns normal, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
+cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner) noexcept nogil
+cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, double x, double y, double dt_s, Settings settings) noexcept nogil
+cdef void turn_own_way(EdgeColumns edges, Py_ssize_t i) noexcept nogil
+cdef void stray(EdgeColumns edges, Py_ssize_t i, double x0, double y0, CornerColumns corners, Py_ssize_t corner, double dt_s, Settings settings) noexcept nogil
+cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, double tr_cr) noexcept nogil
+cpdef int count_unclaimed(CornerColumns corners) noexcept nogil
+cpdef void add(EdgeColumns edges, CircleColumns normal, CornerColumns corners, GroupColumns groups, Situation around, Py_ssize_t room, int key_number, Settings settings) noexcept nogil
+cdef double first_expansion(double x, double y, CircleColumns normal, GroupColumns groups, Situation around, Settings settings) noexcept nogil
+cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, Situation around, Settings settings) noexcept nogil

@@ -1,0 +1,16 @@
+cimport cython
+from libc cimport math
+
+cdef int KEYS
+
+cdef class KeyFrames:
+    cdef public double[:, :, ::1] rotation
+    cdef public double[:, ::1] displacement
+    cdef public double[::1] elapsed_s, sigma_rad
+    cdef public int number
+    cdef public double since_s
+
+cpdef void turn(KeyFrames keys, const double[:, :, ::1] rotation) noexcept nogil
+cpdef void advance(KeyFrames keys, const double[:, :, ::1] rotation, double ahead_x, double ahead_y, double ahead_z, double way_m, double dt_s) noexcept nogil
+cpdef void inflate(KeyFrames keys, double sigma_rad) noexcept nogil
+cpdef int mark(KeyFrames keys) noexcept nogil

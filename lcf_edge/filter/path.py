@@ -1,0 +1,36 @@
+"""The vehicle's path over the ground: an arc by speed and yaw rate, or a straight line."""
+
+import math
+
+from lcf_edge.filter.situation import Situation
+
+INFINITY = float("inf")
+MIN_CURVATURE = 1e-3  # 1/m, an arc with less is as good as straight
+MIN_SPEED_MPS = 0.05  # below it a yaw rate says nothing about a path
+
+
+def arc_radius_m(around: Situation) -> float:
+    """Radius of the path, m, its centre to the left when positive; infinite: straight, or the speed is unknown."""
+    speed = around.speed_mps
+    least = MIN_CURVATURE * max(math.fabs(speed), MIN_SPEED_MPS)
+    if not math.isfinite(speed) or math.fabs(around.yaw_rate_radps) < least:
+        return INFINITY
+    return speed / around.yaw_rate_radps
+
+
+def miss(right_m: float, ahead_m: float, around: Situation) -> float:
+    """Distance of a point from the vehicle's path, m, right positive."""
+    radius = arc_radius_m(around)
+    if not math.isfinite(radius):
+        return right_m
+    distance = math.sqrt((right_m + radius) * (right_m + radius) + ahead_m * ahead_m) - math.fabs(radius)
+    return -distance if radius < 0 else (distance if radius > 0 else 0.0)
+
+
+def way_to(right_m: float, ahead_m: float, around: Situation) -> float:
+    """How far the vehicle goes along its arc until a point is beside it, m."""
+    radius = arc_radius_m(around)
+    if not math.isfinite(radius):
+        return ahead_m
+    outside = right_m + radius if radius > 0 else (-right_m - radius if radius < 0 else 0.0)
+    return math.fabs(radius) * math.atan2(ahead_m, outside)

@@ -1,0 +1,81 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport circles as shared
+from lcf_edge.filter cimport edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter.circles cimport Ids, Members
+from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
+from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.rebel_detection cimport Baselines, Verdicts
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef double VELOCITY_NOISE_PX
+cdef double STILL_PX
+cdef double LIKE_SPEED
+cdef double MEMBER_MARGIN_PX
+cdef double SIDEWAYS
+cdef double MIN_RANGE_M
+cdef double MIN_RATE
+cdef double RATE_SIGMAS
+cdef double MAX_GROWTH
+cdef double MIN_EXTENT2_PX
+cdef double FASTEST_EXPANSION
+cdef double LINK_SHARE
+cdef double COAST_SHARE
+cdef double MIN_COAST_PX
+cdef double MIN_TTC_SHARE
+cdef int CROSSING
+cdef int INCOMING
+cdef int LEADING
+cdef double INFINITY
+cdef double NAN
+
+cdef class RebelGroups:
+    cdef public Py_ssize_t count, groups
+    cdef public int[::1] verdict, label, group
+    cdef public double[::1] vx, vy, elapsed_s
+    cdef public Members members
+    cdef public double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
+    cdef public int[::1] standing, inwards, flowing, circle
+    cdef int[::1] best_circle, best_group
+    cdef int[:, ::1] votes
+    cdef unsigned char[::1] odd, updated, missed
+
+cpdef void predict(CircleColumns circles, Situation around) noexcept nogil
+cdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, double tr_s) noexcept nogil
+cpdef void end_outside(CircleColumns circles, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef int circle_at(CircleColumns circles, double x, double y, double tr_s) noexcept nogil
+cdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) noexcept nogil
+cdef double velocity_x(CircleColumns circles, Py_ssize_t c, double x, double horizon_s) noexcept nogil
+cdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double horizon_s) noexcept nogil
+cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
+cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
+cpdef int lowest_label(RebelGroups groups, int k) noexcept nogil
+cdef void join(RebelGroups groups, int a, int b) noexcept nogil
+cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
+cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
+cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(few=bint)
+cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Settings settings) noexcept nogil
+@cython.locals(inside=bint)
+cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
+cdef void choose(RebelGroups groups, CircleColumns circles) noexcept nogil
+cdef void involve(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef int largest_new(RebelGroups groups) noexcept nogil
+cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
+cdef double standing_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
+cpdef double own_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
+cdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil
+@cython.locals(stands=bint)
+cdef void contact(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef double finite(double value) noexcept nogil
+@cython.locals(beside=bint, crosses=bint)
+cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint stands, double aside_mps, Situation around) noexcept nogil
+@cython.locals(across=bint)
+cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, double tr_s) noexcept nogil
+@cython.locals(waits=bint)
+cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -1,0 +1,31 @@
+"""Run the filter over frames that a test has written, and print a digest of all tables after each."""
+
+import hashlib
+import pickle
+import sys
+from pathlib import Path
+
+from lcf_edge.filter import LineCircleFilter, alpha
+from lcf_edge.filter.line_circle_filter import Step
+
+
+def digest(tables: LineCircleFilter, step: Step) -> str:
+    """Of all that a step leaves behind."""
+    found = hashlib.sha256(step.omitted.tobytes() + repr(step.sizes).encode())
+    for table in (tables.edges, tables.normal, tables.rebel, tables.psi, tables.groups):
+        for column in table.arrays.values():
+            found.update(column.tobytes())
+    return found.hexdigest()
+
+
+def main(path: Path) -> None:
+    """``path``: a pickle of the configuration, the lens, and what each step takes."""
+    config, lens, frames = pickle.loads(path.read_bytes())
+    tables = LineCircleFilter(config, lens)
+    lines = ["uncompiled" if str(alpha.__file__).endswith(".py") else "compiled"]
+    lines += [digest(tables, tables.step(corners, motion)) for corners, motion in frames]
+    sys.stdout.write("\n".join(lines))
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
