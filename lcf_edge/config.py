@@ -108,6 +108,7 @@ class Filter(Table, frozen=True):
     fast_threshold: Annotated[int, msgspec.Meta(ge=1, le=254)] = 25
     fast_adaptive: bool = True  # the threshold follows the scene so that about `corners_target` are found
     corners_target: Count = 700
+    least_roundness: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.02  # λ_min/λ_max; below: along an edge
     tr_cr: NotNegative = 2.0
     tr_s: NotNegative = 3.0
     tr_max: NotNegative = 5.0
@@ -143,6 +144,7 @@ class Filter(Table, frozen=True):
 PAPER = Filter(
     profile="paper",
     fast_adaptive=False,
+    least_roundness=0.0,
     delta_px=4.0,
     bl0_px=25.0,
     key_interval_s=1.0,
