@@ -38,6 +38,7 @@ def config_of(drive: Drive, settings: Filter | None = None, memory: Memory | Non
         distortion=list(drive.lens.distortion),
         height_m=drive.camera_height_m,
         pitch_rad=drive.camera_pitch_rad,
+        mask=[[list(point) for point in part] for part in drive.own_parts],
     )
     vehicle = Vehicle(half_width_m=drive.half_width_m, horizon_s=drive.horizon_s)
     imu = Imu(time_offset_s=-drive.exposure_s / 2)  # a picture shows the middle of its exposure, its stamp the start

@@ -17,6 +17,7 @@ from lcf_edge.errors import ConfigError
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 LARGEST_FILE_BYTES = 2**20
+MOST_POLYGONS, MOST_POINTS = 64, 256  # of a mask
 
 Positive = Annotated[float, msgspec.Meta(gt=0)]
 NotNegative = Annotated[float, msgspec.Meta(ge=0)]
@@ -70,6 +71,7 @@ class Camera(Table, frozen=True):
     height_m: NotNegative = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: Tilt = 0.0  # positive: looks up
     yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
+    mask: list[list[list[float]]] = []  # own parts in view: polygons of x, y in px of a picture of width x height
 
 
 class Imu(Table, frozen=True):
@@ -346,6 +348,7 @@ def _check(config: Config, origin: str) -> None:
         if driver == "recording" and not recording:
             raise ConfigError(f"{origin}: {table}.recording: needed with {table}.driver=recording; name a recording")
     _check_lens(camera, origin)
+    _check_mask(camera, origin)
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
         raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
@@ -368,6 +371,22 @@ def _check_lens(camera: Camera, origin: str) -> None:
     if len(camera.distortion) not in wanted:
         counts = " or ".join(map(str, wanted))
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
+
+
+def _check_mask(camera: Camera, origin: str) -> None:
+    if len(camera.mask) > MOST_POLYGONS:
+        raise ConfigError(f"{origin}: camera.mask: {len(camera.mask)} polygons, more than {MOST_POLYGONS}")
+    for number, polygon in enumerate(camera.mask, start=1):
+        if not 3 <= len(polygon) <= MOST_POINTS or any(len(point) != 2 for point in polygon):
+            raise ConfigError(
+                f"{origin}: camera.mask: polygon {number} must have 3 to {MOST_POINTS} points [x, y]; "
+                "lcf-edge calibrate mask makes them"
+            )
+        if not all(
+            -camera.width <= x <= 2 * camera.width and -camera.height <= y <= 2 * camera.height for x, y in polygon
+        ):
+            size = f"{camera.width}x{camera.height}"
+            raise ConfigError(f"{origin}: camera.mask: polygon {number} lies far outside of a picture of {size} px")
 
 
 def _numbers(value: Any) -> Iterator[float]:

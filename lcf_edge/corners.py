@@ -33,16 +33,19 @@ class CornerDetector:
 
     With ``fast_adaptive`` about ``corners_target`` are found, by a threshold that follows the scene; no part of the
     picture has more than its share, and where there are next to none a lower threshold looks again. All of it depends
-    on the pictures so far and nothing else.
+    on the pictures so far and nothing else. ``seen``: where corners are wanted, (height, width), elsewhere 0; None:
+    everywhere.
     """
 
-    def __init__(self, settings: Filter, lens: Lens, capacity: int) -> None:
+    def __init__(self, settings: Filter, lens: Lens, capacity: int, seen: Grey | None = None) -> None:
+        self._seen = seen
         self._settings = settings
         self._lens = lens
         self._capacity = capacity
         self._squares = Squares(lens.width, lens.height, settings.corners_target)
         self._strong = FollowingThreshold(settings.fast_threshold, *THRESHOLDS)
         self._weak = FollowingThreshold(WEAKEST, WEAKEST, THRESHOLDS[1])
+        self._open = self._squares.touched(np.ones((lens.height, lens.width), np.bool_) if seen is None else seen > 0)
 
     @property
     def threshold(self) -> int:
@@ -72,7 +75,7 @@ class CornerDetector:
         rows = squares.strongest(pixel, strength, squares.most)
         pixel, strength = pixel[rows], strength[rows]
         self._strong.follow(max(len(rows), 1) / self._settings.corners_target)
-        poor = squares.poor(pixel)
+        poor = squares.poor(pixel) & self._open
         faint, how_faint = self._look(image, self._weak, squares.runs(poor))
         self._weak.follow(max(len(faint), 1) / (WEAK_SHARE * self._settings.corners_target))
         rows = squares.strongest(faint, how_faint, FEW)
@@ -90,7 +93,8 @@ class CornerDetector:
             right = min(part[2] + FAST_BORDER_PX, width - margin)
             bottom = min(part[3] + FAST_BORDER_PX, height - margin)
             if left < right and top < bottom:
-                found = threshold.fast.detect(image[top:bottom, left:right])
+                seen = None if self._seen is None else self._seen[top:bottom, left:right]
+                found = threshold.fast.detect(image[top:bottom, left:right], seen)
                 keypoints += found
                 corner_of_part.append((left, top))
                 counts.append(len(found))

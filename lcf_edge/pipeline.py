@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge import own_parts
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
@@ -44,7 +45,9 @@ class Pipeline:
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
         self._lens = lens
-        self._detector = CornerDetector(config.filter, lens, config.memory.corners)
+        seen = own_parts.in_sight(config.camera, lens.width, lens.height)
+        self._detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
+        self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self.filter = LineCircleFilter(config, lens)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
@@ -177,6 +180,7 @@ class Pipeline:
             groups=np.concatenate([centres, groups.bs[:, None]], axis=1),
             edge_group=groups.assign(edges.x[:n][~rebel], edges.y[:n][~rebel]).astype(np.intp),
             focus=focus,
+            own_parts=self._own_parts,
         )
 
 

@@ -44,6 +44,11 @@ class Squares:
         there: npt.NDArray[np.bool_] = marked[row, column]
         return there
 
+    def touched(self, where: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+        """Which squares have a pixel of ``where`` (height, width); bool (rows, columns)."""
+        rows, columns = (np.arange(count) * self.side_px for count in self._shape)
+        return np.logical_or.reduceat(np.logical_or.reduceat(where, rows, axis=0), columns, axis=1)
+
     def runs(self, marked: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
         """Marked neighbours of a row as one rectangle: left, top, right, bottom, px, the last two beyond it."""
         rows, columns = self._shape

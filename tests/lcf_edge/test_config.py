@@ -230,6 +230,11 @@ def test_the_error_names_where_the_wrong_value_stands(file: Callable[[str], Path
         "camera.intrinsics=[500, 500, 320, 240, 0]",
         "camera.intrinsics=[500, -500, 320, 240]",
         "camera.distortion=[0.1]",
+        "camera.mask=[[[0, 0], [9, 9]]]",
+        "camera.mask=[[[0, 0], [9, 9], [9]]]",
+        "camera.mask=[[[0, 0], [9, 9], [5000, 0]]]",
+        f"camera.mask={[[[0, 0], [9, 0], [9, 9]]] * 65}",
+        f"camera.mask={[[[0, 0]] * 257]}",
         "imu.axes=[[1, 0, 0], [0, 1, 0]]",
         "imu.axes=[[1, 0], [0, 1], [0, 0]]",
         "imu.axes=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
@@ -371,6 +376,7 @@ CAMERAS = LENSES.flatmap(
         distortion=st.just(lens[1]),
         intrinsics=st.just([]) | numbers(4, low=1e-3),
         recording=st.text(min_size=1),
+        mask=st.lists(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(list), min_size=3, max_size=5)),
     )
 )
 AXES = st.sampled_from(([], [[0, 1, 0], [0, 0, 1], [1, 0, 0]], [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]))
