@@ -1,5 +1,6 @@
 """From a picture to corners: FAST, but for those along an edge; spread over the picture, with looks."""
 
+import math
 from collections.abc import Iterable
 from operator import attrgetter
 
@@ -19,6 +20,7 @@ FAST_BORDER_PX = 3  # FAST itself leaves out
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 THRESHOLDS = (13, 90)
 WEAKEST = 10  # threshold where there is nothing stronger
+ROWS_ABOVE = 2  # of squares: what can be met may begin so much higher than is thought
 WEAK_SHARE = 0.5  # of the wanted corners may be looked at there
 
 Grey = npt.NDArray[np.uint8]
@@ -52,12 +54,15 @@ class CornerDetector:
         """Of the next frame, grey levels."""
         return self._strong.value
 
-    def detect(self, image: Grey) -> tuple[Corners, int]:
-        """Corners of a (height, width) picture, and how many were left out because the budget was full."""
+    def detect(self, image: Grey, highest_row: float = math.nan) -> tuple[Corners, int]:
+        """Corners of a (height, width) picture, and how many were left out because the budget was full.
+
+        ``highest_row``: px, above it nothing can be met, and faint corners are not looked for; NaN: unknown.
+        """
         height, width = image.shape
         pixel, strength = self._look(image, self._strong, [(0, 0, width, height)])
         if self._settings.fast_adaptive:
-            pixel, strength = self._shared_out(image, pixel, strength)
+            pixel, strength = self._shared_out(image, pixel, strength, highest_row)
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
         keep = np.arange(len(pixel))
         if self._lens.bends:
@@ -69,13 +74,17 @@ class CornerDetector:
             pixel, position = pixel.take(keep, axis=0), position.take(keep, axis=0)
         return Corners(pixel, position, appearance(image, pixel)), evicted
 
-    def _shared_out(self, image: Grey, pixel: npt.NDArray[np.int32], strength: npt.NDArray[np.float32]) -> Found:
+    def _shared_out(
+        self, image: Grey, pixel: npt.NDArray[np.int32], strength: npt.NDArray[np.float32], highest_row: float
+    ) -> Found:
         """No square has more than its share; the poor ones are looked at again."""
         squares = self._squares
         rows = squares.strongest(pixel, strength, squares.most)
         pixel, strength = pixel[rows], strength[rows]
         self._strong.follow(max(len(rows), 1) / self._settings.corners_target)
         poor = squares.poor(pixel) & self._open
+        if highest_row > 0:  # NaN is not
+            poor[: max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0)] = False
         faint, how_faint = self._look(image, self._weak, squares.runs(poor))
         self._weak.follow(max(len(faint), 1) / (WEAK_SHARE * self._settings.corners_target))
         rows = squares.strongest(faint, how_faint, FEW)
