@@ -8,6 +8,7 @@ import numpy as np
 from benchmarks.peers import PEERS, LandmarkMap
 from benchmarks.peers.peer import Peer
 from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge import own_parts
 from lcf_edge.config import Config
 from lcf_edge.ego_motion import EgoMotionEstimator
 from lcf_edge.filter import Motion
@@ -53,6 +54,7 @@ class PeerMethod:
     def __init__(self, peer: Peer, config: Config) -> None:
         self.peer = peer
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
+        self._camera = config.camera
 
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take a sample, in stamp order."""
@@ -68,6 +70,12 @@ class PeerMethod:
         dt_s = max(ego.dt_s, LEAST_DT_S)
         motion = Motion(dt_s, ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.path_yaw_rate_radps)
         circles = self.peer.process(frame.image, motion)
+        seen = own_parts.in_sight(self._camera, frame.image.shape[1], frame.image.shape[0])
+        if seen is not None:  # nobody looks for anything in the vehicle's own parts
+            x, y = (
+                np.clip(circles[name], 0, most - 1) for name, most in zip("xy", frame.image.shape[::-1], strict=True)
+            )
+            circles = circles[seen[y.astype(np.intp), x.astype(np.intp)] > 0]
         total_us = (time.perf_counter_ns() - started) // 1000
         height, width = frame.image.shape
         landmarks = self.peer.landmarks if isinstance(self.peer, LandmarkMap) else 0

@@ -9,7 +9,7 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from hil_mocks import scenes
 from hil_mocks.drives import Drive
 from hil_mocks.truth import Truth
-from lcf_edge.config import Camera, Config, Filter, Memory, Vehicle
+from lcf_edge.config import Camera, Config, Filter, Imu, Memory, Vehicle
 from lcf_edge.lens import Lens
 from lcf_edge.recordings import open_recording
 from lcf_edge.records import Scene
@@ -38,9 +38,11 @@ def config_of(drive: Drive, settings: Filter | None = None, memory: Memory | Non
         distortion=list(drive.lens.distortion),
         height_m=drive.camera_height_m,
         pitch_rad=drive.camera_pitch_rad,
+        mask=[[list(point) for point in part] for part in drive.own_parts],
     )
     vehicle = Vehicle(half_width_m=drive.half_width_m, horizon_s=drive.horizon_s)
-    return Config(camera=camera, vehicle=vehicle, filter=settings or Filter(), memory=memory or Memory())
+    imu = Imu(time_offset_s=-drive.exposure_s / 2)  # a picture shows the middle of its exposure, its stamp the start
+    return Config(camera=camera, imu=imu, vehicle=vehicle, filter=settings or Filter(), memory=memory or Memory())
 
 
 def play_drive(drive: Drive, config: Config, names: Sequence[str]) -> Iterator[Moment]:

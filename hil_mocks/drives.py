@@ -76,6 +76,7 @@ class Paint:
     contrast: float = 1.0
     feature_m: float = 0.15  # size of its larger marks
     grey: float = 128.0  # in the mean
+    tile_m: float = 0.0  # the marks repeat at this distance; 0: they do not
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,6 +116,16 @@ class Box:
         corners: Floats = np.array([-right - ahead, right - ahead, right + ahead, ahead - right])
         corners += self.position(time_s)
         return corners
+
+
+@dataclass(frozen=True, slots=True)
+class Lamp:
+    """A bright rectangle in the ceiling."""
+
+    x_m: float
+    z_m: float
+    width_m: float
+    length_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -165,9 +176,14 @@ class Drive:
     shakes: tuple[Shake, ...] = ()
     gain: Profile = field(default=Profile(((0.0, 1.0),)))  # of the exposure
     exposure_s: float = 0.0  # motion blur over this time
+    sharpening: float = 0.0  # by the camera: this times what a smoother picture lacks is added
     camera_height_m: float = 0.5
     camera_pitch_rad: float = 0.0  # positive: looks up
     ground: Paint = Paint(0)
     sky: Paint = Paint(1)
+    lamps: tuple[Lamp, ...] = ()
+    ceiling_m: float = 3.0  # where they hang
+    gloss: float = 0.0  # share of their light that the floor mirrors
+    own_parts: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of the vehicle in the picture, px
     half_width_m: float = 0.6  # of the vehicle
     horizon_s: float = 4.0  # contact later than this is no threat yet

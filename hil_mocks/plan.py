@@ -23,6 +23,8 @@ class Plan:
     boxes: list[Box] = field(default_factory=list)
     contrast: float = 1.0
     clutter_gap_m: tuple[float, float] = (0.9, 2.6)
+    walls: bool = True  # behind the clutter
+    tile_m: float = 0.0  # of all paint
 
     @property
     def end_s(self) -> float:
@@ -35,7 +37,7 @@ class Plan:
         return int(self.random.choice((-1, 1)))
 
     def paint(self, feature_m: float) -> Paint:
-        return Paint(int(self.random.integers(2**31)), self.contrast, feature_m, self.between(80, 175))
+        return Paint(int(self.random.integers(2**31)), self.contrast, feature_m, self.between(80, 175), self.tile_m)
 
     def change(self, **values: Any) -> None:
         """Replace fields of the drive."""

@@ -5,12 +5,13 @@ face's foreshortening; the ground is drawn in bands of distance with three lines
 """
 
 import math
+from dataclasses import astuple
 
 import cv2
 import numpy as np
 
 from hil_mocks import textures
-from hil_mocks.drives import Box, Floats
+from hil_mocks.drives import Box, Floats, Paint
 from hil_mocks.projection import Stage, Surface, View
 from hil_mocks.textures import Picture
 
@@ -25,6 +26,10 @@ _SKYLINE_TEXELS = 1024
 _SKYLINE_ROWS = 480
 _ZENITH_GREY = 205
 _EXPOSURE_STEPS = 4
+_SHARPENED_PX = 1.2
+_OWN_FEATURE_PX = 25.0
+_OWN_GREY = 70.0
+_LAMP = np.full((8, 8), 250, dtype=np.uint8)
 
 
 class _Skin:
@@ -64,6 +69,11 @@ class Renderer:
         self._ground_levels: dict[int, Picture] = {}
         x, y = np.meshgrid(np.linspace(-1, 1, drive.lens.width), np.linspace(-1, 1, drive.lens.height))
         self._vignette = (1 - drive.lens.vignetting * (x**2 + y**2) / 2).astype(np.float32)
+        self._own = np.zeros((drive.lens.height, drive.lens.width), dtype=np.uint8)  # where own parts hide the world
+        for polygon in drive.own_parts:
+            cv2.fillPoly(self._own, [np.rint(polygon).astype(np.int32)], (255,))
+        look = Paint(drive.seed, feature_m=_OWN_FEATURE_PX, grey=_OWN_GREY)
+        self._own_look = textures.surface(look, 0, (drive.lens.width, drive.lens.height), 1.0, 1.0)
         self._random = np.random.default_rng([drive.seed, 3])
         shape = (drive.lens.height + 32, drive.lens.width + 32)
         grain = self._random.normal(0, drive.noise.picture, (4, *shape))
@@ -78,8 +88,12 @@ class Renderer:
             views = [self._stage.view(view.time_s + delay) for delay in later.tolist()]
             light = [exposed, *(self._optics.finish(self._canvas(each)) for each in views)]
             exposed = np.rint(np.mean(light, axis=0)).astype(np.uint8)
+        exposed = np.where(self._own > 0, self._own_look, exposed) if drive.own_parts else exposed
         gain = float(drive.gain.at(np.array([view.time_s]))[0])
         lit = cv2.multiply(exposed, self._vignette, scale=gain, dtype=cv2.CV_8U)
+        if drive.sharpening:
+            smoother = cv2.GaussianBlur(lit, (0, 0), _SHARPENED_PX)
+            lit = cv2.addWeighted(lit, 1 + drive.sharpening, smoother, -drive.sharpening, 0)
         top, left, which = self._random.integers((32, 32, len(self._grain)))
         grain = self._grain[which, top : top + lit.shape[0], left : left + lit.shape[1]]
         return np.asarray(cv2.add(lit, grain, dtype=cv2.CV_8U), dtype=np.uint8)
@@ -88,7 +102,10 @@ class Renderer:
         """The scene through the pinhole, full daylight, no noise."""
         canvas = np.empty(self._optics.size[::-1], dtype=np.uint8)
         self._draw_ground(canvas, view.attitude, view.position)
+        if self._drive.gloss:
+            self._draw_lamps(canvas, view, self._drive.ceiling_m, self._drive.gloss)
         self._draw_skyline(canvas, view.attitude)
+        self._draw_lamps(canvas, view, -self._drive.ceiling_m, 1.0)
         for placed in view.placed:
             for face, surface in placed.faces:
                 _paint(canvas, surface, self._skin(placed.box, face).fitting(surface))
@@ -124,6 +141,19 @@ class Renderer:
         for side, surface in enumerate(self._optics.surfaces(corners, across, down)):
             if surface is not None:
                 _paint(canvas, surface, self._skyline[side])
+
+    def _draw_lamps(self, canvas: Picture, view: View, y_m: float, share: float) -> None:
+        """The lamps in the ceiling; or, as far below the floor, as it mirrors a share of their light."""
+        if not self._drive.lamps:
+            return
+        x, z, width, length = np.array([astuple(lamp) for lamp in self._drive.lamps]).T
+        level, none = np.full(len(x), y_m), np.zeros(len(x))
+        corners = (np.stack([x - width / 2, level, z - length / 2], axis=1) - view.position) @ view.attitude
+        across = np.stack([width, none, none], axis=1) @ view.attitude
+        down = np.stack([none, none, length], axis=1) @ view.attitude
+        for surface in self._optics.surfaces(corners, across, down):
+            if surface is not None:
+                _paint(canvas, surface, _LAMP, share)
 
     def _draw_ground(self, canvas: Picture, attitude: Floats, position: Floats) -> None:
         """Bands of rows, each with the level of the pyramid that fits its distance."""
@@ -161,8 +191,8 @@ class Renderer:
             cv2.resize(band, (width, len(rows)), canvas[rows[0] : rows[-1] + 1], interpolation=cv2.INTER_AREA)
 
 
-def _paint(canvas: Picture, surface: Surface, texture: Picture) -> None:
-    """Blend a textured surface into the canvas, edges smoothed."""
+def _paint(canvas: Picture, surface: Surface, texture: Picture, share: float = 1.0) -> None:
+    """Blend a textured surface, or a share of its light, into the canvas, edges smoothed."""
     left, top, right, bottom = surface.bounds
     left, top = max(math.floor(left) - 1, 0), max(math.floor(top) - 1, 0)
     width = min(math.ceil(right) + 2, canvas.shape[1]) - left
@@ -182,7 +212,7 @@ def _paint(canvas: Picture, surface: Surface, texture: Picture) -> None:
     )
     mask = np.zeros((height, width), dtype=np.uint8)
     polygon = np.rint((surface.outline - (left, top)) * 2**_POLYGON_BITS).astype(np.int32)
-    cv2.fillConvexPoly(mask, polygon, (255,), cv2.LINE_AA, _POLYGON_BITS)
+    cv2.fillConvexPoly(mask, polygon, (round(255 * share),), cv2.LINE_AA, _POLYGON_BITS)
     region = canvas[top : top + height, left : left + width]
     kept = cv2.multiply(region, cv2.bitwise_not(mask), scale=1 / 255)
     cv2.add(kept, cv2.multiply(patch, mask, scale=1 / 255), region)

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 
 from drivers.records import Frame, ImuSample, SpeedSample
-from hil_mocks.drives import Box, Drive, Floats, Lens, Paint, Profile, SensorNoise, Shake, stamp_ns
+from hil_mocks.drives import Box, Drive, Floats, Lamp, Lens, Paint, Profile, SensorNoise, Shake, stamp_ns
 from hil_mocks.layouts import KINDS, make
 from hil_mocks.projection import Stage, View
 from hil_mocks.rendering import Renderer
@@ -23,6 +23,7 @@ __all__ = [
     "KINDS",
     "Box",
     "Drive",
+    "Lamp",
     "Lens",
     "ObjectTruth",
     "Paint",

@@ -44,6 +44,17 @@ def _marks(random: Random, canvas: npt.NDArray[np.float32], size_px: float, shar
             cv2.fillConvexPoly(canvas, polygon[: 4 - shape], (grey,))
 
 
+def _tiles(random: Random, shape: tuple[int, int], tile_px: float) -> npt.NDArray[np.float32]:
+    """One tile with marks and a joint around it, again and again."""
+    side = max(round(tile_px), 8)
+    tile = 10 * _clouds(random, (side, side), side / 3)
+    _marks(random, tile, side / 3, 0.6, 48)
+    joint = max(side // 12, 1)
+    tile[:joint] = tile[:, :joint] = -45
+    height, width = shape
+    return np.tile(tile, (height // side + 1, width // side + 1))[:height, :width]
+
+
 def _finish(canvas: npt.NDArray[np.float32], mean: float) -> Picture:
     return np.asarray(np.clip(canvas + mean, 4, 251), dtype=np.uint8)
 
@@ -52,6 +63,8 @@ def surface(paint: Paint, face: int, size_px: tuple[int, int], px_per_m: float, 
     """Texture of one face of a box, `size_px` = (width, height); `light` scales its mean."""
     random = np.random.default_rng([paint.seed, face])
     width, height = size_px
+    if paint.tile_m:
+        return _finish(_tiles(random, (height, width), paint.tile_m * px_per_m) * paint.contrast, paint.grey * light)
     feature_px = paint.feature_m * px_per_m
     canvas = 18 * _clouds(random, (height, width), max(feature_px * 2, 8.0))
     _marks(random, canvas, feature_px, 0.7, 48)
@@ -64,6 +77,8 @@ def surface(paint: Paint, face: int, size_px: tuple[int, int], px_per_m: float, 
 def ground(paint: Paint, size_px: int, px_per_m: float) -> Picture:
     """Square patch of road, to be continued by reflection: stains, stones, cracks."""
     random = np.random.default_rng([paint.seed, 7])
+    if paint.tile_m:
+        return _finish(_tiles(random, (size_px, size_px), paint.tile_m * px_per_m) * paint.contrast, paint.grey)
     canvas = 14 * _clouds(random, (size_px, size_px), px_per_m)
     canvas += 10 * _clouds(random, (size_px, size_px), px_per_m / 6)
     _marks(random, canvas, paint.feature_m * px_per_m, 0.08, 40)

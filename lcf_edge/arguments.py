@@ -154,7 +154,7 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         return kinds.add_parser(name, allow_abbrev=False, parents=[settings, task], help=text, description=text)
 
     calibrate = commands.add_parser(
-        "calibrate", allow_abbrev=False, help="measure lens, IMU axes, mounting, clocks for the configuration"
+        "calibrate", allow_abbrev=False, help="measure lens, IMU axes, mounting, clocks, own parts in view"
     )
     kinds = calibrate.add_subparsers(dest="what", metavar="WHAT", required=True)
     camera = add("camera", "the lens: intrinsics and distortion, from views of a board")
@@ -186,7 +186,15 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
     )
     foe = add("foe", "how the camera is mounted, yaw and pitch, from a straight drive")
     clocks = add("time", "the offset between the clocks of camera and IMU, from turning to and fro")
-    for kind, usual in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20")):
+    mask = add("mask", "own parts in view: what never moves while driving, or as outlined")
+    mask.add_argument(
+        "--polygon",
+        action="append",
+        type=_polygon,
+        metavar="X,Y,X,Y,...",
+        help="an outline, px of the picture, in place of what never moves; may be given several times",
+    )
+    for kind, usual in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
         text = f"how long to take ({usual}; of a recording: all)"
         kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
@@ -202,6 +210,16 @@ def _number(least: float, most: float) -> Callable[[str], float]:
         return number
 
     return read
+
+
+def _polygon(text: str) -> list[list[float]]:
+    try:
+        numbers = [float(number) for number in text.split(",")]
+    except ValueError:
+        numbers = []
+    if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
+        raise argparse.ArgumentTypeError(f"{text}: write three points and more as X,Y,X,Y,X,Y")
+    return [list(point) for point in zip(numbers[::2], numbers[1::2], strict=True)]
 
 
 def _positive(text: str) -> float:

@@ -149,6 +149,8 @@ def _calibrate(arguments: argparse.Namespace) -> None:
             _tell(*calibrate.foe(task))
         case "time":
             _tell(*calibrate.time(task))
+        case "mask":
+            _tell(*calibrate.mask(task, arguments.polygon))
 
 
 def _demo(arguments: argparse.Namespace) -> None:

@@ -19,6 +19,7 @@ from lcf_edge.printable import printable
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 SMALLEST_HEIGHT_M = 0.001
+MOST_POLYGONS, MOST_POINTS = 64, 256  # of a mask
 
 _SHOWN = 60  # characters of a key that is not known
 _TOLD = 300  # of anything else that somebody wrote
@@ -87,6 +88,7 @@ class Camera(Table, frozen=True):
     height_m: Annotated[float, msgspec.Meta(ge=0, le=10_000)] = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: Tilt = 0.0  # positive: looks up
     yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
+    mask: list[list[list[float]]] = []  # own parts in view: polygons of x, y in px of a picture of width x height
 
 
 class Imu(Table, frozen=True):
@@ -127,6 +129,7 @@ class Filter(Table, frozen=True):
     fast_threshold: Annotated[int, msgspec.Meta(ge=1, le=254)] = 25
     fast_adaptive: bool = True  # the threshold follows the scene so that about `corners_target` are found
     corners_target: Count = 700
+    least_roundness: Annotated[float, msgspec.Meta(ge=0, le=1)] = 0.02  # λ_min/λ_max; below: along an edge
     tr_cr: Trust = 2.0
     tr_s: Trust = 3.0
     tr_max: Trust = 5.0
@@ -170,6 +173,7 @@ class Filter(Table, frozen=True):
 PAPER = Filter(
     profile="paper",
     fast_adaptive=False,
+    least_roundness=0.0,
     delta_px=4.0,
     bl0_px=25.0,
     key_interval_s=1.0,
@@ -388,6 +392,7 @@ def _check(config: Config, origin: str) -> None:
     if 0 < camera.height_m < SMALLEST_HEIGHT_M:
         raise ConfigError(f"{origin}: camera.height_m: 0 (unknown), or {SMALLEST_HEIGHT_M} at least")
     _check_lens(camera, origin)
+    _check_mask(camera, origin)
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
         raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
@@ -410,6 +415,22 @@ def _check_lens(camera: Camera, origin: str) -> None:
     if len(camera.distortion) not in wanted:
         counts = " or ".join(map(str, wanted))
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
+
+
+def _check_mask(camera: Camera, origin: str) -> None:
+    if len(camera.mask) > MOST_POLYGONS:
+        raise ConfigError(f"{origin}: camera.mask: {len(camera.mask)} polygons, more than {MOST_POLYGONS}")
+    for number, polygon in enumerate(camera.mask, start=1):
+        if not 3 <= len(polygon) <= MOST_POINTS or any(len(point) != 2 for point in polygon):
+            raise ConfigError(
+                f"{origin}: camera.mask: polygon {number} must have 3 to {MOST_POINTS} points [x, y]; "
+                "lcf-edge calibrate mask makes them"
+            )
+        if not all(
+            -camera.width <= x <= 2 * camera.width and -camera.height <= y <= 2 * camera.height for x, y in polygon
+        ):
+            size = f"{camera.width}x{camera.height}"
+            raise ConfigError(f"{origin}: camera.mask: polygon {number} lies far outside of a picture of {size} px")
 
 
 def _numbers(value: Any) -> Iterator[float]:

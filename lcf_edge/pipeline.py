@@ -1,5 +1,6 @@
 """One frame in, one scene out: corners, ego-motion, filter; live and replay alike."""
 
+import math
 import time
 from collections import Counter, deque
 from collections.abc import Iterator
@@ -10,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.records import Frame, ImuSample, SpeedSample
+from lcf_edge import own_parts
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
@@ -18,11 +20,13 @@ from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.lens import Lens
+from lcf_edge.picture_quality import PictureQuality
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
 if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
     from lcf_edge.recordings import Recording
 
+LEAST_RANGE_M = 0.1
 LEAST_DT_S = 5e-3  # of a first frame, or of two with one stamp
 
 Records = np.ndarray[Any, np.dtype[np.void]]
@@ -45,7 +49,11 @@ class Pipeline:
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
         self._lens = lens
-        self._detector = CornerDetector(config.filter, lens, config.memory.corners)
+        seen = own_parts.in_sight(config.camera, lens.width, lens.height)
+        self._detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
+        self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
+        self._quality = PictureQuality()
+        self._speed_mps = math.nan  # of the last frame
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self.filter = LineCircleFilter(config, lens)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
@@ -82,7 +90,8 @@ class Pipeline:
     def process(self, frame: Frame) -> Scene:
         """Run the filter on one frame."""
         started = time.perf_counter_ns()
-        corners, cut = self._detector.detect(frame.image)
+        corners, cut = self._detector.detect(frame.image, self._highest_row())
+        pictured = self._quality.notes(frame.image, len(corners))
         detected = time.perf_counter_ns()
         ego = self._motion.advance(frame.stamp_ns)
         motion = Motion(
@@ -96,10 +105,10 @@ class Pipeline:
         step = self.filter.step(corners, motion)
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
-        notes = ego.notes if len(corners) else (*ego.notes, "no corners")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
         done = time.perf_counter_ns()
         self._seen = corners, step.omitted
+        self._speed_mps = ego.speed_mps
         return Scene(
             stamp_ns=frame.stamp_ns,
             seq=frame.seq,
@@ -114,8 +123,14 @@ class Pipeline:
                 filter=(filtered - before) // 1000,
                 total=(done - started) // 1000,
             ),
-            notes=notes,
+            notes=(*ego.notes, *pictured),
         )
+
+    def _highest_row(self) -> float:
+        """Row, px, above which all that could be met within the horizon is higher than the vehicle; NaN: unknown."""
+        vehicle, camera = self._config.vehicle, self._config.camera
+        farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, LEAST_RANGE_M)
+        return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
     def _circles(self) -> Records:
         """The circles from Tr_s up, rebels first."""
@@ -179,6 +194,7 @@ class Pipeline:
             groups=np.concatenate([centres, _points(groups.bs[:g])], axis=1),
             edge_group=groups.assign(edges.x[:n][~rebel], edges.y[:n][~rebel]).astype(np.intp),
             focus=focus,
+            own_parts=self._own_parts,
         )
 
 

@@ -118,3 +118,4 @@ class View:
     groups: npt.NDArray[np.float32]  # (g, 3) λ: x, y, BS
     edge_group: npt.NDArray[np.intp]  # (m,) row of `groups` that an edge belongs to, -1: none
     focus: npt.NDArray[np.float32]  # (2,) focus of expansion, O
+    own_parts: tuple[npt.NDArray[np.float32], ...] = ()  # polygons (n, 2): nothing is looked for there

@@ -9,7 +9,7 @@ from lcf_edge.errors import LcfError
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-Value = str | int | float | list[float] | list[list[float]]
+Value = str | int | float | list[float] | list[list[float]] | list[list[list[float]]]
 
 
 class CalibrationError(LcfError):

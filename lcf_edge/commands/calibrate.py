@@ -12,6 +12,7 @@ from lcf_edge.calibrate.by_camera import calibrate_by_camera
 from lcf_edge.calibrate.camera import Model, calibrate_camera
 from lcf_edge.calibrate.foe import calibrate_foe
 from lcf_edge.calibrate.guide import Guide
+from lcf_edge.calibrate.mask import Polygon, calibrate_mask, given_mask
 from lcf_edge.calibrate.motions import calibrate_motions
 from lcf_edge.calibrate.report import check_report, save_report
 from lcf_edge.calibrate.rest import calibrate_rest
@@ -25,7 +26,7 @@ SNAP_BY_HAND_DEG = 15.0  # a hand's motion is good to no more
 
 @dataclass(frozen=True)
 class Task:
-    """What the four have in common: where from, where to. ``file``: the configuration, None: the usual one."""
+    """What all have in common: where from, where to. ``file``: the configuration, None: the usual one."""
 
     config: Config
     file: Path | None
@@ -77,6 +78,13 @@ def foe(task: Task) -> list[str]:
 def time(task: Task) -> list[str]:
     """Offset between the clocks. Raises ``LcfError``."""
     return _calibrate(task, lambda source, guide: calibrate_time(source, task.config, task.seconds, guide))
+
+
+def mask(task: Task, polygons: list[Polygon] | None) -> list[str]:
+    """Own parts in view: as given, px, or what never moves. Raises ``LcfError``."""
+    if polygons:
+        return _calibrate(task, lambda source, guide: given_mask(source, task.config, polygons, guide), imu=False)
+    return _calibrate(task, lambda source, guide: calibrate_mask(source, task.config, task.seconds, guide), imu=False)
 
 
 def _calibrate(

@@ -21,6 +21,7 @@ from drivers.errors import (
     WrongDeviceError,
 )
 from drivers.records import Frame
+from lcf_edge import own_parts
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
 from lcf_edge.daemon.degrade import DARK
@@ -159,7 +160,8 @@ def _rate(context: Context, measured: Measured[Frame], exposure_s: float | None)
 
 def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Config) -> Finding:
     height, width = image.shape
-    detector = CornerDetector(config.filter, Lens.from_config(config.camera, width, height), config.memory.corners)
+    lens, seen = Lens.from_config(config.camera, width, height), own_parts.in_sight(config.camera, width, height)
+    detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
     corners, _ = detector.detect(image)
     grey, count = float(image.mean()), len(corners.pixel)
     told = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"

@@ -3,7 +3,8 @@
 Left, the Line expert: corners (yellow dots), those omitted by ψ (red dots), estimated normal edges (blue
 squares), λ groups (green lines from each edge to the group's centre), ψ (yellow circles and rectangles).
 Right, the Circle expert: C_n (green circles), C_r (red circles, cause and time to contact beside them), rebel
-edges (red squares), the focus of expansion (white cross). The caption names each in its colour.
+edges (red squares), the focus of expansion (white cross). Own parts that the configuration masks are hatched in both.
+The caption names each in its colour.
 """
 
 from pathlib import Path
@@ -30,6 +31,7 @@ RED: Colour = (50, 50, 255)
 LIGHT_RED: Colour = (150, 150, 255)  # text
 BLUE: Colour = (255, 140, 30)
 GREEN: Colour = (70, 215, 70)
+GREY: Colour = (150, 150, 150)
 WHITE: Colour = (255, 255, 255)
 BLACK: Colour = (0, 0, 0)
 
@@ -41,6 +43,7 @@ _SQUARE = np.array([(-3, -3), (3, -3), (3, 3), (-3, 3)], np.float32)
 _CROSS = np.array([[(-9, 0), (9, 0)], [(0, -9), (0, 9)]], np.float32)
 _HALO = np.ones((3, 3), np.uint8)
 _STRIP_PX = 20
+_HATCH_PX = 8
 _HALO_PX = 2
 
 
@@ -52,6 +55,7 @@ def draw(image: npt.NDArray[np.uint8], outcome: "Outcome") -> Picture:
     left, right = panels[:, :width], panels[:, width:]
     for panel, paint in ((left, _line_expert), (right, _circle_expert)):
         own = np.ascontiguousarray(panel)  # nothing drawn in one panel spills over into the other
+        _hatch(own, outcome.view.own_parts)
         paint(own, outcome.scene, outcome.view)
         panel[...] = own
     return panels
@@ -108,6 +112,20 @@ def _circle_expert(panel: Picture, scene: Scene, view: View) -> None:
             (", ".join(scene.notes), YELLOW),
         ),
     )
+
+
+def _hatch(panel: Picture, parts: tuple[npt.NDArray[np.float32], ...]) -> None:
+    """Own parts: hatched, with an outline."""
+    if not parts:
+        return
+    rows, columns = panel.shape[:2]
+    inside = np.zeros((rows, columns), np.uint8)
+    for part in parts:
+        cv2.fillPoly(inside, list(_fixed_point(part[None])), (255,), cv2.LINE_8, _FRACTION_BITS)
+    stripes = (np.arange(columns) + np.arange(rows)[:, None]) % _HATCH_PX == 0
+    panel[(inside > 0) & stripes] = GREY
+    for part in parts:
+        _outlines(panel, part[None], GREY)
 
 
 def _label(circle: np.void) -> str:

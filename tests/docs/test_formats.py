@@ -57,11 +57,11 @@ def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
 
 def test_notes_of_a_result_line(rows: Rows) -> None:
     sources = "".join(
-        (ROOT / "lcf_edge" / name).read_text(encoding="utf-8") for name in ("ego_motion.py", "pipeline.py")
+        (ROOT / "lcf_edge" / name).read_text(encoding="utf-8") for name in ("ego_motion.py", "picture_quality.py")
     )
-    noted = set(re.findall(r'notes\.append\("([^"]+)"\)|\*ego\.notes, "([^"]+)"', sources))
+    noted = set(re.findall(r'notes\.append\("([^"]+)"\)', sources))
     table = rows("docs/replay.md", "### Notes")
-    assert {row[0].strip("`") for row in table} == {first or second for first, second in noted}
+    assert {row[0].strip("`") for row in table} == noted
 
 
 def test_options_of_replay(rows: Rows, capsys: pytest.CaptureFixture[str]) -> None:

@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hil_mocks import scenes
 from hil_mocks.drives import START_NS
 from hil_mocks.projection import Stage
-from hil_mocks.scenes import Box, Drive, Lens, Paint, Profile, SensorNoise, Shake
+from hil_mocks.scenes import Box, Drive, Lamp, Lens, Paint, Profile, SensorNoise, Shake
 from hil_mocks.truth import passages, truth
 
 SILENT = SensorNoise(gyro_radps=0, accel_mps2=0, speed_mps=0, yaw_rate_radps=0, picture=0)
@@ -317,6 +317,52 @@ def test_motion_blur_takes_away_detail():
         return cv2.Laplacian(next(iter(scenes.frames(spec)))[0].image, cv2.CV_64F).std()
 
     assert detail(0.03) < 0.8 * detail(0.0)
+
+
+def first_picture(spec):
+    return next(iter(scenes.frames(spec)))[0].image
+
+
+def test_own_parts_stay_in_their_place_and_hide_the_world():
+    part = ((100.0, 300.0), (400.0, 300.0), (400.0, 479.0), (100.0, 479.0))
+    spec = drive(standing(0.0, 3.0), own_parts=(part,), shakes=SHAKES)
+    pictures = [frame.image for frame, _ in islice(scenes.frames(spec), 3)]
+    inside = np.s_[301:479, 101:400]
+    assert np.array_equal(pictures[0][inside], pictures[2][inside])
+    assert not np.array_equal(pictures[0][:300], pictures[2][:300])
+    bare = first_picture(replace(spec, own_parts=()))
+    assert np.array_equal(pictures[0][:299], bare[:299])
+    assert cv2.absdiff(pictures[0][inside], bare[inside]).mean() > 10
+
+
+def test_the_floor_mirrors_lamps_where_their_images_are():
+    lamp = Lamp(0.5, 10.0, 0.6, 0.8)
+    spec = drive(lamps=(lamp,), ceiling_m=2.5, gloss=0.5)
+    lit, dark = (first_picture(each).astype(int) for each in (spec, replace(spec, lamps=())))
+    rows, columns = np.nonzero(np.abs(lit - dark) > 25)
+    below = rows > 240
+    for y_m, seen in ((-2.5, ~below), (2.5, below)):
+        corners = np.array([(x, y_m + spec.camera_height_m, z) for x in (0.2, 0.8) for z in (9.6, 10.4)])
+        expected = (corners @ spec.lens.matrix.T)[:, :2] / corners[:, 2:]
+        found = np.array([columns[seen], rows[seen]])
+        np.testing.assert_allclose(found.min(axis=1), expected.min(axis=0), atol=1.5)
+        np.testing.assert_allclose(found.max(axis=1), expected.max(axis=0), atol=1.5)
+
+
+def test_tiles_repeat():
+    box = replace(standing(0.0, 3.0, width=3.0, height=3.0), paint=Paint(5, tile_m=0.5))
+    face = first_picture(drive(box))[100:300, 200:440].astype(float)
+    period = round(0.5 * 500 / 2.75)  # px: the tile at the distance of the face
+    across = [np.corrcoef(face[:, :-shift].ravel(), face[:, shift:].ravel())[0, 1] for shift in range(1, 2 * period)]
+    assert np.argmax(across[period // 2 :]) + period // 2 + 1 == pytest.approx(period, abs=1)
+    assert max(across[period // 2 :]) > 0.9
+
+
+def test_sharpening_raises_what_differs_from_around():
+    def contrast(sharpening):
+        return cv2.Laplacian(first_picture(drive(standing(0.0, 4.0), sharpening=sharpening)), cv2.CV_64F).std()
+
+    assert contrast(1.0) > 1.5 * contrast(0.0)
 
 
 def corner_counts(kind):

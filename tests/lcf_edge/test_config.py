@@ -279,6 +279,11 @@ def test_the_error_names_where_the_wrong_value_stands(file: Callable[[str], Path
         "camera.intrinsics=[500, 500, 320, 240, 0]",
         "camera.intrinsics=[500, -500, 320, 240]",
         "camera.distortion=[0.1]",
+        "camera.mask=[[[0, 0], [9, 9]]]",
+        "camera.mask=[[[0, 0], [9, 9], [9]]]",
+        "camera.mask=[[[0, 0], [9, 9], [5000, 0]]]",
+        f"camera.mask={[[[0, 0], [9, 0], [9, 9]]] * 65}",
+        f"camera.mask={[[[0, 0]] * 257]}",
         "imu.axes=[[1, 0, 0], [0, 1, 0]]",
         "imu.axes=[[1, 0], [0, 1], [0, 0]]",
         "imu.axes=[[1, 0, 0], [0, 1, 0], [0, 0, -1]]",
@@ -422,6 +427,7 @@ CAMERAS = LENSES.flatmap(
         recording=st.text(min_size=1),
         height=st.integers(1, 2048),
         height_m=st.just(0.0) | st.floats(0.001, 10_000),
+        mask=st.lists(st.lists(st.tuples(st.floats(-1, 1), st.floats(-1, 1)).map(list), min_size=3, max_size=5)),
     )
 )
 AXES = st.sampled_from(([], [[0, 1, 0], [0, 0, 1], [1, 0, 0]], [[0.6, 0.8, 0], [-0.8, 0.6, 0], [0, 0, 1]]))

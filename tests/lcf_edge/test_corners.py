@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from typing import Any
 
 import cv2
 import numpy as np
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 
 from lcf_edge.appearance import BORDER_PX, RING_PX
 from lcf_edge.config import Filter
-from lcf_edge.corners import SPREAD_PX, THRESHOLDS, CornerDetector, strongest_spread
+from lcf_edge.corners import SPREAD_PX, THRESHOLDS, CornerDetector
 from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 
@@ -125,35 +126,61 @@ def test_20_000_corners_are_cut_to_the_budget_and_still_cover_the_picture(noise:
     assert max(shares.values()) - min(shares.values()) <= 1
 
 
-def test_the_strongest_are_kept() -> None:
-    pixel = np.array([(5, 5), (6, 9), (9, 6), (100, 100)], np.int32)
-    strength = np.array([3, 9, 5, 1], np.float32)
-    kept = [strongest_spread(pixel, strength, capacity).tolist() for capacity in (1, 2, 3, 4)]
-    assert kept == [[1], [1, 3], [1, 2, 3], [0, 1, 2, 3]]
+def settled(image: Grey, settings: Filter) -> tuple[int, Corners]:
+    """Threshold and corners of a scene that has stood still for a while."""
+    adaptive = detector(image, settings)
+    for _ in range(20):
+        corners, _ = adaptive.detect(image)
+    return adaptive.threshold, corners
 
 
-@given(
-    places=st.sets(st.tuples(st.integers(0, 200), st.integers(0, 200)), min_size=1, max_size=60),
-    capacity=st.integers(1, 60),
-    seed=st.integers(0, 99),
-)
-def test_every_square_keeps_its_strongest_and_none_keeps_more_than_its_share(
-    places: set[tuple[int, int]], capacity: int, seed: int
-) -> None:
-    pixel = np.array(sorted(places), np.int32)
-    strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
-    kept = strongest_spread(pixel, strength, capacity)
-    assert len(kept) == min(capacity, len(pixel))
-    assert (np.diff(kept) > 0).all()
-    held = np.isin(np.arange(len(pixel)), kept)
-    square = squares(pixel)
-    had, keeps = Counter(square), Counter(square[row] for row in kept)
-    most = max(keeps.values())
-    for name in had:
-        rows = np.array([each == name for each in square])
-        assert keeps[name] >= min(had[name], most - 1)
-        weakest_held = strength[rows & held].min(initial=np.inf)
-        assert weakest_held > strength[rows & ~held].max(initial=-1)
+def within(pixel: npt.NDArray[np.number[Any]], left: int, top: int, right: int, bottom: int) -> int:
+    x, y = pixel.T
+    return int(np.count_nonzero((x >= left) & (x < right) & (y >= top) & (y < bottom)))
+
+
+def test_no_square_takes_more_than_four_times_the_mean() -> None:
+    image = np.full((480, 640), 128, np.uint8)
+    image[:, 320:] = clutter(5)[:, 320:]  # half of the picture is as rich as can be
+    _, corners = settled(image, Filter(corners_target=384))
+    in_square = Counter(map(tuple, (corners.pixel // 40).tolist()))  # 192 of them, 2 corners in the mean
+    assert max(in_square.values()) == 8
+
+
+def dark_body() -> Grey:
+    """A body of 240 by 120 px with an eighth of the contrast of the skyline behind it."""
+    image = clutter(8)
+    image[280:400, 200:440] = image[280:400, 200:440] // 8 + 20
+    return image
+
+
+def test_a_dark_body_before_a_bright_skyline_has_corners_of_its_own() -> None:
+    image = dark_body()
+    threshold, corners = settled(image, Filter())
+    everywhere = cv2.FastFeatureDetector.create(threshold).detect(image)
+    inside = 210, 290, 430, 390
+    assert within(np.array([each.pt for each in everywhere]), *inside) == 0
+    assert within(corners.pixel, *inside) >= 15
+
+
+def test_no_corner_is_found_twice() -> None:
+    _, corners = settled(dark_body(), Filter())
+    assert len({*map(tuple, corners.pixel.tolist())}) == len(corners)
+
+
+@pytest.mark.parametrize("lean_px", [110, 130, 150, 170, 190])
+def test_steps_of_a_slanting_line_are_no_corners(lean_px: int) -> None:
+    """A painted line, as cameras sharpen it and JPEG leaves it."""
+    image = np.full((240, 320), 90, np.uint8)
+    outline = np.array([(40, 235), (52, 235), (46 + lean_px, 5), (40 + lean_px, 5)])
+    cv2.fillPoly(image, [outline], (220,), cv2.LINE_AA)
+    sharp = cv2.addWeighted(image, 2.0, cv2.GaussianBlur(image, (0, 0), 1.2), -1.0, 0)
+    image = np.asarray(cv2.imdecode(cv2.imencode(".jpg", sharp, [cv2.IMWRITE_JPEG_QUALITY, 70])[1], 0), np.uint8)
+    every, _ = detector(image, Filter(fast_adaptive=False, least_roundness=0)).detect(image)
+    corners, _ = detector(image).detect(image)
+    middle = 0, 30, 320, 210  # without the ends of the line
+    assert within(every.pixel, *middle) > 40
+    assert within(corners.pixel, *middle) <= 3
 
 
 # The threshold

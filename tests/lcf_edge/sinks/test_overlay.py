@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from lcf_edge.errors import UsageError
 from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene, Shape, View
 from lcf_edge.sinks import SinkError
-from lcf_edge.sinks.overlay import BLUE, GREEN, RED, WHITE, YELLOW, Colour, Picture, VideoSink, draw
+from lcf_edge.sinks.overlay import BLUE, GREEN, GREY, RED, WHITE, YELLOW, Colour, Picture, VideoSink, draw
 
 WIDTH, HEIGHT = 320, 240
 NO_POINTS = np.zeros((0, 2), np.float32)
@@ -129,6 +129,15 @@ SHOWN: dict[str, tuple[Callable[[], Picture], int, int, Colour]] = {
     "rebel edge": (lambda: picture(rebels=points((50, 60))), RIGHT_OFFSET + 47, 60, RED),
     "focus": (lambda: picture(focus=points((160, 120))[0]), RIGHT_OFFSET + 160, 120, WHITE),
 }
+
+
+@pytest.mark.parametrize("offset", [LEFT_OFFSET, RIGHT_OFFSET])
+def test_own_parts_are_hatched_in_both_panels(offset: int) -> None:
+    panels = picture(own_parts=(points((30, 30), (100, 30), (100, 100), (30, 100)),))
+    for x, y in ((56, 56), (60, 92), (30, 70)):  # on stripes and on the outline
+        assert has(panels, offset + x, y, GREY)
+    assert not has(panels, offset + 120, 72, GREY)
+    assert (panels[40:90, offset + 40 : offset + 90].max(axis=2) < 100).mean() > 0.5  # what is under it can be seen
 
 
 @pytest.mark.parametrize("thing", SHOWN)

@@ -1,0 +1,182 @@
+"""The vehicle's own parts in view: what never moves in the picture while the vehicle drives and turns.
+
+Of every pixel the grey gradient is averaged over the drive. Where something stands still in the picture the mean is as
+long as the root mean square of the gradients; where the world passes they come and go, and point anywhere. A plain
+surface has no gradients: it is an own part when it reaches the border of the picture and its rim stands still.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from drivers.records import Frame
+from lcf_edge.calibrate import report
+from lcf_edge.calibrate.guide import Guide
+from lcf_edge.calibrate.result import CalibrationError, Result
+from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.config import MOST_POINTS, MOST_POLYGONS, Config
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Grey = npt.NDArray[np.uint8]
+Marked = npt.NDArray[np.bool_]
+Polygon = list[list[float]]
+
+LIVE_S = 30.0
+
+_APART_S = 0.2  # pictures that are closer tell the same again
+_LEAST_PICTURES = 20
+_SMOOTH_PX = 1.0
+_STILL = 0.8  # mean gradient to the root mean square
+_TEXTURED = 6.0  # root mean square of the gradients; by Sobel's weights, 8 are one grey level a px
+_PASSES = 0.5  # of the textured pixels must move, else it stood
+_WALLED = 0.7  # of a plain surface's rim must stand still
+_CLOSED_SHARE = 0.02  # of the picture's width: gaps that are closed
+_LEAST_SHARE = 0.001  # of the picture
+_MOST_SHARE = 0.6
+_SMOOTHED_PX = 2.0  # by which a polygon may miss the outline
+_GROWN_PX = 2
+
+
+class Stillness:
+    """How much of every pixel's gradient stays over the pictures of a drive."""
+
+    def __init__(self, height: int, width: int) -> None:
+        self.pictures = 0
+        self._sum = np.zeros((2, height, width), np.float32)
+        self._squares = np.zeros((height, width), np.float32)
+
+    def add(self, image: Grey) -> None:
+        """Take the next picture."""
+        smooth = cv2.GaussianBlur(image, (0, 0), _SMOOTH_PX)
+        gx, gy = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
+        self._sum[0] += gx
+        self._sum[1] += gy
+        self._squares += gx * gx + gy * gy
+        self.pictures += 1
+
+    def textured(self) -> Marked:
+        """Where there is something to see, still or not."""
+        return np.asarray(self._squares >= _TEXTURED**2 * self.pictures)
+
+    def still(self) -> Marked:
+        """Where it never moves."""
+        along, down = self._sum
+        return np.asarray(along**2 + down**2 > _STILL**2 * self.pictures * self._squares) & self.textured()
+
+
+def calibrate_mask(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+    """``camera.mask`` by what never moves. Raises ``CalibrationError``."""
+    if source.live:
+        seconds = seconds or LIVE_S
+        guide.say(f"Drive around for {seconds:g} s, past things, with turns to both sides.")
+    stillness: Stillness | None = None
+    image, last_ns = np.zeros((1, 1), np.uint8), 0
+    for item in for_a_while(source.items(), seconds, Frame):
+        if not isinstance(item, Frame) or (stillness and item.stamp_ns - last_ns < _APART_S * 1e9):
+            continue
+        stillness = stillness or Stillness(*item.image.shape)
+        image, last_ns = item.image, item.stamp_ns
+        stillness.add(image)
+        guide.progress(f"{stillness.pictures} pictures")
+    guide.end()
+    if stillness is None:
+        raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
+    own = own_parts(stillness)
+    polygons = outlines(own)
+    if not polygons:
+        raise CalibrationError(
+            f"camera: nothing stands still in {stillness.pictures} pictures; outline what is in view with --polygon"
+        )
+    words = f"{stillness.pictures} pictures; {len(polygons)} own parts, {own.mean():.1%} of the picture"
+    return _result(polygons, image, config, (words,))
+
+
+def given_mask(source: Source, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
+    """``camera.mask`` as given, px of the source's pictures. Raises ``CalibrationError``."""
+    image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
+    guide.end()
+    if image is None:
+        raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
+    return _result(polygons, image, config, (f"{len(polygons)} own parts, as given",))
+
+
+def own_parts(stillness: Stillness) -> Marked:
+    """What stands still, and the plain surfaces that it encloses. Raises ``CalibrationError``."""
+    if stillness.pictures < _LEAST_PICTURES:
+        raise CalibrationError(
+            f"camera: {stillness.pictures} pictures {_APART_S:g} s apart, {_LEAST_PICTURES} are needed; drive longer"
+        )
+    textured, still = stillness.textured(), stillness.still()
+    moves = 1 - still.sum() / max(textured.sum(), 1)
+    if moves < _PASSES:
+        raise CalibrationError(
+            f"camera: only {moves:.0%} of what can be seen moved; drive past things, and turn to both sides"
+        )
+    own = _solid(still | _enclosed(still, ~textured))
+    if own.mean() > _MOST_SHARE:
+        raise CalibrationError(
+            f"camera: {own.mean():.0%} of the picture never moved; drive past things, and turn to both sides"
+        )
+    return own
+
+
+def _enclosed(still: Marked, plain: Marked) -> Marked:
+    """Plain surfaces at the border of the picture whose rim stands still."""
+    count, label = cv2.connectedComponents(plain.astype(np.uint8), connectivity=4)
+    rim = np.zeros(still.shape, np.bool_)
+    around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+    rim = ~plain & (around > 0)
+    walled = np.bincount(around[rim & still], minlength=count) / np.maximum(
+        np.bincount(around[rim], minlength=count), 1
+    )
+    at_border = np.unique(np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]]))
+    enclosed = np.intersect1d(np.flatnonzero(walled >= _WALLED), at_border[at_border > 0])
+    return np.isin(label, enclosed)
+
+
+def _solid(marked: Marked) -> Marked:
+    """Without gaps and specks; what does not reach the border of the picture is no part of the vehicle."""
+    height, width = marked.shape
+    reach = 2 * round(_CLOSED_SHARE * width / 2) + 1
+    round_brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
+    framed = cv2.copyMakeBorder(marked.astype(np.uint8), *(reach,) * 4, cv2.BORDER_REPLICATE)
+    closed = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, round_brush)
+    small = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach // 2 | 1,) * 2)
+    opened = cv2.morphologyEx(closed, cv2.MORPH_OPEN, small)[reach:-reach, reach:-reach]
+    count, label, stats, _ = cv2.connectedComponentsWithStats(opened)
+    at_border = np.unique(np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]]))
+    large = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] >= _LEAST_SHARE * width * height)
+    return np.isin(label, np.intersect1d(large, at_border[at_border > 0])) if count > 1 else np.zeros_like(marked)
+
+
+def outlines(own: Marked) -> list[Polygon]:
+    """Polygons around each part, the largest first, whole px."""
+    grown = cv2.dilate(own.astype(np.uint8), np.ones((2 * _GROWN_PX + 1,) * 2, np.uint8))
+    found, _ = cv2.findContours(grown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+    simple = [cv2.approxPolyDP(each, _SMOOTHED_PX, True)[:, 0] for each in sorted(found, key=cv2.contourArea)[::-1]]
+    return [each.astype(float).tolist() for each in simple if 3 <= len(each) <= MOST_POINTS][:MOST_POLYGONS]
+
+
+def _result(polygons: Sequence[Polygon], image: Grey, config: Config, findings: tuple[str, ...]) -> Result:
+    height, width = image.shape
+    scale = np.array((config.camera.width / width, config.camera.height / height))
+    mask = [np.rint((np.array(each) + 0.5) * scale - 0.5).astype(int).tolist() for each in polygons]
+    words = f"px of a picture of {config.camera.width}x{config.camera.height} (camera.width, camera.height)"
+    return Result((*findings, words), "camera", {"mask": mask}, _painter(polygons, image))
+
+
+def _painter(polygons: Sequence[Polygon], image: Grey) -> "Callable[[Figure], None]":
+    def paint(figure: "Figure") -> None:
+        axes = figure.subplots()
+        axes.imshow(image, cmap="gray", vmin=0, vmax=255)
+        for polygon in polygons:
+            axes.fill(*zip(*polygon, strict=True), facecolor=report.RED, alpha=0.35, edgecolor=report.RED, hatch="//")
+        axes.set(xlim=(-0.5, image.shape[1] - 0.5), ylim=(image.shape[0] - 0.5, -0.5))
+        axes.set_title("own parts: nothing is looked for there", loc="left")
+
+    return paint

@@ -1,0 +1,30 @@
+"""Where the vehicle's own parts hide the world: `camera.mask`, polygons in px of the configured picture size."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.config import Camera
+
+MARGIN_PX = 4  # FAST looks 3 px around, and an edge is a pixel wide
+
+Polygon = npt.NDArray[np.float32]
+"""(n, 2) px."""
+
+
+def polygons(camera: Camera, width: int, height: int) -> tuple[Polygon, ...]:
+    """The polygons of ``camera.mask`` in a picture of ``width`` × ``height`` px; pixel centres at whole numbers."""
+    scale = np.array((width / camera.width, height / camera.height))
+    return tuple(((np.array(each) + 0.5) * scale - 0.5).astype(np.float32) for each in camera.mask)
+
+
+def in_sight(camera: Camera, width: int, height: int) -> npt.NDArray[np.uint8] | None:
+    """Where the world is seen, 255, and where own parts are or are near, 0; (height, width). None: no own parts."""
+    if not camera.mask:
+        return None
+    seen = np.full((height, width), 255, np.uint8)
+    outlines = [np.rint(each).astype(np.int32) for each in polygons(camera, width, height)]
+    for outline in outlines:
+        cv2.fillPoly(seen, [outline], (0,))  # one by one: where two overlap is hidden too
+    cv2.polylines(seen, outlines, True, (0,), 2 * MARGIN_PX + 1)
+    return seen

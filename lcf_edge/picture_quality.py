@@ -1,0 +1,58 @@
+"""What is wrong with a picture, in a word: few corners, dark, glare, blurred."""
+
+import numpy as np
+import numpy.typing as npt
+
+FEW_CORNERS = 40
+DARK = 25  # mean grey level
+BURNT_OUT = 250  # grey level of a pixel
+GLARE_SHARE = 0.2  # of the picture is burnt out
+BLURRED = 0.65  # of the usual sharpness
+MEMORY = 0.05  # share by which each picture changes what is usual
+GREY_STEP_PX, LINE_STEP_PX = 8, 32  # of the samples
+
+Grey = npt.NDArray[np.uint8]
+
+
+class PictureQuality:
+    """Follows the pictures of one camera: what is sharp for one lens is soft for another."""
+
+    def __init__(self) -> None:
+        self._usual: float | None = None  # sharpness
+
+    def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
+        """What degrades this (height, width) picture, in which so many corners were found; most often nothing."""
+        grey = image[::GREY_STEP_PX, ::GREY_STEP_PX]
+        notes: list[str] = []
+        if not corners:
+            notes.append("no corners")
+        elif corners < FEW_CORNERS:
+            notes.append("few corners")
+        if grey.mean() < DARK:
+            notes.append("dark")
+        if (grey >= BURNT_OUT).mean() > GLARE_SHARE:
+            notes.append("glare")
+        sharp = sharpness(image)
+        usual = sharp if self._usual is None else self._usual
+        if sharp < BLURRED * usual:
+            notes.append("blurred")
+        self._usual = usual + MEMORY * (sharp - usual)
+        return tuple(notes)
+
+
+def sharpness(image: Grey) -> float:
+    """How much of what differs over 4 px differs over 1 px already, squared: 1/4 of steps, 1/16 of long ramps.
+
+    The lesser of rows and columns, as motion blurs one direction alone.
+    """
+    rows = image[LINE_STEP_PX // 2 :: LINE_STEP_PX].astype(np.float32)
+    columns = image[:, LINE_STEP_PX // 2 :: LINE_STEP_PX].T.astype(np.float32)
+    return min(_fine_share(rows), _fine_share(columns))
+
+
+def _fine_share(lines: npt.NDArray[np.float32]) -> float:
+    """``lines``: float32 (n, length), each along a row or a column of the picture."""
+    if lines.shape[0] == 0 or lines.shape[1] <= 4:
+        return 1.0
+    near, far = lines[:, 1:] - lines[:, :-1], lines[:, 4:] - lines[:, :-4]
+    return float((near * near).mean() / max((far * far).mean(), 1.0))

@@ -1,0 +1,56 @@
+"""Corners and places along an edge are told apart by the structure tensor around them."""
+
+from collections.abc import Callable
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcf_edge.along_edge import BORDER_PX, REACH_PX, roundness
+
+Grey = npt.NDArray[np.uint8]
+MIDDLE = np.array([[20, 20]], np.int32)
+
+
+def half_plane(degrees: float) -> Grey:
+    """Dark and bright on the two sides of a smooth edge through the middle."""
+    y, x = np.mgrid[:41, :41] - 20.0
+    across = x * np.cos(np.radians(degrees)) + y * np.sin(np.radians(degrees))
+    return np.asarray(128 + 80 * np.tanh(across / 1.5), np.uint8)
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_it_is_the_ratio_of_opencvs_eigenvalues(noise: Callable[..., Grey], seed: int) -> None:
+    image = noise(seed, 40, 30)
+    y, x = np.mgrid[BORDER_PX : 30 - BORDER_PX, BORDER_PX : 40 - BORDER_PX]
+    both = cv2.cornerEigenValsAndVecs(image, 2 * REACH_PX + 1, 3)[y, x, :2]
+    expected = both.min(axis=2) / both.max(axis=2)
+    found = roundness(image, np.stack([x.ravel(), y.ravel()], axis=1).astype(np.int32))
+    np.testing.assert_allclose(found, expected.ravel(), atol=2e-4)
+
+
+@pytest.mark.parametrize("degrees", range(0, 180, 15))
+def test_along_an_edge_there_is_next_to_none(degrees: int) -> None:
+    assert roundness(half_plane(degrees), MIDDLE)[0] < 0.01
+
+
+@pytest.mark.parametrize("degrees", range(0, 180, 15))
+def test_where_two_edges_meet_there_is_much(degrees: int) -> None:
+    corner = np.minimum(half_plane(degrees), half_plane(degrees + 90))
+    assert roundness(corner, MIDDLE)[0] > 0.2
+
+
+def test_light_and_contrast_make_no_difference(noise: Callable[..., Grey]) -> None:
+    image = noise(3, 41, 41) // 4
+    np.testing.assert_allclose(roundness(image, MIDDLE), roundness(2 * image + 50, MIDDLE), rtol=1e-5)
+
+
+def test_a_plain_picture_has_none() -> None:
+    assert roundness(np.full((41, 41), 77, np.uint8), MIDDLE)[0] == 0
+
+
+def test_without_a_corner_there_is_nothing() -> None:
+    assert roundness(np.zeros((41, 41), np.uint8), np.zeros((0, 2), np.int32)).shape == (0,)
