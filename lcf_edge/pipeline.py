@@ -16,6 +16,7 @@ from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
+from lcf_edge.gyro_bias import GyroBias
 from lcf_edge.lens import Lens
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
@@ -71,6 +72,11 @@ class Pipeline:
         """IMU and speed samples that were not used, by reason."""
         return self._motion.refused
 
+    @property
+    def gyro_bias(self) -> GyroBias:
+        """The gyro's bias, as far as it is known."""
+        return self._motion.bias
+
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take an inertial sample or a speed, each kind in stamp order."""
         if isinstance(sample, ImuSample):
@@ -93,6 +99,8 @@ class Pipeline:
         )
         before = time.perf_counter_ns()
         step = self.filter.step(corners, motion)
+        if step.residual is not None:
+            self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad)
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
         notes = ego.notes if len(corners) else (*ego.notes, "no corners")

@@ -1,6 +1,7 @@
 """Step 0: the camera's rotation is taken out of all that is stored; what the gyro missed, the flow tells."""
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -10,7 +11,21 @@ from lcf_edge.filter.tables import CircleTable, EdgeTable, Floats, PsiTable
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
 LEAST_EDGES = 25  # that a correction of the rotation needs
 MOST_EDGES = 200  # and that are enough
-_ROUNDS = 2
+_ROUNDS = 3
+_WEAK_RAD = 1.0  # prior for what the flow alone tells
+_SCATTER = 0.17  # mean of q/(1 + q) over edges, q = (distance/2σ)², when they lie as corners should
+_LEAST_SIGMA_PX = 0.15  # errors that corners of one frame share
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """The rotation that the flow alone shows to be missing, without the gyro's prior.
+
+    ``turn_rad``: rotation vector (3,) of directions, as in ``Motion.rotation``; ``sigma_rad``: (3,), 1 sigma.
+    """
+
+    turn_rad: Matrix
+    sigma_rad: Matrix
 
 
 def derotate(
@@ -42,12 +57,13 @@ def derotate(
 
 def missing_rotation(
     pinhole: Pinhole, x: Floats, y: Floats, off_px: Floats, cos: Floats, sin: Floats, prior_sigma_rad: float
-) -> tuple[Matrix, float]:
+) -> tuple[Matrix, float, Residual]:
     """The small rotation that puts edges back on their flow lines; and what stays uncertain of it, rad.
 
     ``x``, ``y``: corners, float32 (n,) px. ``off_px``: their distances from the flow lines (``line_distance``), which
     do not depend on depth. ``cos``, ``sin``: of β. Least squares, robust against what moves, with the
-    gyro's uncertainty as prior. Answers a first-order rotation (3, 3), as in ``Motion.rotation``.
+    gyro's uncertainty as prior. Return a first-order rotation (3, 3), as in ``Motion.rotation``, its sigma, and what
+    the flow tells by itself; that is the less certain the more the edges scatter.
     """
     focal = np.float32(pinhole.focal)
     u = (x - np.float32(pinhole.cx)) * np.float32(1 / pinhole.fx)
@@ -60,15 +76,21 @@ def missing_rotation(
     across[2] = sin * v + cos * u
     across *= focal
     prior = np.eye(3) * (CORNER_SIGMA_PX / prior_sigma_rad) ** 2
-    turn = np.zeros(3)
-    information = prior
+    turn: Matrix = np.zeros(3)
+    pull = turn
+    information, outlying = prior, np.ones(len(x), np.float32)
     for _ in range(_ROUNDS):
         rest = off_px - turn.astype(np.float32) @ across
         rest *= np.float32(0.5 / CORNER_SIGMA_PX)
         outlying = 1 + rest * rest
         weighted = across / (outlying * outlying)
         information = (weighted @ across.T).astype(np.float64) + prior
-        turn = np.linalg.solve(information, (weighted @ off_px).astype(np.float64))
+        pull = (weighted @ off_px).astype(np.float64)
+        turn = np.linalg.solve(information, pull).astype(np.float64)
     a, b, c = turn
     sigma = CORNER_SIGMA_PX * math.sqrt(np.diag(np.linalg.inv(information))[:2].max())  # of pitch and yaw
-    return np.array([[1, -c, b], [c, 1, -a], [-b, a, 1]]), sigma
+    alone = np.linalg.inv(information - prior + np.eye(3) * (CORNER_SIGMA_PX / _WEAK_RAD) ** 2)
+    scatter = max(1.0, float(1 - np.mean(1 / outlying)) / _SCATTER) ** 2
+    alone_sigma = scatter * np.hypot(CORNER_SIGMA_PX * np.sqrt(np.diag(alone)), _LEAST_SIGMA_PX / pinhole.focal)
+    residual = Residual(alone @ pull, alone_sigma)
+    return np.array([[1, -c, b], [c, 1, -a], [-b, a, 1]]), sigma, residual

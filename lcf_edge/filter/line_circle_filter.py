@@ -8,7 +8,7 @@ import numpy as np
 from lcf_edge.config import Config
 from lcf_edge.filter.alpha import Alpha
 from lcf_edge.filter.circles import Ids
-from lcf_edge.filter.derotation import derotate, missing_rotation
+from lcf_edge.filter.derotation import Residual, derotate, missing_rotation
 from lcf_edge.filter.edge_equations import Estimate
 from lcf_edge.filter.edge_expert import EdgeExpert
 from lcf_edge.filter.feedback import Feedback
@@ -30,10 +30,15 @@ FORGET = 0.3
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one step tells besides the tables. ``omitted``: bool (corners,), inside ψ."""
+    """What one step tells besides the tables.
+
+    ``omitted``: bool (corners,), inside ψ. ``residual``: the rotation that the gyro missed, None: too few
+    edges tell it.
+    """
 
     omitted: Mask
     sizes: Sizes
+    residual: Residual | None
 
 
 class LineCircleFilter:
@@ -92,7 +97,7 @@ class LineCircleFilter:
 
         kept = (~omitted).nonzero()[0]
         found = self._edge_expert.find(estimate, corners, kept, self._slack_px(motion))
-        estimate, sigma_rad = self._refine(estimate, found, x, y, motion)
+        estimate, sigma_rad, residual = self._refine(estimate, found, x, y, motion)
         taken = self._edge_expert.update(estimate, found, corners, x, y, motion, sigma_rad * self._pinhole.focal)
         self._edge_expert.delete()
         rows, left = self._edge_expert.add(kept[~taken[kept]], corners, x, y, around, self.groups, self._keys.number)
@@ -103,7 +108,7 @@ class LineCircleFilter:
         evicted += left
         evicted += self._update_circles(around, rebels, motion.dt_s)
         evicted += self.edges.trim()
-        return Step(omitted, self._sizes(len(corners), omitted, evicted))
+        return Step(omitted, self._sizes(len(corners), omitted, evicted), residual)
 
     def _derotate(self, motion: Motion) -> Situation:
         """Step 0, and the predictions of circles and ψ."""
@@ -128,12 +133,15 @@ class LineCircleFilter:
         gyro_px = 3 * motion.rotation_sigma_rad * self._pinhole.focal
         return min(gyro_px, SURPRISE_PX + 3 * self._missing_px, self._config.filter.leap_px)
 
-    def _refine(self, estimate: Estimate, found: Found, x: Floats, y: Floats, motion: Motion) -> tuple[Estimate, float]:
-        """Take out the rotation that the gyro missed; answers the predictions and what stays uncertain, rad."""
+    def _refine(
+        self, estimate: Estimate, found: Found, x: Floats, y: Floats, motion: Motion
+    ) -> tuple[Estimate, float, Residual | None]:
+        """Take out the rotation that the gyro missed. Return the predictions, what stays uncertain, rad, and it."""
+        residual = None
         sigma_rad = motion.rotation_sigma_rad
         told = self._edge_expert.off_line(estimate, found, x, y) if sigma_rad > 0 else None
         if told is not None:
-            rotation, sigma_rad = missing_rotation(self._pinhole, *told, sigma_rad)
+            rotation, sigma_rad, residual = missing_rotation(self._pinhole, *told, sigma_rad)
             missed_px = math.hypot(rotation[0, 2], rotation[1, 2]) * self._pinhole.focal
             self._missing_px += FORGET * (missed_px - self._missing_px)
             self._keys.correct(rotation)
@@ -143,7 +151,7 @@ class LineCircleFilter:
         else:
             self._missing_px = self._config.filter.leap_px  # lost: look everywhere
         self._keys.blur(sigma_rad)
-        return estimate, sigma_rad
+        return estimate, sigma_rad, residual
 
     def _update_circles(self, around: Situation, rebels: Rebels | None, dt_s: float) -> int:
         """Steps 4 and 5: circles, ψ; answers evictions."""
