@@ -7,7 +7,7 @@ No clock, no I/O; memory is two fixed rings of samples.
 
 from collections import Counter
 from dataclasses import dataclass, field
-from math import cos, expm1, hypot, inf, isfinite, nan, sin, sqrt
+from math import cos, exp, expm1, hypot, inf, isfinite, nan, sin, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -43,12 +43,16 @@ _REST_SIGMA_RADPS = 1e-3  # 1 sigma of how still a rest is
 
 # Rotation, 1 sigma of the rate where nothing measures it.
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
-_SIGMA_ODOMETRY_RADPS = 0.05  # odometry knows yaw alone
-_SIGMA_UNKNOWN_RADPS = 0.1
+_SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
 _SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
-_SIGMA_STUCK_RADPS = 1.0
-_STUCK_S = 0.3  # a gyro that repeats itself for so long
-_LIVELY_SHARE = 0.5  # while fewer samples of the accelerometer than this do
+_GUESS_TIME_S = 0.5  # over which that is averaged
+_GUESS_LEAST_RADPS, _GUESS_MOST_RADPS = 0.04, 2.0
+_REPEATS_S, _REPEATS_SAMPLES = 0.1, 8  # a gyro without noise for so long, and so many samples, is a guess
+_LIVELY_SHARE = 0.5  # what repeats fewer samples than this is alive; a gyro beside it that does not is stuck
+_STUCK_RADPS = 0.15  # or its value is as wrong as this, 1 sigma
+_WANTED_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
+_LAG_SHARE = 0.5  # of what the flow takes out, that may be left from before: tracks follow late
+_TURN_SHARE = 0.05  # of the rate, that scale and time of the gyro, and the shaken focus, put into the difference
 _ROLL_SHARE = 0.5  # roll moves the picture's edge by so much of what yaw moves it by
 
 _SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
@@ -75,7 +79,8 @@ class _Interval:
     span: Span
     times_s: Floats  # (n,)
     rates_radps: Floats  # (n, 3), as the gyro, or in its place odometry, shows them
-    measured: bool  # by a gyro that lives
+    alive: bool  # there are samples, of a gyro that does not stick
+    measured: bool  # by a gyro, beyond doubt
     odometry_mps: float
     odometry_yaw_radps: float
     path_yaw_before_radps: float
@@ -100,9 +105,11 @@ class EgoMotionEstimator:
         self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
         self._path_yaw_radps = 0.0
+        self._guess_variance: Floats = np.full(3, _SIGMA_UNKNOWN_RADPS**2)  # of rates that no gyro measures
+        self._noisy = False  # as a real gyro; made-up samples have no noise
         self._speed_mps = nan
         self._stamp_ns: int | None = None
-        self._interval = _Interval(Span(0, 0), np.zeros(2), np.zeros((2, 3)), False, nan, nan, 0.0)
+        self._interval = _Interval(Span(0, 0), np.zeros(2), np.zeros((2, 3)), False, False, nan, nan, 0.0)
         self._error_radps: Floats = np.zeros(3)
 
     def add_imu(self, sample: ImuSample) -> None:
@@ -133,9 +140,9 @@ class EgoMotionEstimator:
         ``still``: whether the picture has stood still for half a second, None: it does not tell. The first frame has
         no interval; neither has one whose stamp goes back, which is counted.
 
-        ``rotation_sigma_rad``: the bias's sigma · dt; besides, gyro noise · dt (what is left of the bias), gyro noise
-        · √(dt · sample interval) (white noise), and stated rates over what was held, missed, saturated or never
-        measured.
+        ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
+        interval) (white noise), and stated rates over what was held, missed or saturated. Without a gyro: by how much
+        rates were lately guessed wrong.
         """
         notes: list[str] = []
         if self._stamp_ns is None:
@@ -150,60 +157,89 @@ class EgoMotionEstimator:
         odometry_mps, odometry_yaw_radps = nan, nan
         if self._odometry.age_s(stamp_ns) <= _FRESH_S:
             odometry_mps, odometry_yaw_radps = mean(*self._odometry.between(span)).tolist()
-        period_s = self._imu.period_s()
-        gap_limit_s = max(_GAP_S, 5 * period_s)
-        measured = self._imu.covers(span, gap_limit_s)
-        if measured:
-            held_s, gap_s = self._imu.unmeasured_s(span, gap_limit_s)
-            if gap_s > 0:
-                notes.append("imu gap")
-            times_s, values = self._imu.between(span)
-            force_mps2, saturated_share = np.split(mean(times_s, values)[3:], [3])
-            saturated_s = float(saturated_share[0]) * span.dt_s
-            if saturated_s > 0:
-                notes.append("imu saturated")
-            sigma_rad = self._noise_radps * (span.dt_s + sqrt(span.dt_s * period_s))
-            sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
-            sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
-            rates_radps = values[:, :3]
-        else:
-            notes.append("no imu")
-            times_s, rates_radps = np.array([0.0, span.dt_s]), np.zeros((2, 3))
-            sigma_rad = _SIGMA_UNKNOWN_RADPS * span.dt_s
-            if isfinite(odometry_yaw_radps):
-                notes.append("rotation from odometry")
-                rates_radps[:, 1] = -odometry_yaw_radps
-                sigma_rad = _SIGMA_ODOMETRY_RADPS * span.dt_s
-        if measured and self._stuck(stamp_ns, gap_limit_s):
-            notes.append("gyro stuck")
-            measured, rates_radps = False, np.zeros_like(rates_radps)
-            sigma_rad = _SIGMA_STUCK_RADPS * span.dt_s
-        self._interval = _Interval(
-            span, times_s, rates_radps, measured, odometry_mps, odometry_yaw_radps, self._path_yaw_radps, notes
+        interval = _Interval(
+            span, _ends(span), np.zeros((2, 3)), False, False, odometry_mps, odometry_yaw_radps, self._path_yaw_radps
         )
-        self.bias.advance(span.dt_s, np.full(3, sigma_rad / max(span.dt_s, 1e-9)), measured)
-        if not measured:
+        interval.notes += notes
+        self._interval = interval
+        gap_limit_s = max(_GAP_S, 5 * self._imu.period_s())
+        if self._imu.covers(span, gap_limit_s):
+            force_mps2, gap_s, sigma_radps = self._measure(interval, gap_limit_s)
+        else:
+            interval.notes.append("no imu")
+        if interval.alive and interval.measured:
+            self.bias.advance(span.dt_s, np.full(3, sigma_radps), measured=True)
+        else:
+            self._guess(interval)
+            self.bias.advance(span.dt_s, np.sqrt(self._guess_variance), measured=False)
+        if not interval.alive:
             self._inertial.lose()
         elif not self._learn_rest(span, gap_limit_s, odometry_mps, still):
-            self._inertial.advance(span.dt_s, force_mps2, self._rotation(), gap_s + saturated_s)
-        if measured and not self.bias.known:
-            notes.append("gyro bias unknown")
-        self._speed_mps = self._choose_speed(span, odometry_mps, notes)
+            self._inertial.advance(span.dt_s, force_mps2, self._rotation(), gap_s)
+        if interval.measured and not self.bias.known:
+            interval.notes.append("gyro bias unknown")
+        self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
         return self._answer()
+
+    def _measure(self, interval: _Interval, gap_limit_s: float) -> tuple[Floats, float, float]:
+        """Take in the IMU's samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates."""
+        span, imu, period_s = interval.span, self._imu, self._imu.period_s()
+        held_s, gap_s = imu.unmeasured_s(span, gap_limit_s)
+        if gap_s > 0:
+            interval.notes.append("imu gap")
+        interval.times_s, values = imu.between(span)
+        interval.rates_radps = values[:, :3]
+        whole = mean(interval.times_s, values)
+        saturated_s = float(whole[6]) * span.dt_s
+        if saturated_s > 0:
+            interval.notes.append("imu saturated")
+        left_radps = sqrt(max(0.0, self._noise_radps**2 - self.bias.sigma_radps.max() ** 2))
+        sigma_rad = left_radps * span.dt_s + self._noise_radps * sqrt(span.dt_s * period_s)
+        sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
+        sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
+        repeats, stuck = self._repeats(span.end_ns, gap_limit_s, period_s)
+        stuck = stuck or (repeats and self._guess_variance.max() > _STUCK_RADPS**2)
+        if stuck:
+            interval.notes.append("gyro stuck")
+        interval.alive, interval.measured = not stuck, not repeats
+        return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
+
+    def _guess(self, interval: _Interval) -> None:
+        """Rates that no gyro measures: those that it repeats, odometry's yaw, or else it goes on as it went."""
+        if interval.alive:
+            interval.rates_radps = interval.rates_radps - self.bias.mean_radps
+            return
+        interval.times_s, interval.rates_radps = _ends(interval.span), np.zeros((2, 3))
+        if isfinite(interval.odometry_yaw_radps):
+            interval.notes.append("rotation from odometry")
+            interval.rates_radps[:, 1] = -interval.odometry_yaw_radps
+        else:
+            interval.rates_radps[:, 1] = -self._path_yaw_radps
+
+    def wants_picture(self, sigma_rad: float) -> bool:
+        """Whether a picture that tells the rotation to ``sigma_rad`` would help in the present interval."""
+        interval = self._interval
+        if not interval.measured or interval.span.dt_s == 0:
+            return True
+        return bool(self.bias.error_sigma_radps[:2].max() * interval.span.dt_s > _WANTED_SHARE * sigma_rad)
 
     def see_picture(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
         """The motion of the present interval, knowing besides how the whole picture turned.
 
-        ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
+        A gyro that lives, and whose bias is known, is believed more than a picture that contradicts it; whatever else
+        is said of the rotation is not. ``turn_rad``: rotation vector (3,) of directions, as in
+        ``EgoMotion.rotation``; ``sigma_rad``: (3,).
         """
-        interval = self._interval
+        interval, bias = self._interval, self.bias
         dt_s = interval.span.dt_s
-        if dt_s > 0:
-            error_radps = mean(interval.times_s, interval.rates_radps) + turn_rad / dt_s
-            if not self.bias.see_picture(error_radps, sigma_rad / dt_s) and not (interval.measured and self.bias.known):
-                self.bias.doubt()
-                self.bias.see_picture(error_radps, sigma_rad / dt_s)
-                interval.notes.append("rotation from pictures")
+        if dt_s == 0:
+            return self._answer()
+        error_radps, sigma_radps = mean(interval.times_s, interval.rates_radps) + turn_rad / dt_s, sigma_rad / dt_s
+        trusted = interval.measured and bias.known
+        if not (bias.see_picture(error_radps, sigma_radps) or trusted):
+            bias.doubt()
+            bias.see_picture(error_radps, sigma_radps)
+            interval.notes.append("rotation from pictures")
         return self._answer()
 
     def correct(self, turn_rad: Floats, sigma_rad: Floats) -> None:
@@ -213,8 +249,18 @@ class EgoMotionEstimator:
         """
         interval = self._interval
         dt_s = interval.span.dt_s
-        if interval.measured and dt_s > 0:
-            self.bias.see_flow(self._error_radps + turn_rad / dt_s, sigma_rad / dt_s)
+        if dt_s == 0:
+            return
+        error_radps = self._error_radps + turn_rad / dt_s
+        if interval.measured:
+            rate_radps = hypot(*(mean(interval.times_s, interval.rates_radps) - error_radps))
+            doubt_radps = hypot(_LAG_SHARE * hypot(*turn_rad) / dt_s, _TURN_SHARE * rate_radps)
+            self.bias.see_flow(error_radps, np.hypot(sigma_rad / dt_s, doubt_radps))
+        else:
+            self._follow_path(error_radps)
+            kept = exp(-dt_s / _GUESS_TIME_S)
+            variance = kept * self._guess_variance + (1 - kept) * error_radps**2
+            self._guess_variance = np.clip(variance, _GUESS_LEAST_RADPS**2, _GUESS_MOST_RADPS**2)
 
     def _rotation(self) -> Floats:
         """Of directions, over the interval."""
@@ -226,12 +272,7 @@ class EgoMotionEstimator:
         interval, dt_s = self._interval, self._interval.span.dt_s
         self._error_radps = self.bias.error_radps
         sigma_x, sigma_y, sigma_z = self.bias.error_sigma_radps.tolist()
-        yaw_rate_radps = float(self._error_radps[1] - mean(interval.times_s, interval.rates_radps)[1])
-        if isfinite(interval.odometry_yaw_radps):
-            self._path_yaw_radps = interval.odometry_yaw_radps
-        else:
-            before_radps = interval.path_yaw_before_radps
-            self._path_yaw_radps = before_radps - expm1(-dt_s / _SHAKE_S) * (yaw_rate_radps - before_radps)
+        yaw_rate_radps = self._follow_path(self._error_radps)
         return EgoMotion(
             dt_s,
             self._rotation(),
@@ -243,13 +284,29 @@ class EgoMotionEstimator:
             tuple(interval.notes),
         )
 
-    def _stuck(self, stamp_ns: int, gap_limit_s: float) -> bool:
-        """Whether the gyro repeats itself while the accelerometer does not."""
-        window = self._imu.latest(stamp_ns, _STUCK_S, gap_limit_s)
+    def _follow_path(self, error_radps: Floats) -> float:
+        """The camera's yaw rate if the rates are mistaken by ``error_radps``; the path's follows it."""
+        interval = self._interval
+        yaw_rate_radps = float(error_radps[1] - mean(interval.times_s, interval.rates_radps)[1])
+        if isfinite(interval.odometry_yaw_radps):
+            self._path_yaw_radps = interval.odometry_yaw_radps
+        else:
+            before_radps = interval.path_yaw_before_radps
+            share = -expm1(-interval.span.dt_s / _SHAKE_S)
+            self._path_yaw_radps = before_radps + share * (yaw_rate_radps - before_radps)
+        return yaw_rate_radps
+
+    def _repeats(self, stamp_ns: int, gap_limit_s: float, period_s: float) -> tuple[bool, bool]:
+        """Whether the gyro, which had noise, repeats one value; and whether the accelerometer does not."""
+        window = self._imu.latest(stamp_ns, max(_REPEATS_S, _REPEATS_SAMPLES * period_s), gap_limit_s)
         if window is None:
-            return False
-        repeats = window[1:] == window[:-1]
-        return bool(repeats[:, :3].all() and repeats[:, 3:6].all(axis=1).mean() < _LIVELY_SHARE)
+            return False, False
+        same = window[1:] == window[:-1]
+        repeated = same[:, :3].all(axis=1)
+        self._noisy = self._noisy or bool(repeated.mean() < _LIVELY_SHARE)
+        if not (self._noisy and repeated.all()):
+            return False, False
+        return True, bool(same[:, 3:6].all(axis=1).mean() < _LIVELY_SHARE)
 
     def _learn_rest(self, span: Span, gap_limit_s: float, odometry_mps: float, still: bool | None) -> bool:
         """Whether the vehicle stands still; then the gyro's mean is its bias, the accelerometer's is up."""
@@ -310,6 +367,11 @@ class EgoMotionEstimator:
             return self._inertial.mean_mps
         notes.append("no speed")
         return nan
+
+
+def _ends(span: Span) -> Floats:
+    """Times of both ends, s."""
+    return np.array([0.0, span.dt_s])
 
 
 def _turned(vectors_rad: Floats) -> Floats:

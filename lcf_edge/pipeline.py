@@ -11,12 +11,13 @@ import numpy as np
 from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
-from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
+from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.gyro_bias import GyroBias
+from lcf_edge.image_rotation import ImageRotation
 from lcf_edge.lens import Lens
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
 
@@ -47,6 +48,8 @@ class Pipeline:
         self._lens = lens
         self._detector = CornerDetector(config.filter, lens, config.memory.corners)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
+        self._image_rotation = ImageRotation(lens)
+        self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
@@ -89,7 +92,7 @@ class Pipeline:
         started = time.perf_counter_ns()
         corners, cut = self._detector.detect(frame.image)
         detected = time.perf_counter_ns()
-        ego = self._motion.advance(frame.stamp_ns)
+        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns))
         motion = Motion(
             max(ego.dt_s, LEAST_DT_S),
             ego.rotation,
@@ -99,6 +102,7 @@ class Pipeline:
         )
         before = time.perf_counter_ns()
         step = self.filter.step(corners, motion)
+        self._lost = step.residual is None
         if step.residual is not None:
             self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad)
         filtered = time.perf_counter_ns()
@@ -123,6 +127,14 @@ class Pipeline:
             ),
             notes=notes,
         )
+
+    def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
+        """The motion, with the rotation that the picture tells where it is not known well."""
+        if not self._lost and not self._motion.wants_picture(self._image_rotation.sigma_rad):
+            self._image_rotation.forget()
+            return ego
+        turn = self._image_rotation.turn(frame.image)
+        return ego if turn is None else self._motion.see_picture(turn.turn_rad, turn.sigma_rad)
 
     def _circles(self) -> Records:
         """The circles from Tr_s up, rebels first."""

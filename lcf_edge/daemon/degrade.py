@@ -10,7 +10,7 @@ DARK = 25  # mean grey level of a dark picture
 _BLIND_S = 0.5  # without corners
 
 _WORDS = {
-    "no imu": "no inertial samples: rotation is unknown and the flow lines are widened; check imu",
+    "no imu": "no inertial samples: only the pictures tell the rotation, and the flow lines are widened; check imu",
     "imu gap": "inertial samples are missing between two pictures; check the IMU's cable and rate",
     "gyro stuck": "the gyro repeats one value while the accelerometer lives: it is not used; check imu",
     "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or see more than a plain wall",

@@ -157,7 +157,7 @@ class TestUncertainty:
         assert "gyro bias unknown" in motion.notes
         ego.bias.see_rest(np.zeros(3), 0.02)
         motion = ego.advance(ns(0.3))
-        assert motion.rotation_sigma_rad == pytest.approx(np.hypot(0.02, 0.005 * (1 + np.sqrt(0.1))) * 0.1, rel=0.01)
+        assert motion.rotation_sigma_rad == pytest.approx(np.hypot(0.02, 0.005 * np.sqrt(0.1)) * 0.1, rel=0.01)
         assert "gyro bias unknown" not in motion.notes
 
     def test_held_sample_widens(self) -> None:
@@ -211,7 +211,7 @@ class TestUncertainty:
         motion = ego.advance(ns(0.6))
         assert motion.notes == ("no imu", "rotation from odometry")
         np.testing.assert_allclose(motion.rotation, turned_by((0.0, -0.04, 0.0)), atol=1e-9)
-        assert 0.0 < motion.rotation_sigma_rad < 0.1 * 0.1
+        assert motion.rotation_sigma_rad == pytest.approx(0.1 * 0.1)  # of pitch and roll it says nothing
 
     def test_without_imu_and_yaw_nothing_turns(self) -> None:
         ego = estimator()
@@ -371,8 +371,9 @@ class TestBrokenGyro:
         before, after = ego.advance(ns(1.0)), [ego.advance(ns(t)) for t in (1.2, 1.5, 1.6)][-1]
         assert "gyro stuck" not in before.notes
         assert "gyro stuck" in after.notes
-        assert after.rotation_sigma_rad == pytest.approx(1.0 * 0.1)
-        np.testing.assert_array_equal(after.rotation, np.eye(3))
+        assert after.rotation_sigma_rad == pytest.approx(0.1 * 0.1)
+        assert after.rotation_sigma_rad > 5 * before.rotation_sigma_rad / 0.05 * 0.1
+        assert after.yaw_rate_radps == pytest.approx(before.path_yaw_rate_radps, abs=0.2)  # it goes on as it went
 
     def test_the_picture_tells_the_rotation_when_the_gyro_died(self) -> None:
         ego = calibrated()
@@ -382,8 +383,8 @@ class TestBrokenGyro:
         motion = ego.see_picture(np.array([0.0, -0.06, 0.0]), np.full(3, 0.002))
         assert "rotation from pictures" in motion.notes
         np.testing.assert_allclose(motion.rotation, turned_by((0.0, 0.06, 0.0)), atol=1e-3)
-        assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.01)
-        assert motion.yaw_rate_radps == pytest.approx(-0.6, abs=0.01)
+        assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.1)
+        assert motion.yaw_rate_radps == pytest.approx(-0.6, abs=0.02)
 
     def test_a_picture_does_not_overrule_a_gyro_that_is_known(self) -> None:
         ego = calibrated()
