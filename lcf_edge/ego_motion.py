@@ -242,10 +242,11 @@ class EgoMotionEstimator:
             interval.notes.append("rotation from pictures")
         return self._answer()
 
-    def correct(self, turn_rad: Floats, sigma_rad: Floats) -> None:
+    def correct(self, turn_rad: Floats, sigma_rad: Floats, expansion_hz: float = 0.0) -> None:
         """What the flow took out of the present interval besides: the bias learns from it.
 
         ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
+        ``expansion_hz``: mean V/Z of what is seen.
         """
         interval = self._interval
         dt_s = interval.span.dt_s
@@ -255,7 +256,7 @@ class EgoMotionEstimator:
         if interval.measured:
             rate_radps = hypot(*(mean(interval.times_s, interval.rates_radps) - error_radps))
             doubt_radps = hypot(_LAG_SHARE * hypot(*turn_rad) / dt_s, _TURN_SHARE * rate_radps)
-            self.bias.see_flow(error_radps, np.hypot(sigma_rad / dt_s, doubt_radps))
+            self.bias.see_flow(error_radps, np.hypot(sigma_rad / dt_s, doubt_radps), expansion_hz)
         else:
             self._follow_path(error_radps)
             kept = exp(-dt_s / _GUESS_TIME_S)
@@ -342,14 +343,16 @@ class EgoMotionEstimator:
         return bool(level)
 
     def _stands(self, stamp_ns: int, odometry_mps: float, still: bool | None) -> bool | None:
-        """Whether odometry, or without it the picture, says that it stands; None: it may."""
+        """Whether the picture or odometry says that it stands; None: it may."""
+        if still:
+            return True
         if isfinite(odometry_mps):
             if abs(odometry_mps) > _REST_SPEED_MPS:
                 return False
             window = self._odometry.latest(stamp_ns, _REST_S, inf)
             return window is not None and not (np.abs(window) > (_REST_SPEED_MPS, _REST_YAW_RADPS)).any()
-        if still or (still is False and not self.bias.known):
-            return still
+        if still is False and not (self.bias.known and self._interval.measured):
+            return False  # what moves in it may be others, but nothing else speaks for rest
         return None if self._inertial.may_stand() else False
 
     def _choose_speed(self, span: Span, odometry_mps: float, notes: list[str]) -> float:

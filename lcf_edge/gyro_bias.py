@@ -21,7 +21,8 @@ Floats = npt.NDArray[np.float64]
 PRIOR_RADPS = 0.2  # 1 sigma of an unknown bias: an MPU-6050's 20 °/s are 0.35
 KNOWN_RADPS = 0.03  # a bias with a larger sigma is not known
 _DRIFT_RADPS = 1e-3  # 1 sigma of what the bias wanders in a second
-_FLOW_RADPS = 0.006  # 1 sigma of s: 1° of error in O, at 2 m/s, past things 6 m away
+_FLOW_RADPS = 0.005  # 1 sigma of s, at least
+_FOCUS_RAD = 0.03  # 1 sigma of O
 _FLOW_TIME_S = 10.0  # for which s lasts
 _OUTLIER = 4.0  # sigmas by which an observation may be off
 _ANY_RADPS = 3.0  # 1 sigma of a rate of which nothing is known
@@ -41,6 +42,7 @@ class GyroBias:
         self._measured = 1.0  # 0: no gyro over the present interval, its "rate" is a guess
         self._dt_s = 0.0
         self._against_s = 0.0
+        self._flow_radps = _FLOW_RADPS
         self._covariance[:, _FLOW, _FLOW] = _FLOW_RADPS**2
         self.forget()
 
@@ -83,7 +85,7 @@ class GyroBias:
         state[:, _NOISE] = 0
         covariance[:, _FLOW, :] *= kept
         covariance[:, :, _FLOW] *= kept
-        covariance[:, _FLOW, _FLOW] += (1 - kept * kept) * _FLOW_RADPS**2
+        covariance[:, _FLOW, _FLOW] += (1 - kept * kept) * self._flow_radps**2
         covariance[:, _NOISE, :] = covariance[:, :, _NOISE] = 0
         covariance[:, _NOISE, _NOISE] = noise_radps**2
         grown = covariance[:, _BIAS, _BIAS] + dt_s * _DRIFT_RADPS**2
@@ -102,8 +104,14 @@ class GyroBias:
         """The gyro's rate less that of the whole picture, (3,), with its sigmas. False: an outlier, not used."""
         return self._observe(self._row(flow=0.0), error_radps, sigma_radps)
 
-    def see_flow(self, error_radps: Floats, sigma_radps: Floats) -> bool:
-        """The gyro's rate less that of the flow, (3,), with its sigmas. False: an outlier, not used."""
+    def see_flow(self, error_radps: Floats, sigma_radps: Floats, expansion_hz: float) -> bool:
+        """The gyro's rate less that of the flow, (3,), with its sigmas. False: an outlier, not used.
+
+        ``expansion_hz``: mean V/Z of what is seen; an error of O turns so much of itself into rotation.
+        """
+        flow_radps = max(_FLOW_RADPS, _FOCUS_RAD * expansion_hz)
+        self._covariance[:, _FLOW, _FLOW] += max(0.0, flow_radps**2 - self._flow_radps**2)
+        self._flow_radps = flow_radps
         return self._observe(self._row(flow=1.0), error_radps, sigma_radps)
 
     def _row(self, flow: float) -> Floats:

@@ -20,6 +20,7 @@ from lcf_edge.gyro_bias import GyroBias
 from lcf_edge.image_rotation import ImageRotation
 from lcf_edge.lens import Lens
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
+from lcf_edge.stillness import Stillness
 
 if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
     from lcf_edge.recordings import Recording
@@ -49,6 +50,7 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners)
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._image_rotation = ImageRotation(lens)
+        self._stillness = Stillness(lens.width, lens.height)
         self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
@@ -92,7 +94,8 @@ class Pipeline:
         started = time.perf_counter_ns()
         corners, cut = self._detector.detect(frame.image)
         detected = time.perf_counter_ns()
-        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns))
+        still = self._stillness.look(frame.stamp_ns, corners.pixel)
+        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, still))
         motion = Motion(
             max(ego.dt_s, LEAST_DT_S),
             ego.rotation,
@@ -104,7 +107,7 @@ class Pipeline:
         step = self.filter.step(corners, motion)
         self._lost = step.residual is None
         if step.residual is not None:
-            self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad)
+            self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad, self._expansion_hz())
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
         notes = ego.notes if len(corners) else (*ego.notes, "no corners")
@@ -135,6 +138,12 @@ class Pipeline:
             return ego
         turn = self._image_rotation.turn(frame.image)
         return ego if turn is None else self._motion.see_picture(turn.turn_rad, turn.sigma_rad)
+
+    def _expansion_hz(self) -> float:
+        """Mean V/Z of the normal circles, weighed by their edges; 0 without any."""
+        normal = self.filter.normal
+        weight = normal.support * normal.active
+        return float(np.abs(normal.expansion) @ weight / max(weight.sum(), 1))
 
     def _circles(self) -> Records:
         """The circles from Tr_s up, rebels first."""

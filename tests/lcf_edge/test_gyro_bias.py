@@ -29,7 +29,7 @@ def drive(
         true = truth_radps + drift_radps2 * frame * dt_s
         bias.advance(dt_s, np.full(3, NOISE_RADPS), measured=True)
         seen = true + random.normal(0, NOISE_RADPS, 3) + random.normal(0, flow_sigma_radps, 3)
-        bias.see_flow(seen, np.full(3, flow_sigma_radps))
+        bias.see_flow(seen, np.full(3, flow_sigma_radps), 0.0)
         errors.append(bias.mean_radps - true)
         sigmas.append(bias.sigma_radps)
     return np.array(errors), np.array(sigmas)
@@ -76,7 +76,7 @@ def test_truth_lies_within_two_sigma_nine_times_in_ten() -> None:
             kept = np.exp(-DT_S / 10)
             shared = kept * shared + random.normal(0, 0.006 * np.sqrt(1 - kept**2), 3)
             bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
-            bias.see_flow(truth + shared + random.normal(0, np.hypot(NOISE_RADPS, 0.02), 3), np.full(3, 0.02))
+            bias.see_flow(truth + shared + random.normal(0, np.hypot(NOISE_RADPS, 0.02), 3), np.full(3, 0.02), 0.2)
             within.append(np.abs(bias.mean_radps - truth) <= 2 * bias.sigma_radps)
     assert 0.9 <= np.mean(within) <= 0.99
 
@@ -90,7 +90,18 @@ def test_a_bias_that_drifts_with_temperature_is_followed() -> None:
 
 def test_flow_alone_is_never_believed_beyond_its_own_errors() -> None:
     _, sigmas = drive(GyroBias(), np.zeros(3), 5.0, np.random.default_rng(0), flow_sigma_radps=1e-4)
-    assert (sigmas > 0.004).all()
+    assert (sigmas > 0.003).all()
+
+
+def test_flow_tells_the_less_the_nearer_things_pass() -> None:
+    """Mean V/Z of 2/s, as beside a floor half a metre below: 2 degrees of error in O are 0.06 rad/s."""
+    far, near = GyroBias(), GyroBias()
+    for bias, expansion_hz in ((far, 0.1), (near, 2.0)):
+        for _ in range(200):
+            bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
+            bias.see_flow(np.full(3, 0.06), np.full(3, 0.005), expansion_hz)
+    assert (near.sigma_radps > 4 * far.sigma_radps).all()
+    assert (np.abs(near.mean_radps) < 2 * near.sigma_radps).all()
 
 
 def test_rest_tells_more_than_flow() -> None:
@@ -108,7 +119,7 @@ def test_one_outlier_changes_nothing_and_a_second_of_them_all() -> None:
     before = bias.mean_radps
     for frame in range(25):
         bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
-        used = bias.see_flow(np.array([0.0, 0.3, 0.0]), np.full(3, 0.01))
+        used = bias.see_flow(np.array([0.0, 0.3, 0.0]), np.full(3, 0.01), 0.0)
         if frame == 0:
             assert not used
             assert (bias.mean_radps == before).all()
@@ -145,7 +156,7 @@ def test_whatever_is_told_numbers_stay_finite_and_sigmas_positive_and_bounded(
         elif what == "picture":
             bias.see_picture(np.array(rate), np.full(3, sigma))
         else:
-            bias.see_flow(np.array(rate), np.full(3, sigma))
+            bias.see_flow(np.array(rate), np.full(3, sigma), sigma)
         for value in (bias.mean_radps, bias.error_radps):
             assert np.isfinite(value).all()
             assert (np.abs(value) < 100).all()
