@@ -47,9 +47,8 @@ _SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how 
 _SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
 _GUESS_TIME_S = 0.5  # over which that is averaged
 _GUESS_LEAST_RADPS, _GUESS_MOST_RADPS = 0.04, 2.0
-_REPEATS_S, _REPEATS_SAMPLES = 0.1, 8  # a gyro without noise for so long, and so many samples, is a guess
-_LIVELY_SHARE = 0.5  # what repeats fewer samples than this is alive; a gyro beside it that does not is stuck
-_STUCK_RADPS = 0.15  # or its value is as wrong as this, 1 sigma
+_STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value for so long and so often, is stuck
+_NOISY_SHARE = 0.5  # of the samples, at most, are repeated by one with noise
 _WANTED_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
 _LAG_SHARE = 0.5  # of what the flow takes out, that may be left from before: tracks follow late
 _TURN_SHARE = 0.05  # of the rate, that scale and time of the gyro, and the shaken focus, put into the difference
@@ -79,8 +78,7 @@ class _Interval:
     span: Span
     times_s: Floats  # (n,)
     rates_radps: Floats  # (n, 3), as the gyro, or in its place odometry, shows them
-    alive: bool  # there are samples, of a gyro that does not stick
-    measured: bool  # by a gyro, beyond doubt
+    measured: bool  # by a gyro that lives
     odometry_mps: float
     odometry_yaw_radps: float
     path_yaw_before_radps: float
@@ -109,7 +107,7 @@ class EgoMotionEstimator:
         self._noisy = False  # as a real gyro; made-up samples have no noise
         self._speed_mps = nan
         self._stamp_ns: int | None = None
-        self._interval = _Interval(Span(0, 0), np.zeros(2), np.zeros((2, 3)), False, False, nan, nan, 0.0)
+        self._interval = _Interval(Span(0, 0), np.zeros(2), np.zeros((2, 3)), False, nan, nan, 0.0)
         self._error_radps: Floats = np.zeros(3)
 
     def add_imu(self, sample: ImuSample) -> None:
@@ -158,21 +156,22 @@ class EgoMotionEstimator:
         if self._odometry.age_s(stamp_ns) <= _FRESH_S:
             odometry_mps, odometry_yaw_radps = mean(*self._odometry.between(span)).tolist()
         interval = _Interval(
-            span, _ends(span), np.zeros((2, 3)), False, False, odometry_mps, odometry_yaw_radps, self._path_yaw_radps
+            span, _ends(span), np.zeros((2, 3)), False, odometry_mps, odometry_yaw_radps, self._path_yaw_radps
         )
         interval.notes += notes
         self._interval = interval
         gap_limit_s = max(_GAP_S, 5 * self._imu.period_s())
         if self._imu.covers(span, gap_limit_s):
-            force_mps2, gap_s, sigma_radps = self._measure(interval, gap_limit_s)
+            may_rest = still is not False and self._stands(stamp_ns, odometry_mps, still) is not False
+            force_mps2, gap_s, sigma_radps = self._measure(interval, gap_limit_s, may_rest)
         else:
             interval.notes.append("no imu")
-        if interval.alive and interval.measured:
+        if interval.measured:
             self.bias.advance(span.dt_s, np.full(3, sigma_radps), measured=True)
         else:
             self._guess(interval)
             self.bias.advance(span.dt_s, np.sqrt(self._guess_variance), measured=False)
-        if not interval.alive:
+        if not interval.measured:
             self._inertial.lose()
         elif not self._learn_rest(span, gap_limit_s, odometry_mps, still):
             self._inertial.advance(span.dt_s, force_mps2, self._rotation(), gap_s)
@@ -181,7 +180,7 @@ class EgoMotionEstimator:
         self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
         return self._answer()
 
-    def _measure(self, interval: _Interval, gap_limit_s: float) -> tuple[Floats, float, float]:
+    def _measure(self, interval: _Interval, gap_limit_s: float, may_rest: bool) -> tuple[Floats, float, float]:
         """Take in the IMU's samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates."""
         span, imu, period_s = interval.span, self._imu, self._imu.period_s()
         held_s, gap_s = imu.unmeasured_s(span, gap_limit_s)
@@ -197,18 +196,13 @@ class EgoMotionEstimator:
         sigma_rad = left_radps * span.dt_s + self._noise_radps * sqrt(span.dt_s * period_s)
         sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
         sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
-        repeats, stuck = self._repeats(span.end_ns, gap_limit_s, period_s)
-        stuck = stuck or (repeats and self._guess_variance.max() > _STUCK_RADPS**2)
-        if stuck:
+        interval.measured = not self._stuck(span.end_ns, gap_limit_s, period_s, may_rest)
+        if not interval.measured:
             interval.notes.append("gyro stuck")
-        interval.alive, interval.measured = not stuck, not repeats
         return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
 
     def _guess(self, interval: _Interval) -> None:
-        """Rates that no gyro measures: those that it repeats, odometry's yaw, or else it goes on as it went."""
-        if interval.alive:
-            interval.rates_radps = interval.rates_radps - self.bias.mean_radps
-            return
+        """Rates that no gyro measures: odometry's yaw, or else it goes on as it went."""
         interval.times_s, interval.rates_radps = _ends(interval.span), np.zeros((2, 3))
         if isfinite(interval.odometry_yaw_radps):
             interval.notes.append("rotation from odometry")
@@ -297,17 +291,21 @@ class EgoMotionEstimator:
             self._path_yaw_radps = before_radps + share * (yaw_rate_radps - before_radps)
         return yaw_rate_radps
 
-    def _repeats(self, stamp_ns: int, gap_limit_s: float, period_s: float) -> tuple[bool, bool]:
-        """Whether the gyro, which had noise, repeats one value; and whether the accelerometer does not."""
-        window = self._imu.latest(stamp_ns, max(_REPEATS_S, _REPEATS_SAMPLES * period_s), gap_limit_s)
+    def _stuck(self, stamp_ns: int, gap_limit_s: float, period_s: float, may_rest: bool) -> bool:
+        """Whether the gyro, which had noise, repeats one value; made-up samples may do so at rest, all six."""
+        window = self._imu.latest(stamp_ns, max(_STUCK_S, _STUCK_SAMPLES * period_s), gap_limit_s)
         if window is None:
-            return False, False
+            return False
         same = window[1:] == window[:-1]
         repeated = same[:, :3].all(axis=1)
-        self._noisy = self._noisy or bool(repeated.mean() < _LIVELY_SHARE)
+        self._noisy = self._noisy or bool(repeated.mean() < _NOISY_SHARE)
         if not (self._noisy and repeated.all()):
-            return False, False
-        return True, bool(same[:, 3:6].all(axis=1).mean() < _LIVELY_SHARE)
+            return False
+        return not (may_rest and same[:, 3:6].all() and self._near_bias(window[-1, :3]))
+
+    def _near_bias(self, rate_radps: Floats) -> bool:
+        """Whether a rate at rest may be this."""
+        return bool((np.abs(rate_radps - self.bias.mean_radps) <= _REST_TURN_RADPS + 3 * self.bias.sigma_radps).all())
 
     def _learn_rest(self, span: Span, gap_limit_s: float, odometry_mps: float, still: bool | None) -> bool:
         """Whether the vehicle stands still; then the gyro's mean is its bias, the accelerometer's is up."""
@@ -320,8 +318,7 @@ class EgoMotionEstimator:
         offset = window - at
         std = np.sqrt(np.einsum("ij,ij->j", offset, offset) / rows)
         gyro_std, accel_std = max(std[:3].tolist()), max(std[3:6].tolist())
-        off_radps = np.abs(at[:3] - self.bias.mean_radps)
-        if (off_radps > _REST_TURN_RADPS + 3 * self.bias.sigma_radps).any():
+        if not self._near_bias(at[:3]):
             return False
         level = abs(hypot(*at[3:6]) - GRAVITY_MPS2) <= _REST_GRAVITY_ERROR_MPS2
         if told:
@@ -351,7 +348,7 @@ class EgoMotionEstimator:
                 return False
             window = self._odometry.latest(stamp_ns, _REST_S, inf)
             return window is not None and not (np.abs(window) > (_REST_SPEED_MPS, _REST_YAW_RADPS)).any()
-        if still is False and not (self.bias.known and self._interval.measured):
+        if still is False and not self.bias.known:
             return False  # what moves in it may be others, but nothing else speaks for rest
         return None if self._inertial.may_stand() else False
 

@@ -125,7 +125,13 @@ def test_without_an_imu_the_pictures_tell_the_turn(truth: list[np.ndarray]) -> N
     assert np.percentile(seen.left_mrad[10:], 90) < 1.0
 
 
-@pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck")])
+def hangs(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    end_ns = FRAMES[HALF].stamp_ns
+    last = next(sample for sample in samples if sample.stamp_ns >= end_ns)
+    return [sample if sample.stamp_ns < end_ns else replace(last, stamp_ns=sample.stamp_ns) for sample in samples]
+
+
+@pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck"), (hangs, "gyro stuck")])
 def test_a_gyro_that_ends_in_the_middle_is_told_and_the_pictures_go_on(
     truth: list[np.ndarray], spoil: Spoil, note: str
 ) -> None:

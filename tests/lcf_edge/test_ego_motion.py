@@ -359,7 +359,7 @@ class TestBrokenGyro:
     def alive(self, t: float) -> tuple[float, float, float]:
         return (0.0, 0.6 + 0.001 * np.sin(997 * t), 0.0)
 
-    def test_one_that_sticks_while_the_accelerometer_lives_is_told_and_not_used(self) -> None:
+    def test_one_that_had_noise_and_sticks_is_told_and_not_used(self) -> None:
         ego, random = calibrated(), np.random.default_rng(0)
         feed(
             ego,

@@ -39,7 +39,7 @@ SHAKES = (
     scenes.Shake("roll", 0.03, 0.9, 2.0),
 )
 DRIVE = replace(scenes.make("crossing", 1, seconds=1.0), shakes=SHAKES)
-LEARNING = 6  # pictures
+LEARNING = 10  # pictures
 PICTURES = round(DRIVE.seconds * DRIVE.fps)
 SAMPLES, SPEEDS = scenes.imu(DRIVE), scenes.odometry(DRIVE)
 LEAD_NS = START_NS - SAMPLES[0].stamp_ns  # the samples begin before the pictures
