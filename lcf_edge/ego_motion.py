@@ -171,14 +171,16 @@ class EgoMotionEstimator:
         else:
             self._guess(interval)
             self.bias.advance(span.dt_s, np.sqrt(self._guess_variance), measured=False)
+        rests = interval.measured and self._learn_rest(span, gap_limit_s, odometry_mps, still)
+        rotation = self._rotation()
         if not interval.measured:
             self._inertial.lose()
-        elif not self._learn_rest(span, gap_limit_s, odometry_mps, still):
-            self._inertial.advance(span.dt_s, force_mps2, self._rotation(), gap_s)
+        elif not rests:
+            self._inertial.advance(span.dt_s, force_mps2, rotation, gap_s)
         if interval.measured and not self.bias.known:
             interval.notes.append("gyro bias unknown")
         self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
-        return self._answer()
+        return self._answer(rotation)
 
     def _measure(self, interval: _Interval, gap_limit_s: float, may_rest: bool) -> tuple[Floats, float, float]:
         """Take in the IMU's samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates."""
@@ -227,14 +229,14 @@ class EgoMotionEstimator:
         interval, bias = self._interval, self.bias
         dt_s = interval.span.dt_s
         if dt_s == 0:
-            return self._answer()
+            return self._answer(self._rotation())
         error_radps, sigma_radps = mean(interval.times_s, interval.rates_radps) + turn_rad / dt_s, sigma_rad / dt_s
         trusted = interval.measured and bias.known
         if not (bias.see_picture(error_radps, sigma_radps) or trusted):
             bias.doubt()
             bias.see_picture(error_radps, sigma_radps)
             interval.notes.append("rotation from pictures")
-        return self._answer()
+        return self._answer(self._rotation())
 
     def correct(self, turn_rad: Floats, sigma_rad: Floats, expansion_hz: float = 0.0) -> None:
         """What the flow took out of the present interval besides: the bias learns from it.
@@ -263,14 +265,14 @@ class EgoMotionEstimator:
         rates = interval.rates_radps - self.bias.error_radps
         return _turned(-0.5 * (rates[1:] + rates[:-1]) * np.diff(interval.times_s)[:, None])
 
-    def _answer(self) -> EgoMotion:
+    def _answer(self, rotation: Floats) -> EgoMotion:
         interval, dt_s = self._interval, self._interval.span.dt_s
         self._error_radps = self.bias.error_radps
         sigma_x, sigma_y, sigma_z = self.bias.error_sigma_radps.tolist()
         yaw_rate_radps = self._follow_path(self._error_radps)
         return EgoMotion(
             dt_s,
-            self._rotation(),
+            rotation,
             max(sigma_x, sigma_y, _ROLL_SHARE * sigma_z) * dt_s,
             self._speed_mps,
             yaw_rate_radps,
