@@ -14,14 +14,17 @@ from drivers.records import Frame, ImuSample, SpeedSample
 from lcf_edge import own_parts
 from lcf_edge.config import Config
 from lcf_edge.corners import CornerDetector
-from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotionEstimator
+from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
+from lcf_edge.gyro_bias import GyroBias
+from lcf_edge.image_rotation import ImageRotation
 from lcf_edge.lens import Lens
 from lcf_edge.picture_quality import PictureQuality
 from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
+from lcf_edge.stillness import Stillness
 
 if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
     from lcf_edge.recordings import Recording
@@ -55,6 +58,9 @@ class Pipeline:
         self._quality = PictureQuality()
         self._speed_mps = math.nan  # of the last frame
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
+        self._image_rotation = ImageRotation(lens)
+        self._stillness = Stillness(lens.width, lens.height)
+        self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
@@ -80,6 +86,11 @@ class Pipeline:
         """IMU and speed samples that were not used, by reason."""
         return self._motion.refused
 
+    @property
+    def gyro_bias(self) -> GyroBias:
+        """The gyro's bias, as far as it is known."""
+        return self._motion.bias
+
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take an inertial sample or a speed, each kind in stamp order."""
         if isinstance(sample, ImuSample):
@@ -93,7 +104,8 @@ class Pipeline:
         corners, cut = self._detector.detect(frame.image, self._highest_row())
         pictured = self._quality.notes(frame.image, len(corners))
         detected = time.perf_counter_ns()
-        ego = self._motion.advance(frame.stamp_ns)
+        still = self._stillness.look(frame.stamp_ns, corners.pixel)
+        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, still))
         motion = Motion(
             max(ego.dt_s, LEAST_DT_S),
             ego.rotation,
@@ -103,6 +115,9 @@ class Pipeline:
         )
         before = time.perf_counter_ns()
         step = self.filter.step(corners, motion)
+        self._lost = step.residual is None
+        if step.residual is not None:
+            self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad, self._expansion_hz())
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
         sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
@@ -131,6 +146,20 @@ class Pipeline:
         vehicle, camera = self._config.vehicle, self._config.camera
         farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, LEAST_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
+
+    def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
+        """The motion, with the rotation that the picture tells where it is not known well."""
+        if not self._lost and not self._motion.wants_picture(self._image_rotation.sigma_rad):
+            self._image_rotation.forget()
+            return ego
+        turn = self._image_rotation.turn(frame.image)
+        return ego if turn is None else self._motion.see_picture(turn.turn_rad, turn.sigma_rad)
+
+    def _expansion_hz(self) -> float:
+        """Mean V/Z of the normal circles, weighed by their edges; 0 without any."""
+        normal = self.filter.normal
+        weight = normal.support * normal.active
+        return float(np.abs(normal.expansion) @ weight / max(weight.sum(), 1))
 
     def _circles(self) -> Records:
         """The circles from Tr_s up, rebels first."""

@@ -38,7 +38,9 @@ def axes_of(seen: Watched, config: Config, snap_rad: float) -> Result:
         f"{', '.join(f'{rate:.2f}' for rate in alignment.rates_radps)} rad/s were turned about x, y, z",
         *words,
         f"uncertainty: ± {np.degrees(sigma_rad):.2f}°",
-        "gyro bias: " + ", ".join(f"{bias:.4f}" for bias in alignment.gyro_bias_radps) + " rad/s (learnt at each rest)",
+        "gyro bias: "
+        + ", ".join(f"{bias:.4f}" for bias in alignment.gyro_bias_radps)
+        + " rad/s (learnt while it runs)",
         *guessed(seen),
     )
     if abs(alignment.offset_s - config.imu.time_offset_s) > _LARGEST_LAG_S:

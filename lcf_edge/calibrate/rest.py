@@ -71,7 +71,7 @@ class Rest:
         doubt = "; more than a good accelerometer has" if abs(off) > _GRAVITY_DOUBT else ""
         return (
             f"at rest: {self.seconds:.1f} s, {self.samples} samples, {self.samples / self.seconds:.0f} Hz",
-            f"gyro bias: {_three(self.bias_radps)} rad/s (needs no key: the daemon learns it at each rest)",
+            f"gyro bias: {_three(self.bias_radps)} rad/s (needs no key: the daemon learns it)",
             f"gyro noise: {_three(self.noise_radps)} rad/s a sample; the bias wandered by "
             f"{self.wander_radps.max():.4f} rad/s",
             f"gravity: {self.gravity_mps2:.3f} m/s², {off:+.1%} of {GRAVITY_MPS2}{doubt}; "
@@ -140,7 +140,7 @@ def _refuse_unrecognised(samples: Sequence[ImuSample], rest: Rest) -> None:
         if sample.stamp_ns >= next_ns:
             estimator.advance(sample.stamp_ns)
             next_ns += _FRAME_NS
-    if not estimator.gyro_bias_radps.any():
+    if not estimator.bias.known:
         raise CalibrationError(
             "imu: too restless for the daemon to see that it stands (bias "
             f"{np.linalg.norm(rest.bias_radps):.3f} rad/s, noise {rest.noise_radps.max():.3f} rad/s and "

@@ -10,8 +10,10 @@ DARK = 25  # mean grey level of a dark picture
 _BLIND_S = 0.5  # without corners
 
 _WORDS = {
-    "no imu": "no inertial samples: rotation is unknown and the flow lines are widened; check imu",
+    "no imu": "no inertial samples: only the pictures tell the rotation, and the flow lines are widened; check imu",
     "imu gap": "inertial samples are missing between two pictures; check the IMU's cable and rate",
+    "gyro stuck": "the gyro repeats one value without noise: it is not used; check imu and its wires",
+    "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or see more than a plain wall",
     "rotation from odometry": "rotation is taken from odometry",
     "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
     "speed drifts": "speed comes from the accelerometer alone and drifts",

@@ -114,6 +114,9 @@ class Health:
             for table, rows in asdict(loop.scene.sizes).items():
                 if table in capacities:
                     values[f"{table}_fill"] = f"{rows}/{capacities[table]}"
+        if config.imu.driver != "none" and loop.gyro_bias is not None:
+            values["gyro_bias_radps"] = " ".join(f"{bias:+.4f}" for bias in loop.gyro_bias.mean_radps)
+            values["gyro_bias_sigma_radps"] = f"{loop.gyro_bias.sigma_radps.max():.4f}"
         values |= {f"refused {reason}": str(count) for reason, count in sorted(loop.refused.items())}
         return DeviceStatus("pipeline", Level.WARN if notes else Level.OK, "; ".join(notes) or "runs", values)
 

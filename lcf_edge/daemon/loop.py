@@ -20,6 +20,7 @@ from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.mailbox import Newest, SampleRing
 from lcf_edge.daemon.preview import Previewer
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
+from lcf_edge.gyro_bias import GyroBias
 from lcf_edge.lens import Lens
 from lcf_edge.meters import DurationHistogram
 from lcf_edge.pipeline import Outcome, Pipeline
@@ -118,6 +119,11 @@ class Loop(threading.Thread):
         """IMU and speed samples that were not used, by reason."""
         pipeline = self._pipeline
         return self._refused_before + Counter(dict(pipeline.refused) if pipeline else {})
+
+    @property
+    def gyro_bias(self) -> GyroBias | None:
+        """As far as it is known; None before the first picture."""
+        return self._pipeline.gyro_bias if self._pipeline else None
 
     def rebuild(self, config: Config) -> None:
         """From the next frame on, a new pipeline with empty tables, once another like it has taken pictures.

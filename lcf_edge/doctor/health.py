@@ -9,7 +9,17 @@ from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 from lcf_edge.doctor.processes import Process, daemon_with, processes
 
 _DEVICES = ("camera", "imu")  # told by their own checks
-_TOLD = ("rate_hz", "jitter_ms", "latency_p50_ms", "latency_p99_ms", "resident_mib", "budget_mib", "temperature_c")
+_TOLD = (
+    "rate_hz",
+    "jitter_ms",
+    "latency_p50_ms",
+    "latency_p99_ms",
+    "gyro_bias_radps",
+    "gyro_bias_sigma_radps",
+    "resident_mib",
+    "budget_mib",
+    "temperature_c",
+)
 _JOURNAL = "journalctl -u lcf-edge -n 30 --no-pager"
 
 

@@ -118,7 +118,7 @@ def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
     if bias_radps > _BIAS_RADPS:
         yield warn(
             "imu",
-            f"{told}: a large bias, or not rad/s; it is learnt while the vehicle stands",
+            f"{told}: a large bias, or not rad/s; the daemon learns it, soonest while the vehicle stands",
             context.calibrate("imu"),
         )
     else:

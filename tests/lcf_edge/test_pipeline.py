@@ -176,7 +176,8 @@ def test_intrinsics_of_the_configuration_come_before_those_of_the_recording(appr
 def test_a_whole_drive_has_nothing_to_note(approach: Approach) -> None:
     first, *rest = outcomes(approach())
     assert "first frame" in first.scene.notes
-    assert {note for each in rest for note in each.scene.notes} == set()
+    assert {note for each in rest[:5] for note in each.scene.notes} <= {"gyro bias unknown"}
+    assert {note for each in rest[5:] for note in each.scene.notes} == set()
     assert [each.scene.vehicle_speed for each in rest] == pytest.approx([2.0] * len(rest))
 
 

@@ -39,6 +39,7 @@ SHAKES = (
     scenes.Shake("roll", 0.03, 0.9, 2.0),
 )
 DRIVE = replace(scenes.make("crossing", 1, seconds=1.0), shakes=SHAKES)
+LEARNING = 10  # pictures
 PICTURES = round(DRIVE.seconds * DRIVE.fps)
 SAMPLES, SPEEDS = scenes.imu(DRIVE), scenes.odometry(DRIVE)
 LEAD_NS = START_NS - SAMPLES[0].stamp_ns  # the samples begin before the pictures
@@ -177,7 +178,7 @@ class Seen:
 
     threats: dict[str, float | None]  # after how long each was found, s
     rotations: np.ndarray  # (pictures, 3, 3) of the camera since the picture before
-    notes: set[str]  # but for the first picture
+    notes: set[str]  # but for the first pictures, which tell the gyro's bias
 
 
 def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) -> Seen:
@@ -189,7 +190,7 @@ def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) ->
             scene = pipeline.process(event)
             rebels[scene.seq] = trusted_rebels(scene, config.filter.tr_s)
             rotations.append(motion.advance(event.stamp_ns).rotation)
-            notes |= set(scene.notes) if scene.seq else set()
+            notes |= set(scene.notes) if scene.seq >= LEARNING else set()
         else:
             pipeline.add(event)
             motion.add_imu(event) if isinstance(event, ImuSample) else motion.add_speed(event)

@@ -61,7 +61,18 @@ def test_without_a_speed_nothing_is_said_of_the_rate() -> None:
     assert not degradation.notes
 
 
-@pytest.mark.parametrize("note", ["no imu", "imu gap", "rotation from odometry", "no speed", "speed drifts"])
+@pytest.mark.parametrize(
+    "note",
+    [
+        "no imu",
+        "imu gap",
+        "gyro stuck",
+        "gyro bias unknown",
+        "rotation from odometry",
+        "no speed",
+        "speed drifts",
+    ],
+)
 def test_what_ego_motion_lacks_is_told(note: str) -> None:
     degradation = Degradation(Config())
     degradation.add(frame(0), scene(0, notes=("first frame", note)))

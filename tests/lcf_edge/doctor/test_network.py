@@ -214,7 +214,9 @@ def running(endpoint: str) -> Iterator[Config]:
     link = Link(open_session(config.zenoh), config)
     statuses = [
         DeviceStatus("camera", StatusLevel.OK, "delivers", {"rate_hz": "30.00"}),
-        DeviceStatus("pipeline", StatusLevel.WARN, "dark", {"latency_p50_ms": "3.2", "scenes": "7"}),
+        DeviceStatus(
+            "pipeline", StatusLevel.WARN, "dark", {"gyro_bias_sigma_radps": "0.2000", "latency_p50_ms": "3.2"}
+        ),
     ]
     ended = threading.Event()
 
@@ -238,7 +240,10 @@ def test_a_running_daemon_is_asked(machine: Machine, running: Config) -> None:
     context.__dict__["daemon"] = found
     answers, pipeline = health.check(context)
     assert answers.text.endswith("has no scene (no scene yet)")
-    assert (pipeline.level, pipeline.text) == (Level.WARN, "pipeline: dark (latency_p50_ms 3.2)")
+    assert (pipeline.level, pipeline.text) == (
+        Level.WARN,
+        "pipeline: dark (latency_p50_ms 3.2, gyro_bias_sigma_radps 0.2000)",
+    )
     held = next(network.check(context))
     assert (held.level, held.text) == (Level.OK, f"{running.zenoh.listen[0]}: the daemon listens")
 

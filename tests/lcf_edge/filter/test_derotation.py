@@ -143,18 +143,34 @@ def missing_rotation(edges: EdgeTable, corners: CornerTable, sigma_rad: float) -
 @given(st.tuples(angle, angle, angle), st.integers(0, 1000))
 def test_a_small_rotation_is_recovered_although_a_third_moves(axis: tuple[float, float, float], seed: int) -> None:
     missed = rotation_of(axis)
-    found, sigma_rad = missing_rotation(*off_the_lines(missed, 0.3, seed=seed), SIGMA_RAD)
+    found, sigma_rad, _ = missing_rotation(*off_the_lines(missed, 0.3, seed=seed), SIGMA_RAD)
     assert found == pytest.approx(missed, abs=1.2e-3)
     assert 0 < sigma_rad < 0.1 * SIGMA_RAD
 
 
 def test_edges_on_their_lines_ask_for_no_rotation() -> None:
-    found, _ = missing_rotation(*off_the_lines(np.eye(3), 0.0), SIGMA_RAD)
+    found, _, alone = missing_rotation(*off_the_lines(np.eye(3), 0.0), SIGMA_RAD)
     assert found == pytest.approx(np.eye(3), abs=2e-4)
+    assert alone.turn_rad == pytest.approx(np.zeros(3), abs=4e-4)
+
+
+@given(st.tuples(angle, angle, angle), st.integers(0, 1000))
+def test_what_the_flow_tells_by_itself_is_free_of_the_gyro(axis: tuple[float, float, float], seed: int) -> None:
+    missed = rotation_of(axis)
+    _, _, alone = missing_rotation(*off_the_lines(missed, 0.1, seed=seed), SIGMA_RAD)
+    off_rad = alone.turn_rad - cv2.Rodrigues(missed)[0].ravel()
+    assert (np.abs(off_rad) < 4 * alone.sigma_rad).all()
+    assert (alone.sigma_rad > 0).all()
+    assert (alone.sigma_rad < 0.01).all()
+
+
+def test_edges_that_scatter_make_it_uncertain() -> None:
+    neat, wild = (missing_rotation(*off_the_lines(np.eye(3), n), SIGMA_RAD)[2] for n in (0.0, 0.7))
+    assert (wild.sigma_rad > 2 * neat.sigma_rad).all()
 
 
 def test_a_gyro_that_is_sure_is_believed() -> None:
-    found, sigma_rad = missing_rotation(*off_the_lines(rotation_of((0.004, 0.004, 0.0)), 0.0), 1e-6)
+    found, sigma_rad, _ = missing_rotation(*off_the_lines(rotation_of((0.004, 0.004, 0.0)), 0.0), 1e-6)
     assert found == pytest.approx(np.eye(3), abs=1e-5)
     assert sigma_rad == pytest.approx(1e-6, rel=0.1)
 
