@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.memory import Doubles, doubles, memory_of
 
