@@ -3,11 +3,12 @@
 import math
 
 from lcf_edge.filter import flow, key_frames, rebel_detection
+from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.memory import Integers
-from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
@@ -47,17 +48,6 @@ def mark_key(edges: EdgeColumns, keys: KeyFrames) -> None:
         edges.key_x[i, slot], edges.key_y[i, slot] = edges.x[i], edges.y[i]
 
 
-def oldest_key(edges: EdgeColumns, i: int, keys: KeyFrames) -> int:
-    """Number of the oldest key frame within the window that an edge has seen."""
-    return max(edges.born_key[i], keys.number - KEYS)
-
-
-def has_history(edges: EdgeColumns, i: int, keys: KeyFrames, least_s: float) -> bool:
-    """Whether an edge has been seen for so long."""
-    oldest = oldest_key(edges, i, keys)
-    return oldest < keys.number and keys.elapsed_s[oldest % KEYS] >= least_s
-
-
 def judge_all(
     verdicts: Verdicts,
     edges: EdgeColumns,
@@ -69,11 +59,13 @@ def judge_all(
     """Judge every edge that was seen and has a history, over the whole of it."""
     verdicts.count = 0
     for i in range(edges.count):
-        if edges.matched[i] and has_history(edges, i, keys, MIN_BASELINE_S):
+        if edges.is_own_part(i):
+            edges.rebel[i] = edges.links[i] = 0  # it moves with the camera, and is nothing that could be met
+        elif edges.matched[i] and key_frames.has_history(edges, i, keys, MIN_BASELINE_S):
             j = verdicts.count
             verdicts.count += 1
-            verdicts.oldest[j] = oldest_key(edges, i, keys)
-            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines)
+            verdicts.oldest[j] = key_frames.oldest_key(edges, i, keys)
+            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines, around.pinhole)
             rebel_detection.judge(verdicts, j, edges, baselines, around, settings)
     rebel_detection.find_incoming(verdicts, edges, baselines, around, settings)
 
@@ -150,7 +142,7 @@ def decide(
         if middle <= verdicts.oldest[j]:
             wait(edges, i, key, around)
             continue
-        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines)
+        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines, around.pinhole)
         rebel_detection.judge(recent, 0, edges, baselines, around, settings)
         if rebel_detection.agree(verdicts, j, recent, 0, baselines, settings):
             born[births] = j
@@ -171,13 +163,14 @@ def give_births(
     baselines: Baselines,
     born: Integers,
     births: int,
+    around: Situation,
     settings: Settings,
 ) -> None:
     """The first ``births`` of ``born`` become rebels."""
     for b in range(births):
         j = born[b]
         slot = middle_key(verdicts, j, keys, key) % KEYS
-        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines)
+        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines, around.pinhole)
         rebel_detection.give_birth(edges, verdicts, j, recent, 0, baselines.elapsed_s[slot], settings)
 
 

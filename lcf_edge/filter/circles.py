@@ -81,6 +81,7 @@ def give_birth(circles: CircleColumns, c: int, members: Members, g: int, setting
     circles.corr[c] = 1.0
     circles.cause[c] = 0
     circles.ttc[c], circles.range[c], circles.lateral[c] = INFINITY, NAN, NAN
+    circles.unseen_s[c] = 0.0
 
 
 def free_row(circles: CircleColumns) -> int:

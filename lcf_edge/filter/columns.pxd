@@ -1,3 +1,5 @@
+cdef double OWN_PART_S
+
 cdef class EdgeColumns:
     cdef public Py_ssize_t count, capacity
     cdef double[::1] x, y, beta, speed, bl, trust, deviation, origin_x, origin_y
@@ -7,15 +9,17 @@ cdef class EdgeColumns:
     cdef unsigned char[:, ::1] appearance
     cdef unsigned long long[:, ::1] words
     cdef double[::1] predicted_x, predicted_y, predicted_speed, cos, sin, cost
-    cdef int[::1] corner, best, psi
+    cdef int[::1] corner, best, psi, fixed_x, fixed_y
+    cdef double[::1] fixed_s
     cdef bint own_way(self, Py_ssize_t i) noexcept nogil
+    cdef bint is_own_part(self, Py_ssize_t i) noexcept nogil
 
 cdef class CircleColumns:
     cdef public Py_ssize_t capacity
     cdef unsigned char[::1] active, cause
     cdef unsigned int[::1] id
     cdef int[::1] support
-    cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral
+    cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral, unseen_s
 
 cdef class PsiColumns:
     cdef public Py_ssize_t capacity

@@ -5,6 +5,8 @@ from typing import Any
 
 Memory = Mapping[str, Any]
 
+OWN_PART_S = 1.0  # what has not moved a pixel for so long, while the rest flows, moves with the camera
+
 
 class EdgeColumns:
     """Of an ``EdgeTable``; the first ``count`` rows are in use."""
@@ -21,11 +23,16 @@ class EdgeColumns:
         self.appearance, self.words = memory["appearance"], memory["words"]
         self.predicted_x, self.predicted_y = memory["predicted_x"], memory["predicted_y"]
         self.predicted_speed, self.cos, self.sin = memory["predicted_speed"], memory["cos"], memory["sin"]
+        self.fixed_x, self.fixed_y, self.fixed_s = memory["fixed_x"], memory["fixed_y"], memory["fixed_s"]
         self.corner, self.best, self.cost, self.psi = memory["corner"], memory["best"], memory["cost"], memory["psi"]
 
     def own_way(self, i: int) -> bool:
         """Whether an edge follows no flow line: rebels and chains."""
         return self.rebel[i] != 0 or self.links[i] > 0
+
+    def is_own_part(self, i: int) -> bool:
+        """Whether an edge has stayed where it is in the picture: a part of the vehicle, or dirt on the lens."""
+        return self.fixed_s[i] >= OWN_PART_S
 
 
 class CircleColumns:
@@ -43,6 +50,7 @@ class CircleColumns:
         self.speed, self.expansion, self.trust = memory["speed"], memory["expansion"], memory["trust"]
         self.corr, self.width, self.height = memory["corr"], memory["width"], memory["height"]
         self.ttc, self.range, self.lateral = memory["ttc"], memory["range"], memory["lateral"]
+        self.unseen_s = memory["unseen_s"]
 
 
 class PsiColumns:

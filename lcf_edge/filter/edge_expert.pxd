@@ -12,6 +12,8 @@ cdef double MAX_DEVIATION_RAD
 cdef double MIN_ORIGIN_PX
 cdef double MIN_RADIUS_PX
 cdef double STRAY_GATE_SHARE
+cdef int FIXED_PX
+cdef double MAX_FIXED_STEP_S
 cdef double JOIN_GATE_SHARE
 
 cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
@@ -19,7 +21,7 @@ cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Se
 cdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
 cdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
 cpdef void update(EdgeColumns edges, CircleColumns normal, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
-cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner) noexcept nogil
+cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner, double dt_s) noexcept nogil
 cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, double x, double y, double dt_s, Settings settings) noexcept nogil
 cdef void turn_own_way(EdgeColumns edges, Py_ssize_t i) noexcept nogil
 cdef void stray(EdgeColumns edges, Py_ssize_t i, double x0, double y0, CornerColumns corners, Py_ssize_t corner, double dt_s, Settings settings) noexcept nogil

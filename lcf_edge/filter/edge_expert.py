@@ -15,6 +15,8 @@ MAX_DEVIATION_RAD = 0.5  # DL is bounded
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nearer to the focus there is no direction from it
 STRAY_GATE_SHARE = 0.5  # BL of what has just shown how it moves, in shares of BL at birth
+FIXED_PX = 1  # a corner that stays may jump by the width of a pixel
+MAX_FIXED_STEP_S = 0.1  # of one frame: a few pictures minutes apart show no part of the vehicle
 JOIN_GATE_SHARE = 0.25  # and of its own motion, where it is expected to move as its circle
 
 
@@ -95,15 +97,21 @@ def update(
         go_on(edges, i)
         if relation in (edge_equations.FOLLOWS, edge_equations.DISAGREES):
             correct(edges, i, normal, x, y, dt_s, settings)
-            take_corner(edges, i, corners, corner)
+            take_corner(edges, i, corners, corner, dt_s)
         change = edge_equations.trust_change(relation)
         edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
         if relation in (edge_equations.BREAKS, edge_equations.STAYS) and edges.count < edges.capacity:
             stray(edges, i, x0, y0, corners, corner, dt_s, settings)
 
 
-def take_corner(edges: EdgeColumns, i: int, corners: CornerColumns, corner: int) -> None:
-    """An edge was seen, and looks as its corner does."""
+def take_corner(edges: EdgeColumns, i: int, corners: CornerColumns, corner: int, dt_s: float) -> None:
+    """An edge was seen, and looks as its corner does. ``dt_s``: t_f."""
+    away_x, away_y = corners.pixel_x[corner] - edges.fixed_x[i], corners.pixel_y[corner] - edges.fixed_y[i]
+    if max(away_x, -away_x) <= FIXED_PX and max(away_y, -away_y) <= FIXED_PX:
+        edges.fixed_s[i] += min(dt_s, MAX_FIXED_STEP_S)
+    else:
+        edges.fixed_x[i], edges.fixed_y[i] = corners.pixel_x[corner], corners.pixel_y[corner]
+        edges.fixed_s[i] = 0.0
     edges.matched[i] = 1
     edges.words[i, 0], edges.words[i, 1] = corners.words[corner, 0], corners.words[corner, 1]
     corners.taken[corner] = 1
@@ -164,7 +172,7 @@ def stray(
     edges.bl[row] = STRAY_GATE_SHARE * settings.bl0_px
     edges.links[row] = 1
     edges.circle[row] = -1
-    take_corner(edges, row, corners, corner)
+    take_corner(edges, row, corners, corner, dt_s)
 
 
 def delete(edges: EdgeColumns, plane: ImagePlane, dead: Bytes, tr_cr: float) -> None:
@@ -207,7 +215,7 @@ def add(
             edges.speed[row] = first_expansion(x, y, normal, groups, around, settings) * r
             edges.bl[row], edges.trust[row] = settings.bl0_px, settings.tr_new
             edges.born_key[row] = key_number
-            take_corner(edges, row, corners, k)
+            take_corner(edges, row, corners, k, around.dt_s)
 
 
 def first_expansion(
@@ -233,7 +241,7 @@ def join_rebels(edges: EdgeColumns, start: int, circles: CircleColumns, around: 
     ``start``: row of the first of them.
     """
     for i in range(start, edges.count):
-        c = rebel_circles.circle_at(circles, edges.x[i], edges.y[i], settings.tr_s)
+        c = rebel_circles.circle_at(circles, edges.x[i], edges.y[i], settings)
         if c >= 0:
             vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
             vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)

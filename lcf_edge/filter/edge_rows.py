@@ -15,6 +15,8 @@ def copy_row(edges: EdgeColumns, source: int, target: int) -> None:
     edges.born_key[target], edges.circle[target] = edges.born_key[source], edges.circle[source]
     edges.links[target], edges.rebel[target] = edges.links[source], edges.rebel[source]
     edges.held[target], edges.matched[target] = edges.held[source], edges.matched[source]
+    edges.fixed_x[target], edges.fixed_y[target] = edges.fixed_x[source], edges.fixed_y[source]
+    edges.fixed_s[target] = edges.fixed_s[source]
     edges.words[target, 0], edges.words[target, 1] = edges.words[source, 0], edges.words[source, 1]
     for k in range(KEYS):
         edges.key_x[target, k], edges.key_y[target, k] = edges.key_x[source, k], edges.key_y[source, k]
@@ -28,6 +30,8 @@ def empty_row(edges: EdgeColumns, i: int) -> None:
     edges.born_key[i] = edges.links[i] = 0
     edges.circle[i] = -1
     edges.rebel[i] = edges.held[i] = edges.matched[i] = 0
+    edges.fixed_x[i] = edges.fixed_y[i] = 0
+    edges.fixed_s[i] = 0.0
     edges.words[i, 0] = edges.words[i, 1] = 0
     for k in range(KEYS):
         edges.key_x[i, k] = edges.key_y[i, k] = 0.0

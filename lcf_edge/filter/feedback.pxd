@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport alpha, circles, flow, image_plane, normal_circles
+from lcf_edge.filter cimport alpha, circles, flow, image_plane, key_frames, normal_circles
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -11,8 +11,7 @@ from lcf_edge.filter.situation cimport Situation
 cdef double PI
 cdef double RECTANGLE_FITS
 cdef double MIN_PSI_FRAMES
-cdef double MARGIN_PX
-cdef double CIRCLE_MARGIN_PX
+cdef double CIRCLE_MARGINS
 cdef int CIRCLE_SHAPE
 cdef int RECTANGLE_SHAPE
 
@@ -32,5 +31,5 @@ cpdef int write(PsiColumns psi, CircleColumns normal, EdgeColumns edges, Candida
 cdef bint is_near(PsiColumns psi, Py_ssize_t p, double x, double y, double reach_px) noexcept nogil
 cdef void end_near(PsiColumns psi, double x, double y, double reach_px) noexcept nogil
 @cython.locals(inside=bint)
-cdef void end_aside(PsiColumns psi, Candidates candidates, ImagePlane plane) noexcept nogil
-cpdef void give_way(PsiColumns psi, Candidates candidates, EdgeColumns edges, CircleColumns rebel, ImagePlane plane) noexcept nogil
+cdef void end_aside(PsiColumns psi, Candidates candidates, ImagePlane plane, double margin_px) noexcept nogil
+cpdef void give_way(PsiColumns psi, Candidates candidates, EdgeColumns edges, CircleColumns rebel, ImagePlane plane, double margin_px) noexcept nogil

@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import alpha, circles, flow, image_plane, normal_circles
+from lcf_edge.filter import circles, flow, image_plane, key_frames, normal_circles
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane import ImagePlane
@@ -14,8 +14,7 @@ from lcf_edge.filter.situation import Situation
 PI = 3.141592653589793
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
 MIN_PSI_FRAMES = 3.5
-MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
-CIRCLE_MARGIN_PX = 24.0  # and between ψ and a rebel circle
+CIRCLE_MARGINS = 2.0  # kept between ψ and a rebel circle, where an edge that breaks the flow has one
 CIRCLE_SHAPE = 1  # Ty
 RECTANGLE_SHAPE = 2
 
@@ -76,7 +75,7 @@ def keep_watched(candidates: Candidates, normal: CircleColumns, edges: EdgeColum
         c = edges.circle[i]
         if c >= 0 and not edges.rebel[i]:
             candidates.members[c] += 1
-            if alpha.has_history(edges, i, keys, alpha.SURE_BASELINE_S):
+            if key_frames.has_history(edges, i, keys, alpha.SURE_BASELINE_S):
                 candidates.watched[c] += 1
     for c in range(normal.capacity):
         if 2 * candidates.watched[c] <= candidates.members[c]:
@@ -163,7 +162,7 @@ def end_near(psi: PsiColumns, x: float, y: float, reach_px: float) -> None:
             psi.active[p] = 0
 
 
-def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane) -> None:
+def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane, margin_px: float) -> None:
     """End the regions on the path, as in a turn what was beside may come to lie on it, and at the sides of the frame.
 
     At the sides appears what nobody has seen yet.
@@ -171,7 +170,7 @@ def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane) -> Non
     for p in range(psi.capacity):
         if not psi.active[p]:
             continue
-        reach = 0.5 * psi.width[p] + MARGIN_PX
+        reach = 0.5 * psi.width[p] + margin_px
         inside = image_plane.project(plane, psi.x[p] - reach, psi.y[p])
         inside = image_plane.project(plane, psi.x[p] + reach, psi.y[p]) and inside
         if not inside or not candidates.passing[max(psi.circle[p], 0)]:
@@ -179,13 +178,18 @@ def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane) -> Non
 
 
 def give_way(
-    psi: PsiColumns, candidates: Candidates, edges: EdgeColumns, rebel: CircleColumns, plane: ImagePlane
+    psi: PsiColumns,
+    candidates: Candidates,
+    edges: EdgeColumns,
+    rebel: CircleColumns,
+    plane: ImagePlane,
+    margin_px: float,
 ) -> None:
     """End the ψ regions that come near a rebel edge, a chain of α, a rebel circle, the path or the frame's sides."""
-    end_aside(psi, candidates, plane)
+    end_aside(psi, candidates, plane, margin_px)
     for i in range(edges.count):
         if edges.own_way(i):
-            end_near(psi, edges.x[i], edges.y[i], MARGIN_PX)
+            end_near(psi, edges.x[i], edges.y[i], margin_px)
     for c in range(rebel.capacity):
         if rebel.active[c]:
-            end_near(psi, rebel.x[c], rebel.y[c], rebel.radius[c] + CIRCLE_MARGIN_PX)
+            end_near(psi, rebel.x[c], rebel.y[c], rebel.radius[c] + CIRCLE_MARGINS * margin_px)

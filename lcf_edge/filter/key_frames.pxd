@@ -1,5 +1,6 @@
 cimport cython
 from libc cimport math
+from lcf_edge.filter.columns cimport EdgeColumns
 
 cdef int KEYS
 
@@ -13,4 +14,7 @@ cdef class KeyFrames:
 cpdef void turn(KeyFrames keys, const double[:, :, ::1] rotation) noexcept nogil
 cpdef void advance(KeyFrames keys, const double[:, :, ::1] rotation, double ahead_x, double ahead_y, double ahead_z, double way_m, double dt_s) noexcept nogil
 cpdef void inflate(KeyFrames keys, double sigma_rad) noexcept nogil
+cpdef void stop(KeyFrames keys) noexcept nogil
 cpdef int mark(KeyFrames keys) noexcept nogil
+cpdef int oldest_key(EdgeColumns edges, Py_ssize_t i, KeyFrames keys) noexcept nogil
+cpdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double least_s) noexcept nogil

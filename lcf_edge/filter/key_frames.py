@@ -4,6 +4,7 @@ import math
 
 import numpy as np
 
+from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.memory import Doubles, doubles, memory_of
 
@@ -60,6 +61,12 @@ def inflate(keys: KeyFrames, sigma_rad: float) -> None:
         keys.sigma_rad[k] = math.sqrt(keys.sigma_rad[k] * keys.sigma_rad[k] + sigma_rad * sigma_rad)
 
 
+def stop(keys: KeyFrames) -> None:
+    """The vehicle has stood all the while: there was no displacement."""
+    for k in range(KEYS):
+        keys.displacement[k, 0] = keys.displacement[k, 1] = keys.displacement[k, 2] = 0.0
+
+
 def mark(keys: KeyFrames) -> int:
     """Make this instant a key frame; return its slot."""
     slot = keys.number % KEYS
@@ -71,3 +78,14 @@ def mark(keys: KeyFrames) -> int:
     keys.number += 1
     keys.since_s = 0.0
     return slot
+
+
+def oldest_key(edges: EdgeColumns, i: int, keys: KeyFrames) -> int:
+    """Number of the oldest key frame within the window that an edge has seen."""
+    return max(edges.born_key[i], keys.number - KEYS)
+
+
+def has_history(edges: EdgeColumns, i: int, keys: KeyFrames, least_s: float) -> bool:
+    """Whether an edge has been seen for so long."""
+    oldest = oldest_key(edges, i, keys)
+    return oldest < keys.number and keys.elapsed_s[oldest % KEYS] >= least_s

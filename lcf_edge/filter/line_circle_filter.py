@@ -1,7 +1,7 @@
 """The filter: one step takes a frame's corners and the vehicle's motion, and leaves its tables up to date."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -13,17 +13,23 @@ from lcf_edge.filter import (
     edge_expert,
     feedback,
     flow,
+    flow_fit,
     key_frames,
     line_expert,
     matching,
     normal_circles,
     rebel_circles,
-    rebel_detection,
+    rest,
 )
+from lcf_edge.filter import baselines as lines
+from lcf_edge.filter import heading as headings
+from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.flow_fit import FlowFit
+from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import Corners, Motion
 from lcf_edge.filter.key_frames import KeyFrames
@@ -31,9 +37,10 @@ from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.memory import Doubles, integers, memory_of, octets
 from lcf_edge.filter.normal_circles import Flowing
 from lcf_edge.filter.rebel_circles import RebelGroups
-from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.rest import RestTest
 from lcf_edge.filter.settings import Settings
-from lcf_edge.filter.situation import Heading, Situation, follow, turn_heading
+from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, PsiTable
 from lcf_edge.lens import Lens
 from lcf_edge.records import Sizes
@@ -43,6 +50,8 @@ Matrix = npt.NDArray[np.float64]
 SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
 SURPRISES = 3.0  # and by so many times what the gyro lately missed
 GYRO_SIGMAS = 3.0  # within which a rotation is looked for
+NOISE_SHARE = 0.7  # of what stays off the flow lines, which is of two places, is the noise of one
+DELTA_SIGMAS = 4.0  # of it, within which an edge of the flow stays
 FORGET = 0.3  # share of what the gyro missed that the latest frame tells
 
 
@@ -69,15 +78,17 @@ class LineCircleFilter:
         self.psi = PsiTable(memory.psi)
         self.groups = GroupTable(memory.groups)
         self.corners = CornerTable(memory.corners)
-        self._settings = Settings(config.filter)
         self._pinhole = Pinhole(lens.fx, lens.fy, lens.cx, lens.cy)
+        self._settings = Settings(config.filter, self._pinhole)
         self._plane = ImagePlane(lens)
         self._index = CornerIndex(lens.width, lens.height, memory.corners)
         self._heading = Heading(config.camera)
         self._around = Situation(config, self._pinhole)
-        follow(self._around, self._heading, math.nan, 0.0, 1.0)
+        follow(self._around, self._heading.ray_x, self._heading.ray_y, math.nan, 0.0, 1.0)
         self._keys = KeyFrames()
         self._baselines = Baselines()
+        self._fit = FlowFit()
+        self._rest = RestTest()
         self._homography = Homography()
         self._off_line = OffLine()
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
@@ -110,6 +121,7 @@ class LineCircleFilter:
 
     def step(self, corners: Corners, motion: Motion) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive."""
+        motion = self._rested(motion)
         self._take(corners)
         self._derotate(motion)
         self._predict()
@@ -128,6 +140,14 @@ class LineCircleFilter:
             self._sizes(len(corners), omitted, evicted),
         )
 
+    def _rested(self, motion: Motion) -> Motion:
+        """The motion as the picture knows it: where it says that the vehicle stands, no told speed is believed."""
+        self._rest.told_mps = motion.speed_mps
+        if not self._rest.stands:
+            return motion
+        key_frames.stop(self._keys)
+        return replace(motion, speed_mps=0.0)
+
     def _take(self, corners: Corners) -> None:
         """The frame's corners, and the index that finds them by their place."""
         if len(corners) > self.corners.capacity:
@@ -142,8 +162,9 @@ class LineCircleFilter:
     def _derotate(self, motion: Motion) -> None:
         """Step 0, and the predictions of circles and ψ."""
         rotation = _memory(motion.rotation)
-        turn_heading(self._heading, rotation, motion.yaw_rate_radps, motion.dt_s)
-        follow(self._around, self._heading, motion.speed_mps, motion.yaw_rate_radps, motion.dt_s)
+        headings.turn_heading(self._heading, rotation, motion.yaw_rate_radps, motion.dt_s)
+        ray_x, ray_y = self._heading.ray_x, self._heading.ray_y
+        follow(self._around, ray_x, ray_y, motion.speed_mps, motion.yaw_rate_radps, motion.dt_s)
         self._advance_keys(rotation, motion)
         self._warp(rotation)
         normal_circles.predict(self.normal.columns, self._plane, self._around)
@@ -258,13 +279,29 @@ class LineCircleFilter:
         key = bool(alpha.key_is_due(edges, keys, around.dt_s, settings))
         if key:
             alpha.mark_key(edges, keys)
-        rebel_detection.measure_baselines(baselines, keys, self._homography, self._pinhole, around)
+        lines.measure(baselines, keys, self._homography, self._pinhole, around)
+        self._fit_flow()
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         alpha.release_obedient(verdicts, edges, around, settings)
         wanted = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
         births, evicted = self._make_room(wanted)
-        alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, settings)
+        alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, around, settings)
         return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
+
+    def _fit_flow(self) -> None:
+        """What the whole picture tells of rotation, O and noise; the mounting learns from it; whether it stands."""
+        fit, around, heading, pinhole = self._fit, self._around, self._heading, self._pinhole
+        fit.prior_x = headings.focus_sigma_rad(heading.sigma_x) * pinhole.fx
+        fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy
+        flow_fit.measure(fit, self.edges.columns, self._keys, self._baselines, pinhole, self._settings)
+        if fit.count:
+            around.focus_x += fit.focus_x
+            around.focus_y += fit.focus_y
+            around.horizon_y = around.focus_y
+            around.noise_px = max(around.noise_px, NOISE_SHARE * fit.scale_px)
+            around.delta_px = max(around.delta_px, DELTA_SIGMAS * fit.scale_px)
+            headings.learn_mounting(heading, around, fit)
+        rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)
 
     def _make_room(self, wanted: int) -> tuple[int, int]:
         """Room for so many new rebels: weak ones go home. Return how many may be born, and how many found no place."""
@@ -298,7 +335,7 @@ class LineCircleFilter:
             self._ids,
         )
         evicted += feedback.write(psi, normal, edges, candidates, self._keys, around, settings, self._psi_ids)
-        feedback.give_way(psi, candidates, edges, rebel, self._plane)
+        feedback.give_way(psi, candidates, edges, rebel, self._plane, settings.psi_margin_px)
         return int(evicted)
 
     def _sizes(self, corners: int, omitted: int, evicted: int) -> Sizes:

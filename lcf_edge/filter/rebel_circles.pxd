@@ -2,27 +2,32 @@ cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
 from lcf_edge.filter cimport edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
-from lcf_edge.filter.rebel_detection cimport Baselines, Verdicts
+from lcf_edge.filter.rebel_detection cimport Verdicts
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
 cdef double VELOCITY_NOISE_PX
 cdef double STILL_PX
 cdef double LIKE_SPEED
-cdef double MEMBER_MARGIN_PX
 cdef double SIDEWAYS
 cdef double MIN_RANGE_M
 cdef double MIN_RATE
 cdef double RATE_SIGMAS
 cdef double MAX_GROWTH
+cdef double MAX_EXCESS
+cdef double MIN_SHOWN_PX
+cdef double LEADER_HEIGHT_SHARE
+cdef double MAX_RANGE_M
+cdef double MAX_TTC_HORIZONS
 cdef double MIN_EXTENT2_PX
 cdef double FASTEST_EXPANSION
 cdef double LINK_SHARE
 cdef double COAST_SHARE
-cdef double MIN_COAST_PX
+cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE
 cdef int CROSSING
 cdef int INCOMING
@@ -42,9 +47,9 @@ cdef class RebelGroups:
     cdef unsigned char[::1] odd, updated, missed
 
 cpdef void predict(CircleColumns circles, Situation around) noexcept nogil
-cdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, double tr_s) noexcept nogil
+cdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, Settings settings) noexcept nogil
 cpdef void end_outside(CircleColumns circles, ImagePlane plane, Situation around, Settings settings) noexcept nogil
-cdef int circle_at(CircleColumns circles, double x, double y, double tr_s) noexcept nogil
+cdef int circle_at(CircleColumns circles, double x, double y, Settings settings) noexcept nogil
 cdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) noexcept nogil
 cdef double velocity_x(CircleColumns circles, Py_ssize_t c, double x, double horizon_s) noexcept nogil
 cdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double horizon_s) noexcept nogil
@@ -56,13 +61,15 @@ cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Sit
 cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 @cython.locals(few=bint)
-cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Settings settings) noexcept nogil
+cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 @cython.locals(inside=bint)
 cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
 cdef void choose(RebelGroups groups, CircleColumns circles) noexcept nogil
 cdef void involve(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+cpdef double bounded(double size_px, double shown_px) noexcept nogil
 cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef int largest_new(RebelGroups groups) noexcept nogil
 cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
@@ -75,7 +82,7 @@ cdef double finite(double value) noexcept nogil
 @cython.locals(beside=bint, crosses=bint)
 cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint stands, double aside_mps, Situation around) noexcept nogil
 @cython.locals(across=bint)
-cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, double tr_s) noexcept nogil
+cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
 @cython.locals(waits=bint)
 cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -4,29 +4,34 @@ import math
 
 from lcf_edge.filter import circles as shared
 from lcf_edge.filter import edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Integers, doubles, integers, octets
-from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
 LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
-MEMBER_MARGIN_PX = 8.0
 SIDEWAYS = 0.2  # what leads moves to the side with no more than this share of the vehicle's speed
 MIN_RANGE_M = 0.01
 MIN_RATE = 1e-6  # 1/s, slower expansions are none
 RATE_SIGMAS = 2.0  # by which an expansion is above its noise
 MAX_GROWTH = 1.5  # of a circle, in one frame
+MAX_EXCESS = 2.0  # a circle is no larger than what shows it, times this,
+MIN_SHOWN_PX = 12.0  # which is taken for no smaller than this
+LEADER_HEIGHT_SHARE = 0.3  # of the camera's height that a leader has at least; paint and reflections have less
+MAX_RANGE_M = 1000.0  # farther off nothing is known
+MAX_TTC_HORIZONS = 10.0  # and later than so many horizons
 MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
 FASTEST_EXPANSION = 4.0  # of one object, over one horizon
 LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
-MIN_COAST_PX = 40.0  # what is that near is not small
+COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
 CROSSING = 1
 INCOMING = 2
@@ -91,13 +96,13 @@ def predict(circles: CircleColumns, around: Situation) -> None:
         circles.ttc[c] -= around.dt_s
 
 
-def coasts(circles: CircleColumns, c: int, horizon_s: float, tr_s: float) -> bool:
+def coasts(circles: CircleColumns, c: int, horizon_s: float, settings: Settings) -> bool:
     """Whether a trusted circle is so near to contact that it grows too fast to be followed."""
     return (
         circles.active[c] != 0
         and math.fabs(circles.ttc[c]) < COAST_SHARE * horizon_s
-        and max(circles.width[c], circles.height[c]) > MIN_COAST_PX
-        and circles.trust[c] >= tr_s
+        and max(circles.width[c], circles.height[c]) > settings.min_coast_px
+        and circles.trust[c] >= settings.tr_s
     )
 
 
@@ -110,7 +115,7 @@ def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, se
     for c in range(circles.capacity):
         if not circles.active[c]:
             continue
-        half = 0.5 if coasts(circles, c, around.horizon_s, settings.tr_s) else 0.0
+        half = 0.5 if coasts(circles, c, around.horizon_s, settings) else 0.0
         across, down = half * circles.width[c], half * circles.height[c]
         x = circles.x[c] + min(max(around.pinhole.cx - circles.x[c], -across), across)
         y = circles.y[c] + min(max(around.pinhole.cy - circles.y[c], -down), down)
@@ -121,13 +126,13 @@ def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, se
 # Motion of what is inside
 
 
-def circle_at(circles: CircleColumns, x: float, y: float, tr_s: float) -> int:
+def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) -> int:
     """Circle that holds a point, the nearest; -1: none. Only circles from Tr_s up speak for what is inside them."""
     nearest = -1
     least = 0.0
     for c in range(circles.capacity):
-        if circles.active[c] and circles.trust[c] >= tr_s:
-            away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - MEMBER_MARGIN_PX
+        if circles.active[c] and circles.trust[c] >= settings.tr_s:
+            away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - settings.member_margin_px
             if away < least:
                 nearest, least = c, away
     return nearest
@@ -291,8 +296,24 @@ def average(
             members.variance_y[g] += dy * dy / members.size[g]
 
 
-def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, settings: Settings) -> None:
-    """A few odd ones among edges that were seen to follow the flow are mistakes, not an object."""
+def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
+    """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
+
+    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height.
+    """
+    if groups.inwards[g] <= 0.5:
+        return False
+    half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
+    foot = max(members.y[g] + half - around.horizon_y, 0.0)
+    top = members.y[g] - half - around.horizon_y
+    lowest = around.pinhole.focal * around.pitch_sigma_rad
+    return top > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
+
+
+def find_odd(
+    groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings
+) -> None:
+    """A few odd ones among edges that were seen to follow the flow are mistakes, not an object; nor is what is flat."""
     for g in range(groups.groups):
         radius = shared.radius_of(members, g, settings.bs_px)
         for i in range(edges.count):
@@ -301,7 +322,7 @@ def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, settings
                 if dx * dx + dy * dy < radius * radius:
                     groups.flowing[g] += 1
         few = members.size[g] < settings.rebel_share * (members.size[g] + groups.flowing[g])
-        groups.odd[g] = 1 if few else 0
+        groups.odd[g] = 1 if few or is_flat(groups, g, members, around) else 0
 
 
 # Groups and circles
@@ -320,7 +341,7 @@ def vote(
             continue
         for c in range(circles.capacity):
             away = flow.length(edges.x[i] - circles.x[c], edges.y[i] - circles.y[c])
-            inside = circles.active[c] != 0 and away < circles.radius[c] + MEMBER_MARGIN_PX
+            inside = circles.active[c] != 0 and away < circles.radius[c] + settings.member_margin_px
             if inside or c == edges.circle[i]:
                 groups.votes[g, c] += 1
     for g in range(groups.groups):
@@ -378,6 +399,11 @@ def is_aligned(
     return speed <= most and turn < settings.eps_beta_circle_rebel_rad + math.atan2(still, speed)
 
 
+def bounded(size_px: float, shown_px: float) -> float:
+    """An extent, no larger than what shows it lets one believe, px."""
+    return min(size_px, MAX_EXCESS * max(shown_px, MIN_SHOWN_PX))
+
+
 def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
     """A group updates the circle that it is involved in: aligned Tr +1, else -1.
 
@@ -389,8 +415,10 @@ def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation,
     shared.blend(circles, c, groups.members, g, settings)
     slow_width = edge_equations.update_position(trust, settings.tr_cr, width, circles.width[c])
     slow_height = edge_equations.update_position(trust, settings.tr_cr, height, circles.height[c])
-    circles.width[c] = max(circles.width[c], slow_width)
-    circles.height[c] = max(circles.height[c], slow_height)
+    shown_width, shown_height = circles.width[c], circles.height[c]
+    circles.width[c] = bounded(max(shown_width, slow_width), shown_width)
+    circles.height[c] = bounded(max(shown_height, slow_height), shown_height)
+    circles.radius[c] = bounded(circles.radius[c], shared.radius_of(groups.members, g, settings.bs_px))
     circles.trust[c] = edge_equations.change_trust(trust, change, settings.tr_max)
 
 
@@ -465,7 +493,7 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     if math.isfinite(circles.ttc[c]):
         before = 1 / max(circles.ttc[c], MIN_TTC_SHARE * around.horizon_s)
     rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, before, rate)
-    circles.ttc[c] = 1 / rate if rate > MIN_RATE else INFINITY
+    circles.ttc[c] = 1 / rate if rate * MAX_TTC_HORIZONS * around.horizon_s > 1 else INFINITY
 
     on_ground_m = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
     aside_mps = on_ground_m * groups.mean_vx[g] / around.pinhole.fx
@@ -475,6 +503,10 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     if not math.isfinite(around.speed_mps):
         circles.lateral[c] = NAN
         circles.range[c] = NAN if stands else on_ground_m
+    if circles.range[c] > MAX_RANGE_M:
+        circles.range[c] = NAN
+    if math.fabs(circles.lateral[c]) > MAX_RANGE_M:
+        circles.lateral[c] = NAN
     circles.cause[c] = cause_of(groups, g, circles, stands, aside_mps, around)
 
 
@@ -498,13 +530,13 @@ def cause_of(
 # Circles without a group
 
 
-def is_hidden(circles: CircleColumns, c: int, tr_s: float) -> bool:
+def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
     """Whether a circle lies behind another one that will be met earlier."""
-    if circles.trust[c] < tr_s or not math.isfinite(circles.ttc[c]):
+    if circles.trust[c] < settings.tr_s or not math.isfinite(circles.ttc[c]):
         return False
     for o in range(circles.capacity):
-        if circles.active[o] and circles.trust[o] >= tr_s and circles.ttc[o] < circles.ttc[c]:
-            reach = circles.radius[o] + MEMBER_MARGIN_PX
+        if circles.active[o] and circles.trust[o] >= settings.tr_s and circles.ttc[o] < circles.ttc[c]:
+            reach = circles.radius[o] + settings.member_margin_px
             across = math.fabs(circles.x[c] - circles.x[o]) < max(0.5 * circles.width[o], reach)
             if across and math.fabs(circles.y[c] - circles.y[o]) < max(0.5 * circles.height[o], reach):
                 return True
@@ -512,9 +544,11 @@ def is_hidden(circles: CircleColumns, c: int, tr_s: float) -> bool:
 
 
 def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """Unmatched circles lose trust, except those that coast and those that are hidden; they end without it."""
+    """Unmatched circles lose trust, except those that coast and those that are hidden, for a while; they end without it."""
     for c in range(circles.capacity):
-        waits = coasts(circles, c, around.horizon_s, settings.tr_s) or is_hidden(circles, c, settings.tr_s)
+        circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
+        waits = coasts(circles, c, around.horizon_s, settings) or is_hidden(circles, c, settings)
+        waits = waits and circles.unseen_s[c] < COAST_TIME_SHARE * around.horizon_s
         groups.missed[c] = 1 if circles.active[c] and not groups.updated[c] and not waits else 0
     for c in range(circles.capacity):
         if groups.missed[c]:
@@ -545,7 +579,7 @@ def update(
     cluster(groups, verdicts, edges, around, settings)
     number_groups(groups, settings.rebel_support)
     average(groups, groups.members, verdicts, edges, baselines, around)
-    find_odd(groups, groups.members, edges, settings)
+    find_odd(groups, groups.members, edges, around, settings)
     involve(groups, verdicts, edges, circles, settings)
     for g in range(groups.groups):
         if groups.circle[g] >= 0:

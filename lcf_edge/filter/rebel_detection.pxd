@@ -1,21 +1,20 @@
 cimport cython
 from libc cimport math
+from lcf_edge.filter cimport baselines as lines
 from lcf_edge.filter cimport flow, path
+from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
-from lcf_edge.filter.flow cimport Homography, Pinhole
-from lcf_edge.filter.key_frames cimport KeyFrames
+from lcf_edge.filter.flow cimport Pinhole
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
-cdef int KEYS
 cdef double ROOT_2
 cdef double NEAREST_M
 cdef double MAX_FOCUS_SHARE
 cdef double PARALLAX_DRIFT
-cdef double STILL_M
 cdef double LINK_RATIO
 cdef double GROUND_DIPS
-cdef double NEIGHBOUR_PX
+cdef double COMMON_NOISE_PX
 cdef double ALIKE_SIGMAS
 cdef double NEAR_PATH
 cdef double NEAR_SIGMAS
@@ -32,27 +31,22 @@ cdef double CLOSING_NOISE_SIGMAS
 cdef double MIN_FIRST_LINK_PX
 cdef double MAX_DEVIATION_RAD
 
-cdef class Baselines:
-    cdef public double[:, ::1] h
-    cdef public double[::1] focus_x, focus_y, depth_m, elapsed_s, sigma_px
-
 cdef class Verdicts:
     cdef public Py_ssize_t count
     cdef public int[::1] row, slot, oldest, near
-    cdef public double[::1] x, y, r, drift, short, over, outward, expansion, inverse, doubt
+    cdef public double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
     cdef public unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
     cdef double shared, ground, total
 
-cpdef void measure_baselines(Baselines baselines, KeyFrames keys, Homography h, Pinhole pinhole, Situation around) noexcept nogil
-cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines) noexcept nogil
+cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines, Pinhole pinhole) noexcept nogil
 @cython.locals(drifts=bint)
 cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cdef double ground_outward(double y, double lever, Situation around) noexcept nogil
-cdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Baselines baselines, Settings settings) noexcept nogil
+cdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Situation around) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
-cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
-cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around) noexcept nogil
+cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef void find_incoming(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines, Settings settings) noexcept nogil

@@ -8,11 +8,11 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 
 import math
 
+from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import flow, path
+from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
-from lcf_edge.filter.flow import Homography, Pinhole
-from lcf_edge.filter.inputs import KEYS
-from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
@@ -21,10 +21,9 @@ ROOT_2 = 1.4142135623730951
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 MAX_FOCUS_SHARE = 0.5  # of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
 PARALLAX_DRIFT = 0.25  # share of its way outwards that a corner between two things at different depths drifts
-STILL_M = 1e-3  # a displacement below this has no direction
 LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
 GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
-NEIGHBOUR_PX = 28.0  # edges nearer than this, at a like depth, tell it together
+COMMON_NOISE_PX = 0.3  # noise above this is no longer of each edge alone, and neighbours do not average it out
 ALIKE_SIGMAS = 2.0  # of both, by which neighbours at a like depth differ in inverse range
 NEAR_PATH = 1.5  # half widths from the path, within which edges are looked at
 NEAR_SIGMAS = 2.0  # by which such an edge may move slower than it should
@@ -42,43 +41,13 @@ MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
 MAX_DEVIATION_RAD = 0.5  # DL is bounded
 
 
-class Baselines:
-    """What the displacement since each key frame implies for a picture; a row a slot of ``KeyFrames``.
-
-    ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
-    ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: uncertainty of the rotation since.
-    """
-
-    def __init__(self) -> None:
-        self.h = doubles(KEYS, 9)
-        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (doubles(KEYS) for _ in range(5))
-
-
-def measure_baselines(
-    baselines: Baselines, keys: KeyFrames, h: Homography, pinhole: Pinhole, around: Situation
-) -> None:
-    """What the key frames tell about this frame. ``h``: room for a homography."""
-    for k in range(KEYS):
-        flow.set_homography(h, pinhole, keys.rotation, k)
-        baselines.h[k, 0], baselines.h[k, 1], baselines.h[k, 2] = h.xx, h.xy, h.xw
-        baselines.h[k, 3], baselines.h[k, 4], baselines.h[k, 5] = h.yx, h.yy, h.yw
-        baselines.h[k, 6], baselines.h[k, 7], baselines.h[k, 8] = h.wx, h.wy, h.ww
-        ahead = keys.displacement[k, 2]
-        baselines.focus_x[k], baselines.focus_y[k] = around.focus_x, around.focus_y
-        if math.fabs(ahead) > STILL_M:
-            baselines.focus_x[k] = keys.displacement[k, 0] / ahead * pinhole.fx + pinhole.cx
-            baselines.focus_y[k] = keys.displacement[k, 1] / ahead * pinhole.fy + pinhole.cy
-        baselines.depth_m[k], baselines.elapsed_s[k] = ahead, keys.elapsed_s[k]
-        baselines.sigma_px[k] = keys.sigma_rad[k] * pinhole.focal
-
-
 class Verdicts:
     """Edges held against the flow of what stands still, over their history since a key frame; a row an edge.
 
     ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: where the edge was then, derotated to now,
     px. ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
     it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
-    per second, 1/s. ``mover``, ``incoming``: the verdict.
+    per second, 1/s. ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
 
     ``near``: rows that may stand near the path, with the inverse range of each (``inverse``, 1/m) and its sigma
     (``doubt``). ``shared``, ``ground``, ``total``: what the neighbours of one of them tell together, see
@@ -91,18 +60,20 @@ class Verdicts:
         self.x, self.y, self.r, self.drift = (doubles(capacity) for _ in range(4))
         self.short, self.over, self.outward, self.expansion = (doubles(capacity) for _ in range(4))
         self.mover, self.incoming = (octets(capacity) for _ in range(2))
-        self.inverse, self.doubt = (doubles(capacity) for _ in range(2))
+        self.sigma, self.inverse, self.doubt = (doubles(capacity) for _ in range(3))
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
 
 
-def link(verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines) -> None:
+def link(
+    verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole
+) -> None:
     """Where edge ``i`` was at the key frame in ``slot``, derotated to now."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
-    scale = 1 / (baselines.h[slot, 6] * key_x + baselines.h[slot, 7] * key_y + baselines.h[slot, 8])
+    x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
     verdicts.row[j], verdicts.slot[j] = i, slot
-    verdicts.x[j] = (baselines.h[slot, 0] * key_x + baselines.h[slot, 1] * key_y + baselines.h[slot, 2]) * scale
-    verdicts.y[j] = (baselines.h[slot, 3] * key_x + baselines.h[slot, 4] * key_y + baselines.h[slot, 5]) * scale
+    verdicts.x[j], verdicts.y[j] = x, y
+    verdicts.sigma[j] = lines.sigma_along(baselines, pinhole, slot, x, y)
 
 
 def judge(
@@ -129,7 +100,7 @@ def judge(
         verdicts.over[j] = outward - r * math.fabs(depth_m) / NEAREST_M
         verdicts.short[j] = ground_outward(edges.y[i], r * math.fabs(depth_m), around) - outward
     astray = settings.focus_sigma_px * min(math.fabs(outward) / r, MAX_FOCUS_SHARE)
-    tolerance = baselines.sigma_px[slot] + astray + settings.delta_rebel_px
+    tolerance = verdicts.sigma[j] + astray + around.delta_px
     drifts = math.fabs(drift) > tolerance + PARALLAX_DRIFT * math.fabs(outward)
     verdicts.mover[j] = 1 if drifts or max(verdicts.short[j], verdicts.over[j]) > tolerance else 0
     verdicts.incoming[j] = 0
@@ -144,9 +115,9 @@ def ground_outward(y: float, lever: float, around: Situation) -> float:
     return lever * max(below, 0.0) / (around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
 
 
-def sigma_px(verdicts: Verdicts, j: int, baselines: Baselines, settings: Settings) -> float:
+def sigma_px(verdicts: Verdicts, j: int, around: Situation) -> float:
     """1 sigma of how far an edge went, px: of its two places, and of the rotation between."""
-    return baselines.sigma_px[verdicts.slot[j]] + ROOT_2 * settings.edge_noise_px
+    return verdicts.sigma[j] + ROOT_2 * around.noise_px
 
 
 def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
@@ -155,13 +126,13 @@ def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
 
 
 def near_path(
-    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation
 ) -> None:
     """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MAX_CANDIDATES``."""
     near = 0
     reach_m = around.speed_mps * around.horizon_s
     for j in range(verdicts.count):
-        sigma = sigma_px(verdicts, j, baselines, settings)
+        sigma = sigma_px(verdicts, j, around)
         lever = lever_of(verdicts, j, baselines)
         outward = verdicts.outward[j]
         if verdicts.mover[j] or lever <= 0 or (outward + NEAR_SIGMAS * sigma) * reach_m <= lever:
@@ -178,10 +149,10 @@ def near_path(
         lever = lever_of(verdicts, j, baselines)
         verdicts.near[a] = j
         verdicts.inverse[a] = verdicts.outward[j] / lever
-        verdicts.doubt[a] = sigma_px(verdicts, j, baselines, settings) / lever
+        verdicts.doubt[a] = sigma_px(verdicts, j, around) / lever
 
 
-def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation) -> None:
+def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
     """1/Z of a candidate, and of the ground below, by least squares over its neighbours at a like depth.
 
     ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
@@ -192,7 +163,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situa
     for b in range(verdicts.near_count):
         k = verdicts.row[verdicts.near[b]]
         dx, dy = edges.x[i] - edges.x[k], edges.y[i] - edges.y[k]
-        if dx * dx + dy * dy >= NEIGHBOUR_PX * NEIGHBOUR_PX:
+        if dx * dx + dy * dy >= settings.neighbour_px * settings.neighbour_px:
             continue
         apart = math.fabs(verdicts.inverse[a] - verdicts.inverse[b])
         if apart >= ALIKE_SIGMAS * (verdicts.doubt[a] + verdicts.doubt[b]):
@@ -213,7 +184,8 @@ def will_be_met(
     i, shared = verdicts.row[j], verdicts.shared
     focal = around.pinhole.focal
     reach_m = around.speed_mps * around.horizon_s
-    doubt = 1 / math.sqrt(verdicts.total) + baselines.sigma_px[verdicts.slot[j]] / lever_of(verdicts, j, baselines)
+    shared_px = verdicts.sigma[j] + max(around.noise_px - COMMON_NOISE_PX, 0.0)  # errors that neighbours share
+    doubt = 1 / math.sqrt(verdicts.total) + shared_px / lever_of(verdicts, j, baselines)
     range_m = 1 / max(shared, MIN_INVERSE_RANGE)
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
     excess = shared
@@ -240,9 +212,9 @@ def find_incoming(
     """
     if not around.speed_mps > 0:
         return
-    near_path(verdicts, edges, baselines, around, settings)
+    near_path(verdicts, edges, baselines, around)
     for a in range(verdicts.near_count):
-        ask_neighbours(verdicts, a, edges, around)
+        ask_neighbours(verdicts, a, edges, around, settings)
         verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, baselines, around, settings) else 0
 
 

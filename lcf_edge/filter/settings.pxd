@@ -4,4 +4,5 @@ cdef class Settings:
     cdef public double eps_beta_rad, eps_v, eps_beta_rebel_rad, eps_v_rebel, eps_beta_circle_rebel_rad
     cdef public double eps_v_circle_rebel, involvement, rebel_share, rebel_link_px, edge_noise_px, focus_sigma_px
     cdef public double ground_margin, pitch_sigma_rad, psi_life_s
+    cdef public double neighbour_px, member_margin_px, min_coast_px, psi_margin_px
     cdef public int circle_support, rebel_support

@@ -1,17 +1,40 @@
 """The keys of ``filter`` as the loops take them; meanings and units as in the configuration."""
 
+import math
+
 from lcf_edge.config import Filter
+from lcf_edge.filter.flow import Pinhole
+
+REFERENCE_FOCAL_PX = 320 / math.tan(0.525)  # of 640 px over 1.05 rad, the camera that px of the configuration mean
+NEIGHBOUR_PX = 28.0  # edges nearer than this, at a like depth, tell it together
+MEMBER_MARGIN_PX = 8.0  # around a rebel circle, within which edges may be its own
+MIN_COAST_PX = 40.0  # what is so near that it grows too fast to be followed is not small
+PSI_MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
+# However few px a radian has, corners lie some px apart.
+MIN_LINK_PX = 8.0
+MIN_CIRCLE_PX = 9.6
+MIN_NEIGHBOUR_PX = 6.4
+MIN_MEMBER_MARGIN_PX = 3.0
+MIN_MIN_COAST_PX = 15.0
+MIN_PSI_MARGIN_PX = 5.0
+MIN_FOCUS_SIGMA_PX = 1.0
 
 
 class Settings:
-    """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s)."""
+    """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s).
 
-    def __init__(self, settings: Filter) -> None:
+    Extents of things and angles are px of ``pinhole``: what the configuration has in px is meant at a focal length of
+    ``REFERENCE_FOCAL_PX``, so that it holds for every size of picture and every lens. Gates and noise of corners are px
+    of whatever picture.
+    """
+
+    def __init__(self, settings: Filter, pinhole: Pinhole) -> None:
+        scale = pinhole.focal / REFERENCE_FOCAL_PX
         self.tr_cr, self.tr_s, self.tr_max = settings.tr_cr, settings.tr_s, settings.tr_max
         self.tr_new = 0.5 * (settings.tr_cr + settings.tr_s)
         self.delta_px, self.delta_rebel_px = settings.delta_px, settings.delta_rebel_px
         self.bl0_px, self.bl_min_px, self.leap_px = settings.bl0_px, settings.bl_min_px, settings.leap_px
-        self.bs_px, self.scene_depth_m = settings.bs_px, settings.scene_depth_m
+        self.bs_px, self.scene_depth_m = max(settings.bs_px * scale, MIN_CIRCLE_PX), settings.scene_depth_m
         self.appearance_max, self.appearance_share = settings.appearance_max, settings.appearance_share
         self.key_interval_s, self.key_motion_px = settings.key_interval_s, settings.key_motion_px
         self.eps_beta_rad, self.eps_v = settings.eps_beta_rad, settings.eps_v
@@ -20,6 +43,11 @@ class Settings:
         self.eps_v_circle_rebel = settings.eps_v_circle_rebel
         self.involvement, self.rebel_share = settings.involvement, settings.rebel_share
         self.circle_support, self.rebel_support = settings.circle_support, settings.rebel_support
-        self.rebel_link_px, self.edge_noise_px = settings.rebel_link_px, settings.edge_noise_px
-        self.focus_sigma_px, self.ground_margin = settings.focus_sigma_px, settings.ground_margin
+        self.rebel_link_px = max(settings.rebel_link_px * scale, MIN_LINK_PX)
+        self.neighbour_px = max(NEIGHBOUR_PX * scale, MIN_NEIGHBOUR_PX)
+        self.member_margin_px = max(MEMBER_MARGIN_PX * scale, MIN_MEMBER_MARGIN_PX)
+        self.min_coast_px = max(MIN_COAST_PX * scale, MIN_MIN_COAST_PX)
+        self.psi_margin_px = max(PSI_MARGIN_PX * scale, MIN_PSI_MARGIN_PX)
+        self.edge_noise_px, self.ground_margin = settings.edge_noise_px, settings.ground_margin
+        self.focus_sigma_px = max(settings.focus_sigma_px * scale, MIN_FOCUS_SIGMA_PX)
         self.pitch_sigma_rad, self.psi_life_s = settings.pitch_sigma_rad, settings.psi_life_s

@@ -87,6 +87,9 @@ EDGE_COLUMNS = (
     Column("held", "inside ψ: predicted without being looked for", "", ("line_expert",), np.bool_),
     Column("matched", "its corner was found in this frame, or it is new", "", ("edge_expert",), np.bool_),
     Column("appearance", "grey samples around its corner", "grey", ("edge_expert",), np.uint8, (APPEARANCE_SAMPLES,)),
+    Column("fixed_x", "pixel of the input frame that its corner has not left by more than one", "px", ("edge_expert",), np.int32),
+    Column("fixed_y", "as fixed_x", "px", ("edge_expert",), np.int32),
+    Column("fixed_s", "for how long it has not", "s", ("edge_expert",)),
     Column("predicted_x", "L', in this frame", "px", ("edge_expert", "derotation")),
     Column("predicted_y", "L', in this frame", "px", ("edge_expert", "derotation")),
     Column("predicted_speed", "V', in this frame", "px/s", ("edge_expert",)),
@@ -117,6 +120,7 @@ CIRCLE_COLUMNS = (
     Column("ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles")),
     Column("range", "of C_r, NaN: unknown", "m", ("circles", "rebel_circles")),
     Column("lateral", "miss to the side of the path, right positive, NaN: unknown", "m", ("circles", "rebel_circles")),
+    Column("unseen_s", "of C_r: since edges last showed it", "s", ("circles", "rebel_circles")),
 )
 """C_n and C_r, a table each."""
 

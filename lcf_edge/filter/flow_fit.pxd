@@ -1,0 +1,59 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport baselines as lines
+from lcf_edge.filter cimport flow, key_frames, least_squares, rounding
+from lcf_edge.filter.baselines cimport Baselines
+from lcf_edge.filter.columns cimport EdgeColumns
+from lcf_edge.filter.flow cimport Pinhole
+from lcf_edge.filter.key_frames cimport KeyFrames
+from lcf_edge.filter.least_squares cimport NormalEquations
+from lcf_edge.filter.settings cimport Settings
+
+cdef int KEYS
+cdef int MIN_EDGES
+cdef int MAX_EDGES
+cdef double MIN_ELAPSED_S
+cdef double MIN_R_PX
+cdef int COLUMNS
+cdef int ROWS
+cdef double CELL_EDGES
+cdef double NOISE_PX
+cdef double RATE_SIGMA_RADPS
+cdef double WINDOW_S
+cdef int ROUNDS
+cdef double NARROWING
+cdef double MIN_WIDTH_PX
+cdef double FIRST_WIDTH
+cdef int SLOT_EDGES
+cdef int SLOT_ROUNDS
+cdef double SLOT_WIDTH_PX
+cdef double SLOT_SHARE
+cdef double SLOT_SIGMA_RAD
+cdef double SCALE_SHARE
+cdef double SCALE_SIGMAS
+cdef int BINS
+cdef double BIN_PX
+cdef int UNKNOWNS
+cdef int FOCUS_X
+cdef int FOCUS_Y
+
+cdef class FlowFit:
+    cdef public int count
+    cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px
+    cdef public double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, rest
+    cdef public int[::1] slot, cell, cells, bins
+    cdef public NormalEquations equations
+
+cpdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
+cpdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
+cpdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
+cpdef double quantile(FlowFit fit, double share) noexcept nogil
+cpdef double weight_of(double rest_px, double width_px) noexcept nogil
+cpdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
+cpdef double explained(FlowFit fit) noexcept nogil
+cpdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
+cpdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
+cpdef void turn_slot(FlowFit fit, int k, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
+cpdef int slot_edges(FlowFit fit, int k) noexcept nogil
+cpdef void apply(FlowFit fit, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
+cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil

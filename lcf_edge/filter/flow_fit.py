@@ -1,0 +1,270 @@
+"""What all edges together tell of the camera, over the window of key frames: errors of its rotation, and of O.
+
+What the gyro gets wrong in one frame hardly shows; over the window it does. An edge that stands still, was seen t
+seconds ago r px from the focus, and went outward by μ·r since, lies off its flow line by
+
+    drift = t·(a·ω) + μ·(sin β·ΔO_x - cos β·ΔO_y) + noise
+
+with ω the error of the rotation's rate, a the px across the flow for a turn of 1 rad about each axis, and ΔO the
+error of the focus. Least squares over edges from all over the picture, robust against what moves, gives ω and ΔO with
+their covariance; a second one gives each key frame that edges enough have seen a rotation of its own. How far edges
+stay off their lines after that (``scale_px``) tells how far they can be believed.
+"""
+
+import math
+
+from lcf_edge.filter import baselines as lines
+from lcf_edge.filter import flow, key_frames, least_squares, rounding
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.least_squares import NormalEquations
+from lcf_edge.filter.memory import doubles, integers
+from lcf_edge.filter.settings import Settings
+
+MIN_EDGES = 15
+MAX_EDGES = 320  # and so many are enough
+MIN_ELAPSED_S = 0.15  # over a shorter time an edge tells nothing
+MIN_R_PX = 6.0  # nearer to the focus there is no flow line
+COLUMNS = 8  # cells of the picture, that count alike however many edges they hold
+ROWS = 6
+CELL_EDGES = 6.0  # edges of a cell that count fully
+NOISE_PX = 0.6  # 1 sigma of the drift of an edge that stands
+RATE_SIGMA_RADPS = 0.03  # of ω at least, over a window of ``WINDOW_S``, less over longer ones
+WINDOW_S = 0.75
+ROUNDS = 8
+NARROWING = 0.7  # of the width beyond which an edge is an outlier, from round to round,
+MIN_WIDTH_PX = 0.7  # down to this
+FIRST_WIDTH = 3.0  # of the median drift, to begin with
+SLOT_EDGES = 20  # for a rotation of a key frame's own
+SLOT_ROUNDS = 3
+SLOT_WIDTH_PX = 1.0
+SLOT_SHARE = 0.3  # of the sigma of ω, by which key frames may differ,
+SLOT_SIGMA_RAD = 0.002  # and at least by this
+SCALE_SHARE = 0.35  # of the edges stay nearer to their lines than the quantile that tells the scale: movers do not,
+SCALE_SIGMAS = 0.4538  # which is so many sigmas of a normal distribution
+BINS = 256  # of a histogram of distances,
+BIN_PX = 0.05  # each so wide
+UNKNOWNS = 5
+FOCUS_X = 3
+FOCUS_Y = 4
+
+
+class FlowFit:
+    """The fit of one frame.
+
+    ``count``: edges behind it, 0: too few, and the rest is as of no fit. ``focus_x``, ``focus_y``: ΔO, px;
+    ``focus_sigma_x``, ``focus_sigma_y``: 1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``scale_px``: 1
+    sigma of what stays off the flow lines.
+
+    A row an edge: ``drift``, px; ``pitch``, ``yaw``, ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: what ΔO does to
+    the drift; ``share``: weight by its cell; ``slot``; ``cell``; ``rest``: what is left of the drift, px.
+    """
+
+    def __init__(self) -> None:
+        self.count = 0
+        self.focus_x = self.focus_y = self.scale_px = 0.0
+        self.focus_sigma_x = self.focus_sigma_y = self.prior_x = self.prior_y = 0.0
+        self.drift, self.pitch, self.yaw, self.roll = (doubles(MAX_EDGES) for _ in range(4))
+        self.elapsed_s, self.on_x, self.on_y, self.share = (doubles(MAX_EDGES) for _ in range(4))
+        self.rest = doubles(MAX_EDGES)
+        self.slot, self.cell = (integers(MAX_EDGES) for _ in range(2))
+        self.cells = integers(COLUMNS * ROWS)
+        self.bins = integers(BINS)
+        self.equations = NormalEquations()
+
+
+def tells(edges: EdgeColumns, i: int, keys: KeyFrames, settings: Settings) -> bool:
+    """Whether an edge tells about the flow: found in this frame, trusted, and seen for long enough."""
+    return (
+        edges.matched[i] != 0
+        and edges.trust[i] >= settings.tr_new
+        and not edges.is_own_part(i)
+        and key_frames.has_history(edges, i, keys, MIN_ELAPSED_S)
+    )
+
+
+def gather(
+    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, settings: Settings
+) -> None:
+    """Take the edges that tell, at most ``MAX_EDGES``, evenly."""
+    fit.count = 0
+    telling = 0
+    for i in range(edges.count):
+        if tells(edges, i, keys, settings):
+            telling += 1
+    stride = 1 + telling // MAX_EDGES
+    telling = 0
+    for c in range(COLUMNS * ROWS):
+        fit.cells[c] = 0
+    for i in range(edges.count):
+        if tells(edges, i, keys, settings):
+            if telling % stride == 0:
+                note(fit, edges, i, key_frames.oldest_key(edges, i, keys) % KEYS, baselines, pinhole)
+            telling += 1
+    for k in range(fit.count):
+        fit.share[k] = min(1.0, CELL_EDGES / fit.cells[fit.cell[k]])
+
+
+def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole) -> None:
+    """Note one edge: its drift since the key frame in ``slot``, and what each unknown would make of it."""
+    x = lines.then_x(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
+    y = lines.then_y(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
+    dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
+    r = flow.length(dx, dy)
+    if r <= MIN_R_PX:
+        return
+    k = fit.count
+    cos, sin = dx / r, dy / r
+    moved_x, moved_y = edges.x[i] - x, edges.y[i] - y
+    mu = (moved_x * cos + moved_y * sin) / r
+    fit.drift[k] = flow.line_distance(moved_x, moved_y, cos, sin)
+    fit.pitch[k] = lines.turn_px(pinhole, 0, x, y, -sin, cos)
+    fit.yaw[k] = lines.turn_px(pinhole, 1, x, y, -sin, cos)
+    fit.roll[k] = lines.turn_px(pinhole, 2, x, y, -sin, cos)
+    fit.elapsed_s[k], fit.slot[k] = baselines.elapsed_s[slot], slot
+    fit.on_x[k], fit.on_y[k] = mu * sin, -mu * cos
+    column = min(max(0.5 * x / pinhole.cx * COLUMNS, 0.0), COLUMNS - 1.0)
+    row = min(max(0.5 * y / pinhole.cy * ROWS, 0.0), ROWS - 1.0)
+    fit.cell[k] = rounding.whole(row) * COLUMNS + rounding.whole(column)
+    fit.cells[fit.cell[k]] += 1
+    fit.count += 1
+
+
+def quantile(fit: FlowFit, share: float) -> float:
+    """Distance that this share of the edges stay within, px, of ``rest``; at most ``BINS``·``BIN_PX``."""
+    for b in range(BINS):
+        fit.bins[b] = 0
+    for k in range(fit.count):
+        fit.bins[rounding.whole(min(math.fabs(fit.rest[k]) / BIN_PX, BINS - 1.0))] += 1
+    wanted = share * fit.count
+    below = 0.0
+    for b in range(BINS):
+        if below + fit.bins[b] >= wanted:
+            return BIN_PX * (b + (wanted - below) / max(fit.bins[b], 1))
+        below += fit.bins[b]
+    return BIN_PX * BINS
+
+
+def weight_of(rest_px: float, width_px: float) -> float:
+    """Weight of an edge by what is left of its drift (Geman and McClure): what moves by itself hardly counts."""
+    ratio = rest_px / width_px
+    outlying = 1 + ratio * ratio
+    return 1 / (outlying * outlying)
+
+
+def set_row(fit: FlowFit, k: int) -> None:
+    """What each unknown does to the drift of an edge."""
+    t = fit.elapsed_s[k]
+    fit.equations.row[0], fit.equations.row[1], fit.equations.row[2] = t * fit.pitch[k], t * fit.yaw[k], t * fit.roll[k]
+    fit.equations.row[FOCUS_X], fit.equations.row[FOCUS_Y] = fit.on_x[k], fit.on_y[k]
+
+
+def explained(fit: FlowFit) -> float:
+    """Drift that the answer explains of the edge whose row was set, px."""
+    drift = 0.0
+    for i in range(fit.equations.unknowns):
+        drift += fit.equations.row[i] * fit.equations.answer[i]
+    return drift
+
+
+def rate_sigma(fit: FlowFit, baselines: Baselines, focal: float) -> float:
+    """1 sigma of ω before the fit, rad/s: of the gyro, as its key frames add it up, but never too sure."""
+    longest, sigma = WINDOW_S, 0.0
+    for k in range(fit.count):
+        t = fit.elapsed_s[k]
+        longest = max(longest, t)
+        sigma = max(sigma, baselines.sigma_px[fit.slot[k]] / focal / t)
+    return max(RATE_SIGMA_RADPS * WINDOW_S / longest, sigma)
+
+
+def solve(fit: FlowFit, sigma_radps: float) -> None:
+    """ω and ΔO, round by round narrower."""
+    for k in range(fit.count):
+        fit.rest[k] = fit.drift[k]
+    width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5))
+    for _ in range(ROUNDS):
+        least_squares.begin(fit.equations, UNKNOWNS)
+        for i in range(3):
+            least_squares.add_prior(fit.equations, i, NOISE_PX * NOISE_PX / (sigma_radps * sigma_radps))
+        least_squares.add_prior(fit.equations, FOCUS_X, NOISE_PX * NOISE_PX / (fit.prior_x * fit.prior_x))
+        least_squares.add_prior(fit.equations, FOCUS_Y, NOISE_PX * NOISE_PX / (fit.prior_y * fit.prior_y))
+        for k in range(fit.count):
+            set_row(fit, k)
+            least_squares.add(fit.equations, fit.share[k] * weight_of(fit.rest[k], width), fit.drift[k])
+        least_squares.solve(fit.equations)
+        for k in range(fit.count):
+            set_row(fit, k)
+            fit.rest[k] = fit.drift[k] - explained(fit)
+        width = max(MIN_WIDTH_PX, NARROWING * width)
+
+
+def turn_slot(fit: FlowFit, k: int, baselines: Baselines, pinhole: Pinhole, sigma_rad: float) -> None:
+    """A rotation of key frame ``k``'s own, of what is left."""
+    fit.equations.answer[0] = fit.equations.answer[1] = fit.equations.answer[2] = 0.0
+    for _ in range(SLOT_ROUNDS):
+        least_squares.begin(fit.equations, 3)
+        for i in range(3):
+            least_squares.add_prior(fit.equations, i, NOISE_PX * NOISE_PX / (sigma_rad * sigma_rad))
+        turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
+        for j in range(fit.count):
+            if fit.slot[j] == k:
+                fit.equations.row[0], fit.equations.row[1], fit.equations.row[2] = fit.pitch[j], fit.yaw[j], fit.roll[j]
+                left = fit.rest[j] - (turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j])
+                least_squares.add(fit.equations, weight_of(left, SLOT_WIDTH_PX), fit.rest[j])
+        least_squares.solve(fit.equations)
+    turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
+    for j in range(fit.count):
+        if fit.slot[j] == k:
+            fit.rest[j] -= turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j]
+    lines.turn(baselines, k, pinhole, turn_x, turn_y, turn_z)
+
+
+def slot_edges(fit: FlowFit, k: int) -> int:
+    """Edges that were first seen at key frame ``k``."""
+    edges = 0
+    for j in range(fit.count):
+        if fit.slot[j] == k:
+            edges += 1
+    return edges
+
+
+def apply(fit: FlowFit, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
+    """Correct the baselines by ω and ΔO, and note what stays uncertain."""
+    turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
+    fit.focus_x, fit.focus_y = fit.equations.answer[FOCUS_X], fit.equations.answer[FOCUS_Y]
+    least_squares.invert(fit.equations)
+    fit.scale_px = quantile(fit, SCALE_SHARE) / SCALE_SIGMAS
+    variance = max(NOISE_PX, fit.scale_px) * max(NOISE_PX, fit.scale_px)
+    fit.focus_sigma_x = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_X, FOCUS_X])
+    fit.focus_sigma_y = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_Y, FOCUS_Y])
+    for i in range(3):
+        for j in range(3):
+            baselines.rate_covariance[i, j] = variance * fit.equations.inverse[i, j]
+    baselines.is_fitted = True
+    for k in range(KEYS):
+        t = baselines.elapsed_s[k]
+        baselines.focus_x[k] += fit.focus_x
+        baselines.focus_y[k] += fit.focus_y
+        lines.turn(baselines, k, pinhole, t * turn_x, t * turn_y, t * turn_z)
+        if slot_edges(fit, k) >= SLOT_EDGES:
+            sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, baselines.sigma_px[k] / pinhole.focal)
+            turn_slot(fit, k, baselines, pinhole, sigma_rad)
+    fit.scale_px = quantile(fit, SCALE_SHARE) / SCALE_SIGMAS
+
+
+def measure(
+    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, settings: Settings
+) -> None:
+    """Fit the frame, and correct the baselines by it. ``prior_x``, ``prior_y`` must be set."""
+    fit.focus_x = fit.focus_y = fit.scale_px = 0.0
+    fit.focus_sigma_x, fit.focus_sigma_y = fit.prior_x, fit.prior_y
+    gather(fit, edges, keys, baselines, pinhole, settings)
+    if fit.count < MIN_EDGES:
+        fit.count = 0
+        return
+    sigma_radps = rate_sigma(fit, baselines, pinhole.focal)
+    solve(fit, sigma_radps)
+    apply(fit, baselines, pinhole, sigma_radps)

@@ -1,0 +1,24 @@
+from libc cimport math
+from lcf_edge.filter.flow_fit cimport FlowFit
+from lcf_edge.filter.situation cimport Situation
+
+cdef double PITCH_MEMORY_S
+cdef double YAW_MEMORY_S
+cdef double MOUNTING_SIGMA_RAD
+cdef double SHAKE_SIGMA_RAD
+cdef double MOUNTING_DRIFT_RAD
+cdef double FIT_WINDOW_S
+cdef double MAX_MOUNTING_SIGMAS
+cdef double LEVER_WIDTHS
+cdef double MIN_SPEED_MPS
+cdef double MIN_VARIANCE
+
+cdef class Heading:
+    cdef public double mounted_x, mounted_y, ray_x, ray_y, sigma_x, sigma_y
+
+cpdef void turn_heading(Heading heading, const double[:, :, ::1] rotation, double yaw_rate_radps, double dt_s) noexcept nogil
+cpdef double focus_sigma_rad(double mounting_sigma_rad) noexcept nogil
+cpdef void learn_mounting(Heading heading, Situation around, FlowFit fit) noexcept nogil
+cpdef double unpulled(double shift_rad, double prior_rad, double sigma_rad) noexcept nogil
+cpdef double mounting_gain(double mounting_rad, double prior_rad, double sigma_rad, double aside_rad, double dt_s) noexcept nogil
+cpdef double drifted(double sigma_rad, double gain, double dt_s) noexcept nogil

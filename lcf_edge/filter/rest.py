@@ -1,0 +1,81 @@
+"""Whether the vehicle stands, as the picture tells: the ground, which must flow when it drives, does not."""
+
+import math
+
+from lcf_edge.filter import baselines as lines
+from lcf_edge.filter import flow, key_frames
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.situation import Situation
+
+MIN_BASELINE_S = 0.2  # motion over less than this is not told from noise
+MIN_EDGES = 25
+MIN_GROUND_EDGES = 8
+MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is told
+STILL_PX = 0.5  # less than half of the edges go farther than this,
+STILL_GROUND_PX = 1.0  # and more than half of those on the ground no farther than this,
+STILL_SHARE = 0.3  # nor than this share of what they must
+
+
+class RestTest:
+    """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
+
+    ``stands``: the verdict. ``told_mps``: the speed by IMU, odometry or configuration; NaN: unknown.
+    """
+
+    def __init__(self) -> None:
+        self.edges = self.still = self.ground = self.still_ground = 0
+        self.stands = False
+        self.told_mps = 0.0
+
+
+def latest_key(keys: KeyFrames) -> int:
+    """Number of the latest key frame that is ``MIN_BASELINE_S`` old, -1: none."""
+    number = keys.number - 1
+    while number >= 0 and number >= keys.number - KEYS:
+        if keys.elapsed_s[number % KEYS] >= MIN_BASELINE_S:
+            return number
+        number -= 1
+    return -1
+
+
+def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, around: Situation) -> None:
+    """Note one edge: how far it went since a key frame, and how far the ground there must have gone."""
+    key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
+    x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
+    way = flow.length(edges.x[i] - x, edges.y[i] - y)
+    r = flow.length(x - baselines.focus_x[slot], y - baselines.focus_y[slot])
+    focal = around.pinhole.focal
+    below = max(edges.y[i] - around.horizon_y - focal * around.pitch_sigma_rad, 0.0)
+    driven_m = math.fabs(test.told_mps) * baselines.elapsed_s[slot]
+    expected = r * driven_m * below / (around.camera_height_m * focal)
+    test.edges += 1
+    if way < STILL_PX:
+        test.still += 1
+    if expected > MIN_FLOW_PX:
+        test.ground += 1
+        if way < min(STILL_GROUND_PX, STILL_SHARE * expected):
+            test.still_ground += 1
+
+
+def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
+    """Set ``stands``. Without ground in sight it stays as it was for as long as nothing moves."""
+    stood = test.stands
+    test.stands = False
+    test.edges = test.still = test.ground = test.still_ground = 0
+    number = latest_key(keys)
+    known = math.isfinite(test.told_mps) and test.told_mps != 0 and around.camera_height_m > 0
+    if number < 0 or not known:
+        return
+    for i in range(edges.count):
+        seen = edges.matched[i] != 0 and not edges.is_own_part(i)
+        if seen and key_frames.oldest_key(edges, i, keys) <= number:
+            look(test, edges, i, number % KEYS, baselines, around)
+    if test.edges < MIN_EDGES or 2 * test.still <= test.edges:
+        return
+    if test.ground < MIN_GROUND_EDGES:
+        test.stands = stood
+    else:
+        test.stands = 2 * test.still_ground > test.ground
