@@ -22,6 +22,8 @@ NOTHING = "nothing"
 NAMES = (FILTER, *PEERS)
 """The methods that find circles."""
 
+_CALIBRATED_RADPS = 1e-3  # 1 sigma of a bias that has been taken out
+
 
 class Method(Protocol):
     """One method on one drive."""
@@ -55,6 +57,7 @@ class PeerMethod:
         self.peer = peer
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._camera = config.camera
+        self._motion.bias.see_rest(np.zeros(3), _CALIBRATED_RADPS)  # a peer has nothing to teach it with
 
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take a sample, in stamp order."""

@@ -2,16 +2,20 @@
 
 import math
 
-from lcf_edge.filter import flow
+from lcf_edge.filter import flow, least_squares
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.least_squares import NormalEquations
 from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.settings import Settings
 
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
 MIN_EDGES = 25  # that a correction of the rotation needs
 MAX_EDGES = 200  # and that are enough
-ROUNDS = 2
+ROUNDS = 3
+WEAK_RAD = 1.0  # prior for what the flow alone tells
+SCATTER = 0.17  # of edges that lie as corners should, see ``weigh``
+MIN_SIGMA_PX = 0.15  # errors that corners of one frame share
 
 
 def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
@@ -53,13 +57,16 @@ class OffLine:
     """Edges that tell about the rotation, a row each, at most ``MAX_EDGES``.
 
     ``pitch``, ``yaw``, ``roll``: px across the flow line for 1 rad about x, y and z; ``px``: distance from it. The
-    answer: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad.
+    answer: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad. ``alone``, ``alone_sigma``: (3,), the same rotation
+    and 1 sigma of it as the flow tells it by itself, without the gyro's prior.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.pitch, self.yaw, self.roll, self.px = (doubles(MAX_EDGES) for _ in range(4))
         self.turn_x = self.turn_y = self.turn_z = self.sigma = 0.0
+        self.alone, self.alone_sigma = (doubles(3) for _ in range(2))
+        self.equations = NormalEquations()
 
 
 def tells_rotation(edges: EdgeColumns, i: int, tr_s: float) -> bool:
@@ -103,37 +110,54 @@ def off_line(off: OffLine, edges: EdgeColumns, i: int, corners: CornerColumns, p
     off.count += 1
 
 
-def missing_rotation(off: OffLine, prior_sigma_rad: float) -> None:
+def missing_rotation(off: OffLine, focal: float, prior_sigma_rad: float) -> None:
     """The small rotation that puts edges back on their flow lines, and what stays uncertain of it.
 
     Least squares, robust against what moves, with the gyro's uncertainty as prior: (Σ w·aᵀa + prior)·turn = Σ w·a·px,
-    a = (pitch, yaw, roll) of an edge, w = 1/(1 + (rest/2σ)²)².
+    a = (pitch, yaw, roll) of an edge, w = 1/(1 + (rest/2σ)²)². What the flow tells by itself is the less certain the
+    more the edges scatter.
     """
     prior = CORNER_SIGMA_PX / prior_sigma_rad
     prior = prior * prior
     off.turn_x = off.turn_y = off.turn_z = 0.0
+    scatter = 0.0
     for _ in range(ROUNDS):
-        xx = yy = zz = prior
-        xy = xz = yz = x = y = z = 0.0
-        for k in range(off.count):
-            a, b, c, px = off.pitch[k], off.yaw[k], off.roll[k], off.px[k]
-            rest = (px - (off.turn_x * a + off.turn_y * b + off.turn_z * c)) * (0.5 / CORNER_SIGMA_PX)
-            outlying = 1 + rest * rest
-            weight = 1 / (outlying * outlying)
-            xx += weight * a * a
-            xy += weight * a * b
-            xz += weight * a * c
-            yy += weight * b * b
-            yz += weight * b * c
-            zz += weight * c * c
-            x += weight * a * px
-            y += weight * b * px
-            z += weight * c * px
-        # by the adjugate of the symmetric matrix
-        ix, iy, iz = yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy
-        jy, jz, kz = xx * zz - xz * xz, xy * xz - xx * yz, xx * yy - xy * xy
-        determinant = xx * ix + xy * iy + xz * iz
-        off.turn_x = (ix * x + iy * y + iz * z) / determinant
-        off.turn_y = (iy * x + jy * y + jz * z) / determinant
-        off.turn_z = (iz * x + jz * y + kz * z) / determinant
-        off.sigma = CORNER_SIGMA_PX * math.sqrt(max(ix, jy) / determinant)  # of pitch and yaw
+        scatter = weigh(off, prior)
+        least_squares.solve(off.equations)
+        off.turn_x, off.turn_y = off.equations.answer[0], off.equations.answer[1]
+        off.turn_z = off.equations.answer[2]
+    weak = CORNER_SIGMA_PX / WEAK_RAD
+    for i in range(3):
+        off.equations.matrix[i, i] += weak * weak - prior
+    least_squares.solve(off.equations)
+    for i in range(3):
+        off.alone[i] = off.equations.answer[i]
+    least_squares.invert(off.equations)
+    doubt = max(1.0, scatter / SCATTER)
+    shared = MIN_SIGMA_PX / focal
+    for i in range(3):
+        variance = CORNER_SIGMA_PX * CORNER_SIGMA_PX * off.equations.inverse[i, i] + shared * shared
+        off.alone_sigma[i] = doubt * doubt * math.sqrt(variance)
+        off.equations.matrix[i, i] += prior - weak * weak
+    least_squares.factorise(off.equations)
+    least_squares.invert(off.equations)
+    off.sigma = CORNER_SIGMA_PX * math.sqrt(max(off.equations.inverse[0, 0], off.equations.inverse[1, 1]))
+
+
+def weigh(off: OffLine, prior: float) -> float:
+    """Enter all edges, weighed by what the rotation found so far leaves of them.
+
+    Return the mean of q/(1 + q), q = (rest/2σ)²: how much they scatter.
+    """
+    scatter = 0.0
+    least_squares.begin(off.equations, 3)
+    for i in range(3):
+        least_squares.add_prior(off.equations, i, prior)
+    for k in range(off.count):
+        a, b, c, px = off.pitch[k], off.yaw[k], off.roll[k], off.px[k]
+        rest = (px - (off.turn_x * a + off.turn_y * b + off.turn_z * c)) * (0.5 / CORNER_SIGMA_PX)
+        outlying = 1 + rest * rest
+        off.equations.row[0], off.equations.row[1], off.equations.row[2] = a, b, c
+        least_squares.add(off.equations, 1 / (outlying * outlying), px)
+        scatter += 1 - 1 / outlying
+    return scatter / max(off.count, 1)

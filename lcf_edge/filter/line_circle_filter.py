@@ -56,11 +56,27 @@ FORGET = 0.3  # share of what the gyro missed that the latest frame tells
 
 
 @dataclass(frozen=True, slots=True)
+class Residual:
+    """The rotation that the flow alone shows to be missing, without the gyro's prior.
+
+    ``turn_rad``: rotation vector (3,) of directions, as in ``Motion.rotation``; ``sigma_rad``: (3,), 1 sigma.
+    """
+
+    turn_rad: npt.NDArray[np.float64]
+    sigma_rad: npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
-    """What one step tells besides the tables. ``omitted``: bool (corners,), inside ψ."""
+    """What one step tells besides the tables.
+
+    ``omitted``: bool (corners,), inside ψ. ``residual``: the rotation that the gyro missed, None: too few edges tell
+    it.
+    """
 
     omitted: Mask
     sizes: Sizes
+    residual: Residual | None
 
 
 class LineCircleFilter:
@@ -128,7 +144,7 @@ class LineCircleFilter:
         omitted = self._omit()
         evicted = self._collect()
         self._find(motion)
-        sigma_rad = self._refine(motion)
+        sigma_rad, residual = self._refine(motion)
         self._update(sigma_rad)
         evicted += self._add()
         rebels, left = self._detect()
@@ -138,6 +154,7 @@ class LineCircleFilter:
         return Step(
             np.asarray(self.corners.omitted[: len(corners)].copy()),
             self._sizes(len(corners), omitted, evicted),
+            residual,
         )
 
     def _rested(self, motion: Motion) -> Motion:
@@ -218,12 +235,14 @@ class LineCircleFilter:
         gyro_px = GYRO_SIGMAS * motion.rotation_sigma_rad * self._pinhole.focal
         return min(gyro_px, SURPRISE_PX + SURPRISES * self._missing_px, self._settings.leap_px)
 
-    def _refine(self, motion: Motion) -> float:
-        """Take out the rotation that the gyro missed; return what stays uncertain, rad."""
+    def _refine(self, motion: Motion) -> tuple[float, Residual | None]:
+        """Take out the rotation that the gyro missed; return what stays uncertain, rad, and what the flow tells."""
+        residual = None
         sigma_rad, off, edges = motion.rotation_sigma_rad, self._off_line, self.edges.columns
         corners, settings = self.corners.columns, self._settings
         if sigma_rad > 0 and derotation.measure_off_line(off, edges, corners, self._pinhole, settings):
-            derotation.missing_rotation(off, sigma_rad)
+            derotation.missing_rotation(off, self._pinhole.focal, sigma_rad)
+            residual = Residual(np.array(off.alone), np.array(off.alone_sigma))
             a, b, c, sigma_rad = off.turn_x, off.turn_y, off.turn_z, off.sigma
             rotation = _memory(np.array([[1.0, -c, b], [c, 1.0, -a], [-b, a, 1.0]]))
             self._missing_px += FORGET * (math.hypot(a, b) * self._pinhole.focal - self._missing_px)
@@ -233,7 +252,7 @@ class LineCircleFilter:
         else:
             self._missing_px = settings.leap_px  # lost: look everywhere
         key_frames.inflate(self._keys, sigma_rad)
-        return sigma_rad
+        return sigma_rad, residual
 
     def _update(self, sigma_rad: float) -> None:
         """Edges classified, updated, deleted."""

@@ -15,6 +15,7 @@ from lcf_edge.filter import derotation
 from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography, warp_x, warp_y
 from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.line_circle_filter import Residual
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
@@ -131,13 +132,16 @@ def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int 
     return edges, corners
 
 
-def missing_rotation(edges: EdgeTable, corners: CornerTable, sigma_rad: float) -> tuple[npt.NDArray[np.float64], float]:
-    """The rotation that the gyro missed, (3, 3), and what stays uncertain of it."""
+def missing_rotation(
+    edges: EdgeTable, corners: CornerTable, sigma_rad: float
+) -> tuple[npt.NDArray[np.float64], float, Residual]:
+    """The rotation that the gyro missed, (3, 3), what stays uncertain of it, and what the flow tells by itself."""
     off = OffLine()
     for row in range(edges.count):
         derotation.off_line(off, edges.columns, row, corners.columns, PINHOLE)
-    derotation.missing_rotation(off, sigma_rad)
-    return np.eye(3) + np.cross(np.eye(3), [off.turn_x, off.turn_y, off.turn_z]), off.sigma
+    derotation.missing_rotation(off, PINHOLE.focal, sigma_rad)
+    alone = Residual(np.array(off.alone), np.array(off.alone_sigma))
+    return np.eye(3) + np.cross(np.eye(3), [off.turn_x, off.turn_y, off.turn_z]), off.sigma, alone
 
 
 @given(st.tuples(angle, angle, angle), st.integers(0, 1000))
