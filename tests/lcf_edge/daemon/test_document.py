@@ -23,6 +23,7 @@ TESTS = {
     "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_told",
     "disk full, or gone": "test_a_disk_that_takes_nothing_costs_the_recording_only",
     "memory short": "test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so",
+    "file descriptors used up by connections": "test_without_descriptors_it_lives_tells_and_reads_its_configuration",
     "board hot": "test_a_board_that_is_hot_is_told",
 }
 
