@@ -41,13 +41,7 @@ def access_control(prefix: str) -> dict[str, Any]:
     """Zenoh's rules for everybody: reading, asking, and the speed."""
 
     def taken_in(name: str, messages: list[str], *keys: str) -> dict[str, Any]:
-        return {
-            "id": name,
-            "permission": "allow",
-            "flows": ["ingress"],
-            "messages": messages,
-            "key_exprs": [f"{prefix}/{key}" for key in keys],
-        }
+        return {"id": name, "permission": "allow", "flows": ["ingress"], "messages": messages, "key_exprs": list(keys)}
 
     out = {
         "id": "out",
@@ -58,10 +52,10 @@ def access_control(prefix: str) -> dict[str, Any]:
     }
     rules = [
         out,
-        taken_in("subscribed to", ["declare_subscriber"], "scene", "preview/compressed", "diagnostics"),
-        taken_in("asked", ["query"], "query/*"),
-        taken_in("asked whether alive", ["declare_liveliness_subscriber", "liveliness_query"], "@alive/*"),
-        taken_in("speed", ["put"], "speed"),
+        taken_in("subscribed to", ["declare_subscriber"], "**"),
+        taken_in("asked", ["query"], "**"),
+        taken_in("asked whether alive", ["declare_liveliness_subscriber", "liveliness_query"], f"{prefix}/@alive/**"),
+        taken_in("speed", ["put"], f"{prefix}/speed"),
     ]
     return {
         "enabled": True,

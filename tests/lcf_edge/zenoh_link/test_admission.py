@@ -14,6 +14,7 @@ from lcf_edge.zenoh_link.admission import settings
 
 ALLOWED_MIB = 10.0
 SILENCE_S = 0.3
+PATIENCE_S = 20.0
 
 Daemon = subprocess.Popen[str]
 
@@ -64,6 +65,14 @@ def test_a_local_process_cannot_speak_for_the_rover(local: Callable[[], Any]) ->
     told = [one for key in keys for one in (*planner.receive(key, 3, SILENCE_S), *planner.get(key, SILENCE_S))]
     assert told
     assert b"fake" not in {one if isinstance(one, str) else one.payload for one in told}
+
+
+def test_a_local_process_may_read_by_wildcards(local: Callable[[], Any]) -> None:
+    reader = local()
+    reader.subscribe("**")
+    assert reader.receive("**", 1, PATIENCE_S)
+    assert reader.get("lcf/**")
+    assert reader.tokens("lcf/@alive/**") == ["lcf/@alive/rover"]
 
 
 def test_large_messages_do_not_fill_its_memory(local: Callable[[], Any], daemon: Daemon) -> None:
