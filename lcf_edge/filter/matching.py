@@ -131,10 +131,18 @@ def choose(
             corner = index.order[place]
             if not corners.free[corner]:
                 continue
+            far = DISTANCE_COST * math.sqrt(away2)
+            if (
+                edges.best[i] >= 0
+                and far >= edges.cost[i]
+                and corners.edge[corner] >= 0
+                and far >= corners.cost[corner]
+            ):
+                continue  # however alike, it suits neither of them better
             unlike = difference(edges, i, index, place)
             if unlike >= most:
                 continue
-            cost = unlike + DISTANCE_COST * math.sqrt(away2)
+            cost = unlike + far
             if edges.best[i] < 0 or cost < edges.cost[i]:
                 edges.best[i], edges.cost[i] = corner, cost
             if corners.edge[corner] < 0 or cost < corners.cost[corner]:
