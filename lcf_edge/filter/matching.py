@@ -132,13 +132,9 @@ def choose(
             if not corners.free[corner]:
                 continue
             far = DISTANCE_COST * math.sqrt(away2)
-            if (
-                edges.best[i] >= 0
-                and far >= edges.cost[i]
-                and corners.edge[corner] >= 0
-                and far >= corners.cost[corner]
-            ):
-                continue  # however alike, it suits neither of them better
+            edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]
+            if edge_has_better and corners.edge[corner] >= 0 and far >= corners.cost[corner]:
+                continue  # however alike they look
             unlike = difference(edges, i, index, place)
             if unlike >= most:
                 continue

@@ -137,7 +137,7 @@ PSI_COLUMNS = (
     Column("new", "corners without an edge", "1", ("line_expert",), np.int32),
     Column(
         "live",
-        "a list: rows that were in use at the start of this frame, the last first",
+        "a list: the rows in use before corners are omitted, the last first",
         "row",
         ("line_expert",),
         np.int32,
