@@ -22,11 +22,11 @@ cdef class CircleColumns:
     cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral, unseen_s
 
 cdef class PsiColumns:
-    cdef public Py_ssize_t capacity
+    cdef public Py_ssize_t capacity, live_count
     cdef unsigned char[::1] active, shape
     cdef unsigned int[::1] id
     cdef double[::1] x, y, width, height, trust, expansion, life_s
-    cdef int[::1] circle, edges, missing, new
+    cdef int[::1] circle, edges, missing, new, live
 
 cdef class GroupColumns:
     cdef public Py_ssize_t count, capacity

@@ -54,7 +54,7 @@ class CircleColumns:
 
 
 class PsiColumns:
-    """Of a ``PsiTable``."""
+    """Of a ``PsiTable``. ``live_count``: entries of ``live``."""
 
     def __init__(self, memory: Memory) -> None:
         self.capacity = len(memory["x"])
@@ -67,6 +67,8 @@ class PsiColumns:
         self.x, self.y, self.width, self.height = memory["x"], memory["y"], memory["width"], memory["height"]
         self.trust, self.expansion, self.life_s = memory["trust"], memory["expansion"], memory["life_s"]
         self.edges, self.missing, self.new = memory["edges"], memory["missing"], memory["new"]
+        self.live_count = 0
+        self.live = memory["live"]
 
 
 class GroupColumns:

@@ -21,11 +21,11 @@ MIN_SIGMA_PX = 0.15  # errors that corners of one frame share
 def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
     """H = K·R·K⁻¹ on every stored place of the edges; own directions turn with the picture. ``roll``: rad."""
     for i in range(edges.count):
-        x, y = edges.x[i], edges.y[i]
-        edges.x[i], edges.y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+        flow.warp(h, edges.x[i], edges.y[i])
+        edges.x[i], edges.y[i] = h.x, h.y
         if edges.own_way(i):
-            x, y = edges.origin_x[i], edges.origin_y[i]
-            edges.origin_x[i], edges.origin_y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+            flow.warp(h, edges.origin_x[i], edges.origin_y[i])
+            edges.origin_x[i], edges.origin_y[i] = h.x, h.y
             edges.beta[i] += roll
 
 
@@ -33,8 +33,8 @@ def derotate_circles(circles: CircleColumns, h: Homography, roll: float) -> None
     """H = K·R·K⁻¹ on the centres of circles; their directions turn with the picture."""
     for c in range(circles.capacity):
         if circles.active[c]:
-            x, y = circles.x[c], circles.y[c]
-            circles.x[c], circles.y[c] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+            flow.warp(h, circles.x[c], circles.y[c])
+            circles.x[c], circles.y[c] = h.x, h.y
             circles.beta[c] += roll
 
 
@@ -42,15 +42,15 @@ def derotate_psi(psi: PsiColumns, h: Homography) -> None:
     """H = K·R·K⁻¹ on the centres of ψ."""
     for p in range(psi.capacity):
         if psi.active[p]:
-            x, y = psi.x[p], psi.y[p]
-            psi.x[p], psi.y[p] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+            flow.warp(h, psi.x[p], psi.y[p])
+            psi.x[p], psi.y[p] = h.x, h.y
 
 
 def derotate_predictions(edges: EdgeColumns, h: Homography) -> None:
     """H = K·R·K⁻¹ on L'."""
     for i in range(edges.count):
-        x, y = edges.predicted_x[i], edges.predicted_y[i]
-        edges.predicted_x[i], edges.predicted_y[i] = flow.warp_x(h, x, y), flow.warp_y(h, x, y)
+        flow.warp(h, edges.predicted_x[i], edges.predicted_y[i])
+        edges.predicted_x[i], edges.predicted_y[i] = h.x, h.y
 
 
 class OffLine:

@@ -8,10 +8,10 @@ cdef class Pinhole:
 
 cdef class Homography:
     cdef double xx, xy, xw, yx, yy, yw, wx, wy, ww
+    cdef readonly double x, y
 
 cpdef double wrap(double angle) noexcept nogil
 cpdef double line_distance(double dx, double dy, double cos, double sin) noexcept nogil
 cdef double length(double dx, double dy) noexcept nogil
 cpdef void set_homography(Homography h, Pinhole pinhole, const double[:, :, ::1] rotation, Py_ssize_t k) noexcept nogil
-cpdef double warp_x(Homography h, double x, double y) noexcept nogil
-cpdef double warp_y(Homography h, double x, double y) noexcept nogil
+cpdef void warp(Homography h, double x, double y) noexcept nogil

@@ -37,11 +37,15 @@ class Pinhole:
 
 
 class Homography:
-    """H = K·R·K⁻¹, row after row: where the picture of distant points goes when the camera turns."""
+    """H = K·R·K⁻¹, row after row: where the picture of distant points goes when the camera turns.
+
+    ``x``, ``y``: the place that ``warp`` found, px.
+    """
 
     def __init__(self) -> None:
         self.xx = self.yy = self.ww = 1.0
         self.xy = self.xw = self.yx = self.yw = self.wx = self.wy = 0.0
+        self.x = self.y = 0.0
 
 
 def set_homography(h: Homography, pinhole: Pinhole, rotation: Doubles, k: int) -> None:
@@ -57,11 +61,8 @@ def set_homography(h: Homography, pinhole: Pinhole, rotation: Doubles, k: int) -
     h.ww = rotation[k, 2, 2] - pinhole.cx * h.wx - pinhole.cy * h.wy
 
 
-def warp_x(h: Homography, x: float, y: float) -> float:
-    """x of an image position after a homography, px."""
-    return (h.xx * x + h.xy * y + h.xw) / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)
-
-
-def warp_y(h: Homography, x: float, y: float) -> float:
-    """y of an image position after a homography, px."""
-    return (h.yx * x + h.yy * y + h.yw) / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)
+def warp(h: Homography, x: float, y: float) -> None:
+    """Set ``x``, ``y`` of a homography to where it takes an image position, px."""
+    scale = 1 / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)
+    h.x = (h.xx * x + h.xy * y + h.xw) * scale
+    h.y = (h.yx * x + h.yy * y + h.yw) * scale

@@ -13,7 +13,7 @@ cdef int CIRCLE_SHAPE
 
 cdef bint holds(PsiColumns psi, Py_ssize_t p, double x, double y) noexcept nogil
 cpdef int psi_at(PsiColumns psi, double x, double y) noexcept nogil
-cdef bint any_active(PsiColumns psi) noexcept nogil
+cpdef void list_live(PsiColumns psi) noexcept nogil
 @cython.locals(seen=bint, beside=bint)
 cpdef bint coincides(CornerIndex index, ImagePlane plane, CornerColumns corners, double x, double y, double reach_px) noexcept nogil
 cdef void place_in_psi(PsiColumns psi, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, double reach_px) noexcept nogil

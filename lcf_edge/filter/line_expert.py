@@ -23,19 +23,21 @@ def holds(psi: PsiColumns, p: int, x: float, y: float) -> bool:
 
 
 def psi_at(psi: PsiColumns, x: float, y: float) -> int:
-    """Row of the ψ region that holds a point, px; -1: none. Where regions overlap, the last row."""
-    for p in range(psi.capacity - 1, -1, -1):
-        if psi.active[p] and holds(psi, p, x, y):
+    """Row of the ψ region that holds a point, px, of those that are listed; -1: none. Where they overlap, the last."""
+    for k in range(psi.live_count):
+        p = psi.live[k]
+        if holds(psi, p, x, y):
             return p
     return -1
 
 
-def any_active(psi: PsiColumns) -> bool:
-    """Whether there are ψ regions at all."""
-    active = 0
-    for p in range(psi.capacity):
-        active += psi.active[p]
-    return active > 0
+def list_live(psi: PsiColumns) -> None:
+    """List the rows in use, the last first."""
+    psi.live_count = 0
+    for p in range(psi.capacity - 1, -1, -1):
+        if psi.active[p]:
+            psi.live[psi.live_count] = p
+            psi.live_count += 1
 
 
 def coincides(
@@ -127,7 +129,8 @@ def omit(
         edges.held[i] = 0
     for k in range(corners.count):
         corners.omitted[k] = 0
-    if not any_active(psi):
+    list_live(psi)
+    if psi.live_count == 0:
         return 0
     place_in_psi(psi, index, plane, edges, corners, settings.bl_min_px)
     end_surprised(psi)

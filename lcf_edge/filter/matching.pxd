@@ -33,6 +33,7 @@ cpdef double difference(EdgeColumns edges, Py_ssize_t i, CornerIndex index, Py_s
 @cython.locals(total=int)
 cpdef double contrast(EdgeColumns edges, Py_ssize_t i) noexcept nogil
 cpdef double likeness_needed(double own_contrast, Settings settings) noexcept nogil
+@cython.locals(edge_has_better=bint)
 cdef void choose(CornerIndex index, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, double x, double y, double gate, double most) noexcept nogil
 cdef double gate_px(EdgeColumns edges, Py_ssize_t i, double slack_px, bint wide, Settings settings) noexcept nogil
 @cython.locals(nothing_there=bint)

@@ -131,10 +131,14 @@ def choose(
             corner = index.order[place]
             if not corners.free[corner]:
                 continue
+            far = DISTANCE_COST * math.sqrt(away2)
+            edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]
+            if edge_has_better and corners.edge[corner] >= 0 and far >= corners.cost[corner]:
+                continue  # however alike they look
             unlike = difference(edges, i, index, place)
             if unlike >= most:
                 continue
-            cost = unlike + DISTANCE_COST * math.sqrt(away2)
+            cost = unlike + far
             if edges.best[i] < 0 or cost < edges.cost[i]:
                 edges.best[i], edges.cost[i] = corner, cost
             if corners.edge[corner] < 0 or cost < corners.cost[corner]:

@@ -139,6 +139,13 @@ PSI_COLUMNS = (
     Column("edges", "edges under it, in this frame", "1", ("line_expert",), np.int32),
     Column("missing", "those without a corner", "1", ("line_expert",), np.int32),
     Column("new", "corners without an edge", "1", ("line_expert",), np.int32),
+    Column(
+        "live",
+        "a list: the rows in use before corners are omitted, the last first",
+        "row",
+        ("line_expert",),
+        np.int32,
+    ),
 )
 """ψ, regions that are ignored."""
 
@@ -242,7 +249,8 @@ class EdgeTable(Table):
         n = self.count
         chains = (self.links[:n] > 0) & ~self.rebel[:n]
         excess_chains = max(0, int(np.count_nonzero(chains)) - self.chain_capacity)
-        self.links[self.least_trusted(chains, excess_chains)] = 0
+        if excess_chains:
+            self.links[self.least_trusted(chains, excess_chains)] = 0
         excess = max(0, -self.normal_room())
         if excess:
             dead = np.zeros(n, np.bool_)

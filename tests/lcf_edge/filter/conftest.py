@@ -142,6 +142,7 @@ def _situation(*, speed_mps: float = 2.0, yaw_rate_radps: float = 0.0, **changes
 
 def _psi_at(psi: PsiTable, x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.int32]:
     """Row of the ψ region that holds each point, -1: none."""
+    line_expert.list_live(psi.columns)
     places = zip(x.tolist(), y.tolist(), strict=True)
     return np.array([line_expert.psi_at(psi.columns, *place) for place in places], np.int32)
 

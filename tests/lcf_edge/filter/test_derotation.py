@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Filter
-from lcf_edge.filter import derotation
+from lcf_edge.filter import derotation, flow
 from lcf_edge.filter.derotation import OffLine
-from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography, warp_x, warp_y
+from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.line_circle_filter import Residual
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
@@ -37,9 +37,11 @@ def homography(rotation: npt.NDArray[np.float64]) -> Homography:
 
 def warp(rotation: npt.NDArray[np.float64], x: npt.NDArray[Any], y: npt.NDArray[Any]) -> npt.NDArray[np.float64]:
     """(2, n) places after a rotation."""
-    h = homography(rotation)
-    places = list(zip(x.tolist(), y.tolist(), strict=True))
-    return np.array([[warp_x(h, *place) for place in places], [warp_y(h, *place) for place in places]])
+    h, places = homography(rotation), []
+    for place in zip(x.tolist(), y.tolist(), strict=True):
+        flow.warp(h, *place)
+        places.append((h.x, h.y))
+    return np.array(places).T
 
 
 def derotate(

@@ -34,6 +34,7 @@ def ids(tables: LineCircleFilter) -> dict[int, int]:
 
 def inside(tables: LineCircleFilter, at: npt.NDArray[np.float32]) -> npt.NDArray[np.bool_]:
     """Which places (n, 2) lie inside ψ."""
+    line_expert.list_live(tables.psi.columns)
     return np.array([line_expert.psi_at(tables.psi.columns, *place) >= 0 for place in at.tolist()], np.bool_)
 
 

@@ -108,6 +108,7 @@ def check(tables: LineCircleFilter, step: Step, corners: Corners, memory: Memory
     x = np.concatenate([edges.x[:n][breaks], circles.x[circles.active]])
     y = np.concatenate([edges.y[:n][breaks], circles.y[circles.active]])
     places = zip(x.tolist(), y.tolist(), strict=True)
+    line_expert.list_live(psi.columns)
     assert all(line_expert.psi_at(psi.columns, *place) < 0 for place in places)
 
 
