@@ -81,7 +81,6 @@ class CornerDetector:
         squares = self._squares
         rows = squares.strongest(pixel, strength, squares.most)
         pixel, strength = pixel[rows], strength[rows]
-        self._strong.follow(max(len(rows), 1) / self._settings.corners_target)
         poor = squares.poor(pixel) & self._open
         if highest_row > 0:  # NaN is not
             poor[: max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0)] = False
@@ -89,7 +88,9 @@ class CornerDetector:
         self._weak.follow(max(len(faint), 1) / (WEAK_SHARE * self._settings.corners_target))
         rows = squares.strongest(faint, how_faint, FEW)
         rich = ~squares.at(poor, pixel)  # the second look has found what was in the poor ones
-        return np.concatenate([pixel[rich], faint[rows]]), np.concatenate([strength[rich], how_faint[rows]])
+        pixel, strength = np.concatenate([pixel[rich], faint[rows]]), np.concatenate([strength[rich], how_faint[rows]])
+        self._strong.follow(max(len(pixel), 1) / self._settings.corners_target)
+        return pixel, strength
 
     def _look(self, image: Grey, threshold: FollowingThreshold, parts: Iterable[Part]) -> Found:
         """Corners of parts of the picture, but for those along an edge."""

@@ -10,6 +10,8 @@ from collections.abc import Iterator
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.ranking import place_in_square
+
 SQUARES = 192  # that a picture is divided into, about
 MOST = 4.0  # times the mean: no square has more corners
 FEW = 2  # a square with fewer is poor
@@ -50,15 +52,21 @@ class Squares:
         return np.logical_or.reduceat(np.logical_or.reduceat(where, rows, axis=0), columns, axis=1)
 
     def runs(self, marked: npt.NDArray[np.bool_]) -> Iterator[tuple[int, int, int, int]]:
-        """Marked neighbours of a row as one rectangle: left, top, right, bottom, px, the last two beyond it."""
+        """Marked squares as rectangles: left, top, right, bottom, px, the last two beyond it.
+
+        Neighbours in a row are one rectangle, and so are rows with the same ones below each other.
+        """
         rows, columns = self._shape
         closed = np.zeros((rows, columns + 2), np.int8)
         closed[:, 1:-1] = marked
         change = np.diff(closed, axis=1)
         begins, ends = np.argwhere(change == 1).tolist(), np.argwhere(change == -1).tolist()
         side = self.side_px
+        tops: dict[tuple[int, int, int], int] = {}  # of open rectangles: first and last column, row below
         for (row, first), (_, beyond) in zip(begins, ends, strict=True):
-            yield first * side, row * side, beyond * side, (row + 1) * side
+            tops[first, beyond, row + 1] = tops.pop((first, beyond, row), row)
+        for (first, beyond, bottom), top in tops.items():
+            yield first * side, top * side, beyond * side, bottom * side
 
 
 def strongest_spread(pixel: Pixels, strength: Strengths, capacity: int, side_px: int) -> Rows:
@@ -68,15 +76,3 @@ def strongest_spread(pixel: Pixels, strength: Strengths, capacity: int, side_px:
     """
     place = place_in_square(pixel, strength, side_px)
     return np.sort(np.lexsort((-strength, place))[:capacity])
-
-
-def place_in_square(pixel: Pixels, strength: Strengths, side_px: int) -> Rows:
-    """How many corners in the same square are stronger, (n,)."""
-    column, row = (pixel // side_px).T
-    square = row * 65536 + column
-    order = np.lexsort((-strength, square))
-    ordered = square[order]
-    starts = np.flatnonzero(np.r_[True, ordered[1:] != ordered[:-1]][: len(order)])
-    place = np.empty(len(order), np.intp)
-    place[order] = np.arange(len(order)) - np.repeat(starts, np.diff(np.r_[starts, len(order)]))
-    return place

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.along_edge import BORDER_PX, REACH_PX, roundness
+from lcf_edge.along_edge import BORDER_PX, roundness
 
 Grey = npt.NDArray[np.uint8]
 MIDDLE = np.array([[20, 20]], np.int32)
@@ -26,7 +26,7 @@ def half_plane(degrees: float) -> Grey:
 def test_it_is_the_ratio_of_opencvs_eigenvalues(noise: Callable[..., Grey], seed: int) -> None:
     image = noise(seed, 40, 30)
     y, x = np.mgrid[BORDER_PX : 30 - BORDER_PX, BORDER_PX : 40 - BORDER_PX]
-    both = cv2.cornerEigenValsAndVecs(image, 2 * REACH_PX + 1, 3)[y, x, :2]
+    both = cv2.cornerEigenValsAndVecs(image, 2 * BORDER_PX - 1, 3)[y, x, :2]
     expected = both.min(axis=2) / both.max(axis=2)
     found = roundness(image, np.stack([x.ravel(), y.ravel()], axis=1).astype(np.int32))
     np.testing.assert_allclose(found, expected.ravel(), atol=2e-4)

@@ -17,7 +17,7 @@ from lcf_edge.compilation import examined, extension, sources, uncompiled
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "lcf_edge"
 
-STAY_PYTHON = {"appearance": {"appearance"}}
+STAY_PYTHON = {"along_edge": {"roundness"}, "ranking": {"place_in_square"}, "appearance": {"appearance"}}
 """Functions of compiled modules that are meant to stay Python: they allocate, and call the loops."""
 
 DECLARATIONS = {path for path in PACKAGE.rglob("*.pxd") if path.with_suffix(".py").exists()}
