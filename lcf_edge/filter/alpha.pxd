@@ -10,7 +10,6 @@ from lcf_edge.filter.situation cimport Situation
 
 cdef int KEYS
 cdef double MIN_BASELINE_S
-cdef double SURE_BASELINE_S
 cdef int PENDING
 cdef double OBEYING_COSTS
 

@@ -13,7 +13,6 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 MIN_BASELINE_S = 0.08  # shorter links say nothing
-SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands
 PENDING = 2  # links of a chain that waits for its third key frame
 OBEYING_COSTS = 2.0  # trust that a rebel loses in a frame in which it follows the flow
 

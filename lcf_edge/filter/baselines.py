@@ -24,9 +24,7 @@ class Baselines:
 
     def __init__(self) -> None:
         self.h = doubles(KEYS, 9)
-        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (
-            doubles(KEYS) for _ in range(5)
-        )
+        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (doubles(KEYS) for _ in range(5))
         self.is_fitted = False
         self.rate_covariance = doubles(3, 3)
 

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport alpha, circles, flow, image_plane, key_frames, normal_circles
+from lcf_edge.filter cimport circles, flow, image_plane, key_frames, normal_circles
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -9,6 +9,7 @@ from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
 cdef double PI
+cdef double SURE_BASELINE_S
 cdef double RECTANGLE_FITS
 cdef double MIN_PSI_FRAMES
 cdef double CIRCLE_MARGINS

@@ -12,6 +12,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 PI = 3.141592653589793
+SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
 MIN_PSI_FRAMES = 3.5
 CIRCLE_MARGINS = 2.0  # kept between ψ and a rebel circle, where an edge that breaks the flow has one
@@ -75,7 +76,7 @@ def keep_watched(candidates: Candidates, normal: CircleColumns, edges: EdgeColum
         c = edges.circle[i]
         if c >= 0 and not edges.rebel[i]:
             candidates.members[c] += 1
-            if key_frames.has_history(edges, i, keys, alpha.SURE_BASELINE_S):
+            if key_frames.has_history(edges, i, keys, SURE_BASELINE_S):
                 candidates.watched[c] += 1
     for c in range(normal.capacity):
         if 2 * candidates.watched[c] <= candidates.members[c]:

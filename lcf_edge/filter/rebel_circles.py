@@ -310,9 +310,7 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     return top > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
 
 
-def find_odd(
-    groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings
-) -> None:
+def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
     """A few odd ones among edges that were seen to follow the flow are mistakes, not an object; nor is what is flat."""
     for g in range(groups.groups):
         radius = shared.radius_of(members, g, settings.bs_px)
@@ -544,7 +542,7 @@ def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
 
 
 def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """Unmatched circles lose trust, except those that coast and those that are hidden, for a while; they end without it."""
+    """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it."""
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
         waits = coasts(circles, c, around.horizon_s, settings) or is_hidden(circles, c, settings)

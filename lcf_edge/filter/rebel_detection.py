@@ -125,9 +125,7 @@ def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
     return verdicts.r[j] * baselines.depth_m[verdicts.slot[j]]
 
 
-def near_path(
-    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation
-) -> None:
+def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
     """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MAX_CANDIDATES``."""
     near = 0
     reach_m = around.speed_mps * around.horizon_s

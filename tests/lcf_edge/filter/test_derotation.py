@@ -14,8 +14,8 @@ from lcf_edge.config import Filter
 from lcf_edge.filter import derotation, flow
 from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography
-from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.line_circle_filter import Residual
+from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
