@@ -21,6 +21,8 @@ cdef double MAX_GROWTH
 cdef double MAX_EXCESS
 cdef double MIN_SHOWN_PX
 cdef double LEADER_HEIGHT_SHARE
+cdef double MIRROR_NOISE_PX
+cdef double MIRROR_SIGMAS
 cdef double MAX_RANGE_M
 cdef double MAX_TTC_HORIZONS
 cdef double MIN_EXTENT2_PX
@@ -41,6 +43,7 @@ cdef class RebelGroups:
     cdef public double[::1] vx, vy, elapsed_s
     cdef public Members members
     cdef public double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
+    cdef public double[::1] rate_below, r2_below2
     cdef public int[::1] standing, inwards, flowing, circle
     cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
@@ -61,6 +64,7 @@ cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Sit
 cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 @cython.locals(few=bint)
 cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil

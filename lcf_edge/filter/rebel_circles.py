@@ -24,6 +24,8 @@ MAX_GROWTH = 1.5  # of a circle, in one frame
 MAX_EXCESS = 2.0  # a circle is no larger than what shows it, times this,
 MIN_SHOWN_PX = 12.0  # which is taken for no smaller than this
 LEADER_HEIGHT_SHARE = 0.3  # of the camera's height that a leader has at least; paint and reflections have less
+MIRROR_NOISE_PX = 0.6  # 1 sigma of how far an edge went
+MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group better than something upright
 MAX_RANGE_M = 1000.0  # farther off nothing is known
 MAX_TTC_HORIZONS = 10.0  # and later than so many horizons
 MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
@@ -48,7 +50,8 @@ class RebelGroups:
 
     A row a group: ``members``; means of ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, ``inwards``, how many
     stand still and are incoming, and how many fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
-    ``focus_r2``, means of μ/t·r² and r²; ``below2`` and ``below_vy``, of the height under the horizon squared, and
+    ``focus_r2``, means of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h
+    and r²·h², h px under the horizon; ``below2`` and ``below_vy``, of the height under the horizon squared, and
     times V; ``flowing``, normal edges inside; ``odd``, too few of those inside are rebels; ``circle``, row of C_r, -1:
     none; ``votes`` for each circle.
     """
@@ -61,6 +64,7 @@ class RebelGroups:
         self.mean_vx, self.mean_vy, self.mean_s = (doubles(rebels) for _ in range(3))
         self.closing_mps, self.focus_rate = (doubles(rebels) for _ in range(2))
         self.focus_r2, self.below2, self.below_vy = (doubles(rebels) for _ in range(3))
+        self.rate_below, self.r2_below2 = (doubles(rebels) for _ in range(2))
         self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
         self.odd = octets(rebels)
         self.votes = integers(rebels, circles)
@@ -247,6 +251,7 @@ def clear_group(groups: RebelGroups, g: int) -> None:
     shared.clear(groups.members, g)
     groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
+    groups.rate_below[g] = groups.r2_below2[g] = 0.0
     groups.flowing[g] = groups.standing[g] = groups.inwards[g] = 0
 
 
@@ -281,6 +286,8 @@ def average(
         groups.closing_mps[g] += share * baselines.depth_m[slot] / groups.elapsed_s[k]
         groups.focus_rate[g] += share * verdicts.expansion[j] * r2
         groups.focus_r2[g] += share * r2
+        groups.rate_below[g] += share * verdicts.expansion[j] * r2 * below
+        groups.r2_below2[g] += share * r2 * below * below
         groups.below2[g] += share * below * below
         groups.below_vy[g] += share * below * groups.vy[k]
         if verdicts.incoming[j]:
@@ -296,6 +303,19 @@ def average(
             members.variance_y[g] += dy * dy / members.size[g]
 
 
+def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
+    """Whether a group lies on a plane under the ground: lamps, as a glossy floor shows them.
+
+    There μ/t grows with the height h under the horizon, on what stands upright it is the same everywhere: which of
+    μ/t = k·h and μ/t = c leaves less, by least squares in px/s.
+    """
+    level = groups.focus_rate[g] * groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
+    slope = groups.rate_below[g] * groups.rate_below[g] / max(groups.r2_below2[g], MIN_EXTENT2_PX)
+    noise = MIRROR_NOISE_PX / groups.mean_s[g]
+    better = (slope - level) * members.size[g]
+    return groups.rate_below[g] > 0 and better > MIRROR_SIGMAS * MIRROR_SIGMAS * noise * noise
+
+
 def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
     """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
 
@@ -303,6 +323,8 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     """
     if groups.inwards[g] <= 0.5:
         return False
+    if is_mirrored(groups, g, members):
+        return True
     half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
     foot = max(members.y[g] + half - around.horizon_y, 0.0)
     top = members.y[g] - half - around.horizon_y
