@@ -1,8 +1,7 @@
 """A wheel where nothing can be compiled: a Debian with Python alone, of the wheel's processor, emulated if need be.
 
-There it filters a rendered drive: compiled and, a part of it, as the Python that it was compiled from, which must find
-the very same. So must the sources that this process runs, where the processor is of the same kind; another one's NumPy
-rounds otherwise now and then, and what that changes is told.
+There it filters a rendered drive, and must find the very same as the sources that this process runs, on its own
+processor; and so must a part of it as the Python that it was compiled from.
 """
 
 import json
@@ -41,7 +40,7 @@ class Trial:
             raise ReleaseError(f"{wheel.name}: the extension has {size_kb:.0f} kB, more than {MOST_EXTENSION_KB}")
         root = Path(self._place.name, machine.name)
         run("cp", "-a", str(unpacked(machine, SUITE, PACKAGES)), str(root))
-        _install(machine, wheel, root / "wheel")
+        install(machine, wheel, root / "wheel")
         for drive in (self._drive, self._short):
             run("cp", "-a", str(drive), str(root))
         if compilers := [path.name for path in (root / "usr/bin").iterdir() if path.name.endswith(("gcc", "cc"))]:
@@ -51,12 +50,12 @@ class Trial:
             raise ReleaseError(f"{wheel.name}: compiled it finds something else than uncompiled")
         found = _replayed(root, "drive")
         same = sum(one == other for one, other in zip(found, self._expected, strict=True))
-        if machine.is_this and same < len(found):
+        if same < len(found):
             raise ReleaseError(f"{wheel.name}: {len(found) - same} of {len(found)} results differ from the sources'")
         emulated = "" if machine.is_this else ", emulated"
         return (
             f"extension {size_kb:.0f} kB; Debian {SUITE}, Python {PYTHON}, {machine.name}{emulated}: compiled as "
-            f"uncompiled; {same} of {len(found)} frames as here ({digest(found)}, here {digest(self._expected)})"
+            f"uncompiled, {len(found)} frames as here (SHA-256 {digest(found)})"
         )
 
     @cached_property
@@ -70,7 +69,7 @@ def _short() -> scenes.Drive:
     return scenes.make("two_crossing", 0, seconds=_SHORT_S, width=320, height=240, focal_px=250.0)
 
 
-def _install(machine: Machine, wheel: Path, folder: Path) -> None:
+def install(machine: Machine, wheel: Path, folder: Path) -> None:
     """As pip would there, from what fits that system."""
     fits = ["manylinux2014", *(f"manylinux_2_{minor}" for minor in range(17, 42))]
     options = [f"--platform={name}_{machine.name}" for name in fits]
