@@ -319,17 +319,18 @@ def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
 def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
     """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
 
-    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height.
+    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height. Where the
+    ground itself does not flow, the vehicle is slower than is told, or its own parts are in view, and nothing leads
+    down there.
     """
     if groups.inwards[g] <= 0.5:
         return False
-    if is_mirrored(groups, g, members):
+    lowest = around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad
+    if is_mirrored(groups, g, members) or (around.ground_is_still and members.y[g] > lowest):
         return True
     half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
     foot = max(members.y[g] + half - around.horizon_y, 0.0)
-    top = members.y[g] - half - around.horizon_y
-    lowest = around.pinhole.focal * around.pitch_sigma_rad
-    return top > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
+    return members.y[g] - half > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
 
 
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:

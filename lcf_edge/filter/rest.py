@@ -61,9 +61,9 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
-    """Set ``stands``. Without ground in sight it stays as it was for as long as nothing moves."""
+    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands as before, while nothing moves."""
     stood = test.stands
-    test.stands = False
+    test.stands = around.ground_is_still = False
     test.edges = test.still = test.ground = test.still_ground = 0
     number = latest_key(keys)
     known = math.isfinite(test.told_mps) and test.told_mps != 0 and around.camera_height_m > 0
@@ -73,9 +73,7 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
         seen = edges.matched[i] != 0 and not edges.is_own_part(i)
         if seen and key_frames.oldest_key(edges, i, keys) <= number:
             look(test, edges, i, number % KEYS, baselines, around)
-    if test.edges < MIN_EDGES or 2 * test.still <= test.edges:
-        return
-    if test.ground < MIN_GROUND_EDGES:
-        test.stands = stood
-    else:
-        test.stands = 2 * test.still_ground > test.ground
+    shows_ground = test.ground >= MIN_GROUND_EDGES
+    around.ground_is_still = shows_ground and 2 * test.still_ground > test.ground
+    if test.edges >= MIN_EDGES and 2 * test.still > test.edges:
+        test.stands = around.ground_is_still if shows_ground else stood
