@@ -11,6 +11,7 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.situation import Situation
 
 MIN_BASELINE_S = 0.2  # motion over less than this is not told from noise
+MIN_STILL_S = 0.25  # a picture that comes twice is no rest
 MIN_EDGES = 25
 MIN_GROUND_EDGES = 8
 MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is told
@@ -22,12 +23,13 @@ STILL_SHARE = 0.3  # nor than this share of what they must
 class RestTest:
     """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
 
-    ``stands``: the verdict. ``told_mps``: the speed by IMU, odometry or configuration; NaN: unknown.
+    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``told_mps``: the speed by IMU, odometry or configuration; NaN: unknown.
     """
 
     def __init__(self) -> None:
         self.edges = self.still = self.ground = self.still_ground = 0
         self.stands = False
+        self.still_s = 0.0
         self.told_mps = 0.0
 
 
@@ -62,8 +64,9 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
     """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands as before, while nothing moves."""
-    stood = test.stands
+    stood, looked_s = test.stands, test.still_s
     test.stands = around.ground_is_still = False
+    test.still_s = 0.0
     test.edges = test.still = test.ground = test.still_ground = 0
     number = latest_key(keys)
     known = math.isfinite(test.told_mps) and test.told_mps != 0 and around.camera_height_m > 0
@@ -76,4 +79,6 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
     shows_ground = test.ground >= MIN_GROUND_EDGES
     around.ground_is_still = shows_ground and 2 * test.still_ground > test.ground
     if test.edges >= MIN_EDGES and 2 * test.still > test.edges:
-        test.stands = around.ground_is_still if shows_ground else stood
+        if around.ground_is_still or (stood and not shows_ground):
+            test.still_s = looked_s + around.dt_s
+        test.stands = test.still_s >= MIN_STILL_S
