@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow, path
+from lcf_edge.filter cimport edge_equations, flow, path
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.flow cimport Homography, Pinhole
 from lcf_edge.filter.key_frames cimport KeyFrames
@@ -30,7 +30,6 @@ cdef double MIN_R_PX
 cdef double LINK_NOISE_SIGMAS
 cdef double CLOSING_NOISE_SIGMAS
 cdef double MIN_FIRST_LINK_PX
-cdef double MAX_DEVIATION_RAD
 
 cdef class Baselines:
     cdef public double[:, ::1] h
