@@ -114,13 +114,13 @@ class LineCircleFilter:
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
         self._flowing = Flowing(capacity, memory.circles_normal)
-        self._rebel_groups = RebelGroups(capacity, memory.circles_rebel)
+        self._rebel_groups = RebelGroups(memory.edges_rebel, memory.circles_rebel)
         self._candidates = Candidates(memory.circles_normal)
         self._ids = Ids()  # one count, so that an id names one circle of either kind
         self._psi_ids = Ids()
 
     def table_bytes(self) -> dict[str, int]:
-        """Bytes of each preallocated table."""
+        """Bytes of each preallocated table; the work space of a step, which is kept too, takes less than the edges."""
         return {
             "edges (E_n, E_r, α)": self.edges.nbytes,
             "circles_normal (C_n)": self.normal.nbytes,

@@ -12,6 +12,7 @@ from lcf_edge.filter.memory import Integers, doubles, integers, octets
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
+from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
@@ -35,9 +36,7 @@ LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share 
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
-CROSSING = 1
-INCOMING = 2
-LEADING = 3
+CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 

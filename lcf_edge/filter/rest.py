@@ -23,7 +23,8 @@ STILL_SHARE = 0.3  # nor than this share of what they must
 class RestTest:
     """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
 
-    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``told_mps``: the speed by IMU, odometry or configuration; NaN: unknown.
+    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``told_mps``: the speed by IMU, odometry
+    or configuration; NaN: unknown.
     """
 
     def __init__(self) -> None:
@@ -63,7 +64,7 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
-    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands as before, while nothing moves."""
+    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight what stood stands, while nothing moves."""
     stood, looked_s = test.stands, test.still_s
     test.stands = around.ground_is_still = False
     test.still_s = 0.0
