@@ -37,4 +37,4 @@ def test_what_a_local_program_may_do() -> None:
         key for rule in access_control("lcf")["rules"] if rule["flows"] == ["ingress"] for key in rule["key_exprs"]
     }
     local = DOCUMENT.partition("Whoever can run a program")[2].partition("What else it sends")[0]
-    assert taken == set(re.findall(r"`(lcf/[^`]+)`", local))
+    assert taken == set(re.findall(r"`(lcf/[^`]+|\*\*)`", local))

@@ -12,8 +12,9 @@ import pytest
 from lcf_edge.config import Config
 from lcf_edge.filter import Corners, LineCircleFilter, Motion, line_expert
 from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
-from lcf_edge.filter.situation import Heading, Situation, follow
+from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.tables import PsiTable
 from lcf_edge.lens import Lens
 
@@ -134,7 +135,8 @@ def _situation(*, speed_mps: float = 2.0, yaw_rate_radps: float = 0.0, **changes
     """A rover on its way that looks straight ahead; ``changes``: fields of ``Situation``."""
     config = Config()
     around = Situation(config, Pinhole(LENS.fx, LENS.fy, LENS.cx, LENS.cy))
-    follow(around, Heading(config.camera), speed_mps, yaw_rate_radps, 0.05)
+    heading = Heading(config.camera)
+    follow(around, heading.ray_x, heading.ray_y, speed_mps, yaw_rate_radps, 0.05)
     for name, value in changes.items():
         setattr(around, name, value)
     return around

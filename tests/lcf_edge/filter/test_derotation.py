@@ -20,7 +20,7 @@ from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SIGMA_RAD = 0.01
-SETTINGS = Settings(Filter())
+SETTINGS = Settings(Filter(), PINHOLE)
 
 angle = st.floats(-0.006, 0.006)
 

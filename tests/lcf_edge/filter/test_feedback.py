@@ -11,6 +11,8 @@ import pytest
 from lcf_edge.config import Config, Filter, Vehicle
 from lcf_edge.filter import LineCircleFilter, line_expert
 from lcf_edge.filter.line_circle_filter import Step
+from lcf_edge.filter.settings import REFERENCE_FOCAL_PX
+from lcf_edge.filter.tables import PsiTable
 from lcf_edge.records import Shape
 
 DEFAULTS = Config()
@@ -85,7 +87,8 @@ def test_a_rectangle_is_taken_where_it_fits_better(
 ) -> None:
     middle = (-2.56, -0.51, 8.0)  # of one of the squares in which newborn circles are gathered
     row = drive(box(middle, size_m, landmarks=40), frames=10)
-    tables = next(tables for _, tables, _ in steps(row) if tables.psi.active.any())
+    squares = Config(filter=Filter(bs_px=64 * REFERENCE_FOCAL_PX / row.lens.fx))  # of 64 px in this picture
+    tables = next(tables for _, tables, _ in steps(row, squares) if tables.psi.active.any())
     assert {Shape(int(shape)) for shape in tables.psi.shape[tables.psi.active]} == {shape}
 
 
@@ -178,11 +181,20 @@ def test_a_region_never_covers_what_breaks_the_flow(crowd: Any, drive: Drive, bo
     assert omitted
 
 
+def loneliest(psi: PsiTable) -> int:
+    """The region that is farthest from all others, so that what is in it is in no other."""
+    rows = np.flatnonzero(psi.active)
+    place = psi.x[rows] + 1j * psi.y[rows]
+    away = np.abs(place[:, None] - place)
+    np.fill_diagonal(away, np.inf)
+    return int(rows[away.min(axis=1).argmax()])
+
+
 def test_a_region_ends_at_once_where_something_new_appears(crowd: Any) -> None:
     tables = LineCircleFilter(DEFAULTS, crowd.lens)
     for seq, (corners, motion) in enumerate(crowd):
         if tables.psi.active.any():
-            row = int(np.flatnonzero(tables.psi.active)[0])
+            row = loneliest(tables.psi)
             number, x, y = tables.psi.id[row], tables.psi.x[row], tables.psi.y[row]
             new = np.array([x, y]) + np.random.default_rng(seq).uniform(-8, 8, (40, 2))
             pixel = np.concatenate([corners.pixel, np.rint(new).astype(np.int32)])

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from lcf_edge.config import Filter
 from lcf_edge.filter import line_expert, matching
+from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.image_plane import ImagePlane, project
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, Corners
 from lcf_edge.filter.matching import CornerIndex
@@ -63,7 +64,8 @@ class Frame:
         return [int(row) for row in found]
 
 
-SETTINGS = Settings(Filter(appearance_max=14.0, appearance_share=100.0))
+PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
+SETTINGS = Settings(Filter(appearance_max=14.0, appearance_share=100.0), PINHOLE)
 
 
 # Places
@@ -159,7 +161,7 @@ def test_difference_is_the_mean_absolute_one() -> None:
 
 
 def test_a_faint_corner_must_look_more_alike_than_a_strong_one() -> None:
-    settings = Settings(Filter(appearance_max=28.0, appearance_share=0.5))
+    settings = Settings(Filter(appearance_max=28.0, appearance_share=0.5), PINHOLE)
     contrast = np.array([0, 4, 10, 30, 127])
     looks = np.where(np.arange(16) % 2, 128 + contrast[:, None], 128 - contrast[:, None]).astype(np.uint8)
     frame = Frame(SMALL, corners_at([]))

@@ -44,7 +44,8 @@ class Scene:
         around.dt_s = 1.0
         self.edges = EdgeTable(200, 10, 10)
         self.circles = CircleTable(capacity)
-        self.flowing, self.settings, self.ids = Flowing(210, capacity), Settings(Filter(**settings)), Ids()
+        self.flowing, self.ids = Flowing(210, capacity), Ids()
+        self.settings = Settings(Filter(**settings), around.pinhole)
         self.evicted = 0
 
     def add(self, places: Places, expansion: float = 0.5) -> slice:

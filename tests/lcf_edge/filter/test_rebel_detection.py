@@ -12,17 +12,20 @@ from hypothesis import assume, given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Filter
+from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import key_frames, rebel_detection
-from lcf_edge.filter.flow import Homography
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.path import miss, way_to
-from lcf_edge.filter.rebel_detection import Baselines, Verdicts
+from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import EdgeTable
 
 AHEAD = (0.0, 0.0, 1.0)
-SETTINGS = Settings(Filter())
+PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
+SETTINGS = Settings(Filter(), PINHOLE)
 STEPS = 8  # of 0.05 s
 HEIGHT_M = 0.3  # of the camera
 
@@ -65,7 +68,7 @@ class Watched:
                 slot = key_frames.mark(keys)
                 edges.key_x[:number, slot], edges.key_y[:number, slot] = self.place(seq)
         edges.x[:number], edges.y[:number] = self.place(STEPS)
-        rebel_detection.measure_baselines(baselines, keys, Homography(), self.around.pinhole, self.around)
+        lines.measure(baselines, keys, Homography(), self.around.pinhole, self.around)
         return edges, baselines
 
     def place(self, seq: int) -> npt.NDArray[np.float32]:
@@ -77,7 +80,7 @@ class Watched:
         verdicts = Verdicts(edges.count)
         verdicts.count = edges.count
         for row in range(edges.count):
-            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines)
+            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines, PINHOLE)
             rebel_detection.judge(verdicts, row, edges.columns, baselines, self.around, SETTINGS)
         return verdicts
 
@@ -91,7 +94,7 @@ class Watched:
     def agreed(self) -> list[bool]:
         edges, baselines = self.seen()
         whole, recent = (self.judged(edges, baselines, slot) for slot in (0, 1))
-        noisy = Settings(Filter(edge_noise_px=0.8))
+        noisy = Settings(Filter(edge_noise_px=0.8), PINHOLE)
         return [bool(rebel_detection.agree(whole, row, recent, row, baselines, noisy)) for row in range(whole.count)]
 
 
@@ -324,7 +327,7 @@ def agrees(whole: Verdicts, recent: Verdicts) -> bool:
     baselines = Baselines()
     np.asarray(baselines.elapsed_s)[:2] = 0.4, 0.2
     np.asarray(recent.slot)[0] = 1
-    return bool(rebel_detection.agree(whole, 0, recent, 0, baselines, Settings(Filter(edge_noise_px=0.8))))
+    return bool(rebel_detection.agree(whole, 0, recent, 0, baselines, Settings(Filter(edge_noise_px=0.8), PINHOLE)))
 
 
 @pytest.mark.parametrize("sign", [-1, 1])

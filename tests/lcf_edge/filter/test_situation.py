@@ -11,7 +11,8 @@ import pytest
 from lcf_edge.config import Camera, Config
 from lcf_edge.filter import Motion
 from lcf_edge.filter.flow import Pinhole
-from lcf_edge.filter.situation import Heading, Situation, follow, ground_range_m, turn_heading
+from lcf_edge.filter.heading import Heading, turn_heading
+from lcf_edge.filter.situation import Situation, follow, ground_range_m
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 
@@ -28,7 +29,7 @@ class Ahead:
 
     @property
     def focus(self) -> tuple[float, float]:
-        follow(self._around, self.heading, 2.0, 0.0, 0.05)
+        follow(self._around, self.heading.ray_x, self.heading.ray_y, 2.0, 0.0, 0.05)
         return self._around.focus_x, self._around.focus_y
 
 
