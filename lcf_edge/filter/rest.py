@@ -64,7 +64,7 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
-    """Set ``stands`` and ``Situation.ground_is_still``. With no ground in sight, what stood stands till something moves."""
+    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands on until something moves."""
     stood, looked_s = test.stands, test.still_s
     test.stands = around.ground_is_still = False
     test.still_s = 0.0
