@@ -1,5 +1,6 @@
 """A recording as camera, IMU and odometry: true timing, shared start, faults."""
 
+import gc
 import threading
 import tracemalloc
 from collections.abc import Iterator
@@ -164,14 +165,17 @@ class TestTiming:
 
         def most_bytes_after(pause_s: float) -> int:
             clock.sleep_s(pause_s)
+            gc.collect()  # what other tests have left
             tracemalloc.reset_peak()
             assert len(camera.read()) == 1
             return tracemalloc.get_traced_memory()[1]
 
         tracemalloc.start()
-        after_a_minute = most_bytes_after(60.0)  # the IMU's ring is full then
-        after_four = most_bytes_after(240.0)
-        tracemalloc.stop()
+        try:
+            after_a_minute = most_bytes_after(60.0)  # the IMU's ring is full then
+            after_four = most_bytes_after(240.0)
+        finally:
+            tracemalloc.stop()
         assert after_four < 1.1 * after_a_minute
         assert camera.counts["overtaken"] == pytest.approx(300 * FPS, rel=0.01)
 
