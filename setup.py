@@ -43,7 +43,9 @@ MACROS = [
 FLAGS = ["-O3", "-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
 FLAGS += ["-g0", "-fno-asynchronous-unwind-tables"]  # a tenth smaller
 
-_OF_THIS_BUILD = zlib.crc32(Path(__file__).read_bytes() + Cython.__version__.encode())
+# A changed declaration changes the layout of what other modules share: all are compiled anew.
+_DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))
+_OF_THIS_BUILD = zlib.crc32(Path(__file__).read_bytes() + Cython.__version__.encode() + _DECLARED)
 CACHE = Path("build/compiled", f"{_OF_THIS_BUILD:08x}")
 OBJECTS = CACHE / f"{sysconfig.get_platform()}-{sys.implementation.cache_tag}"
 

@@ -88,7 +88,9 @@ class Camera(Table, frozen=True):
     height_m: Annotated[float, msgspec.Meta(ge=0, le=10_000)] = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: Tilt = 0.0  # positive: looks up
     yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
-    mask: list[list[list[float]]] = []  # own parts in view: polygons of x, y in px of a picture of width x height
+    mask: list[
+        list[list[Annotated[float, msgspec.Meta(ge=-20_000, le=40_000)]]]
+    ] = []  # own parts in view: polygons of x, y in px of a picture of width x height
 
 
 class Imu(Table, frozen=True):

@@ -19,7 +19,7 @@ from lcf_edge.spread import FEW, Squares, strongest_spread
 FAST_BORDER_PX = 3  # FAST itself leaves out
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 THRESHOLDS = (13, 90)
-WEAKEST = 10  # threshold where there is nothing stronger
+WEAKEST = THRESHOLDS[0]  # what is fainter still is noise as often as not
 ROWS_ABOVE = 2  # of squares: what can be met may begin so much higher than is thought
 WEAK_SHARE = 0.5  # of the wanted corners may be looked at there
 
@@ -82,7 +82,9 @@ class CornerDetector:
         rows = squares.strongest(pixel, strength, squares.most)
         pixel, strength = pixel[rows], strength[rows]
         poor = squares.poor(pixel) & self._open
-        if highest_row > 0:  # NaN is not
+        if self._weak.value >= self._strong.value:
+            poor[:] = False  # it would find what has been found
+        elif highest_row > 0:  # NaN is not
             poor[: max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0)] = False
         faint, how_faint = self._look(image, self._weak, squares.runs(poor))
         self._weak.follow(max(len(faint), 1) / (WEAK_SHARE * self._settings.corners_target))

@@ -27,6 +27,7 @@ _SIGMA_SHARE = 0.03  # and of its size: roll, and the corners of the picture
 _ROLL_SIGMA_RAD = pi  # not told
 _STEP_RAD = 1e-3
 _GRID = 24
+_LEAST_GAIN_PX = 1.0  # a rad; lenses that no camera has give less
 
 
 @dataclass(frozen=True, slots=True)
@@ -94,5 +95,7 @@ def _gain(lens: Lens) -> Floats:
         there = lens.distort((moved * (lens.fx, lens.fy) + (lens.cx, lens.cy)).astype(np.float32))
         shift = sign * (there - placed)[:, axis] / _STEP_RAD
         seen = np.isfinite(shift)
-        gains.append(float(np.average(shift[seen], weights=weight[seen])) if seen.any() else lens.fx)
+        total = float(weight[seen].sum())
+        gain = float(shift[seen] @ weight[seen]) / total if total > 0 else lens.fx
+        gains.append(max(gain, _LEAST_GAIN_PX))
     return np.array(gains)

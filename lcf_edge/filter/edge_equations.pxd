@@ -2,6 +2,7 @@ from libc cimport math
 from lcf_edge.filter cimport flow
 
 cdef double CORNER_NOISE_PX
+cdef double MAX_DEVIATION_RAD
 cdef int BEYOND
 cdef int FOLLOWS
 cdef int DISAGREES
@@ -18,3 +19,4 @@ cpdef double update_speed(double trust, double tr_cr, double speed, double along
 cpdef double update_gate(double bl, double speed, double predicted_speed, double corr, double dt_s, double least_px, double most_px) noexcept nogil
 cpdef double update_deviation(double deviation, double turn) noexcept nogil
 cpdef double change_trust(double trust, double change, double tr_max) noexcept nogil
+cdef double bound_deviation(double deviation) noexcept nogil

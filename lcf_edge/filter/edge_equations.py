@@ -5,6 +5,7 @@ import math
 from lcf_edge.filter import flow
 
 CORNER_NOISE_PX = 0.7  # below this a displacement has no direction
+MAX_DEVIATION_RAD = 0.5  # DL is bounded
 
 # λ*: how a corner relates to an estimated edge (section Edge Classifications)
 BEYOND = 1  # outside the gate, but within the error span
@@ -99,6 +100,11 @@ def update_deviation(deviation: float, turn: float) -> float:
     turned and half its weight it halves.
     """
     return flow.wrap(deviation + 0.5 * flow.wrap(flow.wrap(turn) - deviation))
+
+
+def bound_deviation(deviation: float) -> float:
+    """DL between -``MAX_DEVIATION_RAD`` and ``MAX_DEVIATION_RAD``."""
+    return min(max(deviation, -MAX_DEVIATION_RAD), MAX_DEVIATION_RAD)
 
 
 def change_trust(trust: float, change: float, tr_max: float) -> float:

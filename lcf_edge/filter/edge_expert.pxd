@@ -8,7 +8,6 @@ from lcf_edge.filter.situation cimport Situation
 
 cdef double MIN_CORR
 cdef double SWING_SHARE
-cdef double MAX_DEVIATION_RAD
 cdef double MIN_ORIGIN_PX
 cdef double MIN_RADIUS_PX
 cdef double STRAY_GATE_SHARE

@@ -11,7 +11,6 @@ from lcf_edge.filter.situation import Situation
 
 MIN_CORR = 0.25
 SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
-MAX_DEVIATION_RAD = 0.5  # DL is bounded
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nearer to the focus there is no direction from it
 STRAY_GATE_SHARE = 0.5  # BL of what has just shown how it moves, in shares of BL at birth
@@ -145,7 +144,7 @@ def turn_own_way(edges: EdgeColumns, i: int) -> None:
     if flow.length(dx, dy) > MIN_ORIGIN_PX:
         edges.beta[i] = math.atan2(dy, dx)
     deviation = edge_equations.update_deviation(edges.deviation[i], edges.beta[i] - before)
-    edges.deviation[i] = min(max(deviation, -MAX_DEVIATION_RAD), MAX_DEVIATION_RAD)
+    edges.deviation[i] = edge_equations.bound_deviation(deviation)
 
 
 def stray(

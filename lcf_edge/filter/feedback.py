@@ -10,14 +10,15 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.memory import integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
+from lcf_edge.records import Shape
 
 PI = 3.141592653589793
 SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands
 RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
 MIN_PSI_FRAMES = 3.5
 CIRCLE_MARGINS = 2.0  # kept between ψ and a rebel circle, where an edge that breaks the flow has one
-CIRCLE_SHAPE = 1  # Ty
-RECTANGLE_SHAPE = 2
+CIRCLE_SHAPE = int(Shape.CIRCLE)  # Ty
+RECTANGLE_SHAPE = int(Shape.RECTANGLE)
 
 
 class Candidates:

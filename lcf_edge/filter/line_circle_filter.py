@@ -118,6 +118,7 @@ class LineCircleFilter:
         self._baselines = Baselines()
         self._fit = FlowFit()
         self._rest = RestTest()
+        self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
         self._homography = Homography()
         self._off_line = OffLine()
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
@@ -126,13 +127,13 @@ class LineCircleFilter:
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
         self._flowing = Flowing(capacity, memory.circles_normal)
-        self._rebel_groups = RebelGroups(capacity, memory.circles_rebel)
+        self._rebel_groups = RebelGroups(memory.edges_rebel, memory.circles_rebel)
         self._candidates = Candidates(memory.circles_normal)
         self._ids = Ids()  # one count, so that an id names one circle of either kind
         self._psi_ids = Ids()
 
     def table_bytes(self) -> dict[str, int]:
-        """Bytes of each preallocated table."""
+        """Bytes of each preallocated table; the work space of a step, which is kept too, takes less than the edges."""
         return {
             "edges (E_n, E_r, α)": self.edges.nbytes,
             "circles_normal (C_n)": self.normal.nbytes,
@@ -341,9 +342,10 @@ class LineCircleFilter:
             around.focus_x += fit.focus_x
             around.focus_y += fit.focus_y
             around.horizon_y = around.focus_y
-            around.noise_px = max(around.noise_px, NOISE_SHARE * fit.scale_px)
-            around.delta_px = max(around.delta_px, DELTA_SIGMAS * fit.scale_px)
+            self._scale_px = fit.scale_px
             headings.learn_mounting(heading, around, fit)
+        around.noise_px = max(around.noise_px, NOISE_SHARE * self._scale_px)
+        around.delta_px = max(around.delta_px, DELTA_SIGMAS * self._scale_px)
         rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)
 
     def _make_room(self, wanted: int) -> tuple[int, int]:

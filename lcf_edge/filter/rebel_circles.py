@@ -12,6 +12,7 @@ from lcf_edge.filter.memory import Integers, doubles, integers, octets
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
+from lcf_edge.records import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
@@ -35,9 +36,7 @@ LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share 
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
-CROSSING = 1
-INCOMING = 2
-LEADING = 3
+CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -319,17 +318,18 @@ def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
 def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
     """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
 
-    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height.
+    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height. Where the
+    ground itself does not flow, the vehicle is slower than is told, or its own parts are in view, and nothing leads
+    down there.
     """
     if groups.inwards[g] <= 0.5:
         return False
-    if is_mirrored(groups, g, members):
+    lowest = around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad
+    if is_mirrored(groups, g, members) or (around.ground_is_still and members.y[g] > lowest):
         return True
     half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
     foot = max(members.y[g] + half - around.horizon_y, 0.0)
-    top = members.y[g] - half - around.horizon_y
-    lowest = around.pinhole.focal * around.pitch_sigma_rad
-    return top > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
+    return members.y[g] - half > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
 
 
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:

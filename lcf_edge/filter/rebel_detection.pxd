@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport baselines as lines
-from lcf_edge.filter cimport flow, path
+from lcf_edge.filter cimport edge_equations, flow, path
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.flow cimport Pinhole
@@ -29,7 +29,6 @@ cdef double MIN_R_PX
 cdef double LINK_NOISE_SIGMAS
 cdef double CLOSING_NOISE_SIGMAS
 cdef double MIN_FIRST_LINK_PX
-cdef double MAX_DEVIATION_RAD
 
 cdef class Verdicts:
     cdef public Py_ssize_t count

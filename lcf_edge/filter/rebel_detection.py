@@ -9,7 +9,7 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow, path
+from lcf_edge.filter import edge_equations, flow, path
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.flow import Pinhole
@@ -17,7 +17,7 @@ from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
-ROOT_2 = 1.4142135623730951
+ROOT_2 = math.sqrt(2.0)
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 MAX_FOCUS_SHARE = 0.5  # of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
 PARALLAX_DRIFT = 0.25  # share of its way outwards that a corner between two things at different depths drifts
@@ -38,7 +38,6 @@ MIN_R_PX = 1.0
 LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover's recent link
 CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the recent link
 MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
-MAX_DEVIATION_RAD = 0.5  # DL is bounded
 
 
 class Verdicts:
@@ -254,7 +253,7 @@ def give_birth(
     edges.deviation[i] = 0.0
     if flow.length(x2 - x1, y2 - y1) > MIN_FIRST_LINK_PX:
         turn = flow.wrap(beta - math.atan2(y2 - y1, x2 - x1))
-        edges.deviation[i] = min(max(turn, -MAX_DEVIATION_RAD), MAX_DEVIATION_RAD)
+        edges.deviation[i] = edge_equations.bound_deviation(turn)
     edges.speed[i] = flow.length(x3 - x2, y3 - y2) / elapsed_s
     edges.beta[i] = beta
     edges.origin_x[i], edges.origin_y[i] = x1, y1

@@ -9,6 +9,7 @@ from lcf_edge.filter.situation cimport Situation
 
 cdef int KEYS
 cdef double MIN_BASELINE_S
+cdef double MIN_STILL_S
 cdef int MIN_EDGES
 cdef int MIN_GROUND_EDGES
 cdef double MIN_FLOW_PX
@@ -19,9 +20,9 @@ cdef double STILL_SHARE
 cdef class RestTest:
     cdef public int edges, still, ground, still_ground
     cdef public bint stands
-    cdef public double told_mps
+    cdef public double told_mps, still_s
 
 cpdef int latest_key(KeyFrames keys) noexcept nogil
 cpdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(stood=bint, known=bint, seen=bint)
+@cython.locals(stood=bint, known=bint, seen=bint, shows_ground=bint)
 cpdef void measure(RestTest test, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around) noexcept nogil

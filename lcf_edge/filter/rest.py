@@ -11,6 +11,7 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.situation import Situation
 
 MIN_BASELINE_S = 0.2  # motion over less than this is not told from noise
+MIN_STILL_S = 0.25  # a picture that comes twice is no rest
 MIN_EDGES = 25
 MIN_GROUND_EDGES = 8
 MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is told
@@ -22,12 +23,14 @@ STILL_SHARE = 0.3  # nor than this share of what they must
 class RestTest:
     """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
 
-    ``stands``: the verdict. ``told_mps``: the speed by IMU, odometry or configuration; NaN: unknown.
+    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``told_mps``: the speed by IMU, odometry
+    or configuration; NaN: unknown.
     """
 
     def __init__(self) -> None:
         self.edges = self.still = self.ground = self.still_ground = 0
         self.stands = False
+        self.still_s = 0.0
         self.told_mps = 0.0
 
 
@@ -61,9 +64,10 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
-    """Set ``stands``. Without ground in sight it stays as it was for as long as nothing moves."""
-    stood = test.stands
-    test.stands = False
+    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands on until something moves."""
+    stood, looked_s = test.stands, test.still_s
+    test.stands = around.ground_is_still = False
+    test.still_s = 0.0
     test.edges = test.still = test.ground = test.still_ground = 0
     number = latest_key(keys)
     known = math.isfinite(test.told_mps) and test.told_mps != 0 and around.camera_height_m > 0
@@ -73,9 +77,9 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
         seen = edges.matched[i] != 0 and not edges.is_own_part(i)
         if seen and key_frames.oldest_key(edges, i, keys) <= number:
             look(test, edges, i, number % KEYS, baselines, around)
-    if test.edges < MIN_EDGES or 2 * test.still <= test.edges:
-        return
-    if test.ground < MIN_GROUND_EDGES:
-        test.stands = stood
-    else:
-        test.stands = 2 * test.still_ground > test.ground
+    shows_ground = test.ground >= MIN_GROUND_EDGES
+    around.ground_is_still = shows_ground and 2 * test.still_ground > test.ground
+    if test.edges >= MIN_EDGES and 2 * test.still > test.edges:
+        if around.ground_is_still or (stood and not shows_ground):
+            test.still_s = looked_s + around.dt_s
+        test.stands = test.still_s >= MIN_STILL_S

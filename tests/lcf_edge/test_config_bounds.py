@@ -57,7 +57,7 @@ def within(kind: inspect.IntType | inspect.FloatType) -> st.SearchStrategy[Any]:
 
 
 PIPELINE_TABLES = ("camera", "imu", "vehicle", "filter", "memory")
-LISTS = {"camera.intrinsics", "camera.distortion", "imu.axes"}
+LISTS = {"camera.intrinsics", "camera.distortion", "camera.mask", "imu.axes"}
 OTHERS = {"camera.fps", "camera.gain", "imu.bus", "imu.address", "imu.baud", "camera.width", "camera.height"}
 SCALARS = {
     key: within(kind)

@@ -77,3 +77,18 @@ def test_what_ego_motion_lacks_is_told(note: str) -> None:
     degradation = Degradation(Config())
     degradation.add(frame(0), scene(0, notes=("first frame", note)))
     assert len(degradation.notes) == 1
+
+
+@pytest.mark.parametrize(
+    ("note", "words"),
+    [
+        ("gyro bias unknown", "the gyro's bias is not known yet"),
+        ("gyro stuck", "the gyro repeats one value"),
+    ],
+)
+def test_a_gyro_that_is_not_fully_believed_says_why(note: str, words: str) -> None:
+    degradation = Degradation(Config())
+    degradation.add(frame(0), scene(0, notes=(note,)))
+    assert degradation.notes[0].startswith(words)
+    degradation.add(frame(50), scene(1))
+    assert not degradation.notes

@@ -17,6 +17,8 @@ TESTS = {
     "covered lens": "test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees",
     "frame rate too low for the motion": "test_a_frame_rate_too_low_for_the_motion",
     "no IMU": "test_an_imu_that_is_away_widens_and_is_told",
+    "gyro's bias not known yet": "test_a_gyro_that_is_not_fully_believed_says_why",
+    "gyro repeats one value (a chip or bus that hangs)": "test_a_gyro_that_is_not_fully_believed_says_why",
     "no speed": "test_without_speed_ranges_are_unknown",
     "pipeline too slow": "test_every_frame_is_a_scene_or_counted",
     "pipeline stuck": "test_the_watchdog_is_fed_by_the_progress_of_the_pipeline",
