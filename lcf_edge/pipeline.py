@@ -18,6 +18,7 @@ from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMoti
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
+from lcf_edge.filter.line_circle_filter import Mounting
 from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
 from lcf_edge.gyro_bias import GyroBias
 from lcf_edge.image_rotation import ImageRotation
@@ -91,6 +92,11 @@ class Pipeline:
         """The gyro's bias, as far as it is known."""
         return self._motion.bias
 
+    @property
+    def mounting(self) -> Mounting:
+        """How the camera is mounted, as far as it is learnt."""
+        return self.filter.mounting
+
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take an inertial sample or a speed, each kind in stamp order."""
         if isinstance(sample, ImuSample):
@@ -120,6 +126,9 @@ class Pipeline:
             self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad, self._expansion_hz())
         filtered = time.perf_counter_ns()
         circles, psi = self._circles(), self._psi()
+        notes = [*ego.notes, *pictured]
+        if self.filter.stands:
+            notes.append("stands still")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
         done = time.perf_counter_ns()
         self._seen = corners, step.omitted
@@ -138,7 +147,7 @@ class Pipeline:
                 filter=(filtered - before) // 1000,
                 total=(done - started) // 1000,
             ),
-            notes=(*ego.notes, *pictured),
+            notes=tuple(notes),
         )
 
     def _highest_row(self) -> float:

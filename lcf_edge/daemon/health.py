@@ -117,6 +117,8 @@ class Health:
         if config.imu.driver != "none" and loop.gyro_bias is not None:
             values["gyro_bias_radps"] = " ".join(f"{bias:+.4f}" for bias in loop.gyro_bias.mean_radps)
             values["gyro_bias_sigma_radps"] = f"{loop.gyro_bias.sigma_radps.max():.4f}"
+        if loop.mounting is not None:
+            values |= {f"camera_{name}": f"{value:.4f}" for name, value in asdict(loop.mounting).items()}
         values |= {f"refused {reason}": str(count) for reason, count in sorted(loop.refused.items())}
         return DeviceStatus("pipeline", Level.WARN if notes else Level.OK, "; ".join(notes) or "runs", values)
 

@@ -20,6 +20,7 @@ from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.mailbox import Newest, SampleRing
 from lcf_edge.daemon.preview import Previewer
 from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
+from lcf_edge.filter.line_circle_filter import Mounting
 from lcf_edge.gyro_bias import GyroBias
 from lcf_edge.lens import Lens
 from lcf_edge.meters import DurationHistogram
@@ -124,6 +125,11 @@ class Loop(threading.Thread):
     def gyro_bias(self) -> GyroBias | None:
         """As far as it is known; None before the first picture."""
         return self._pipeline.gyro_bias if self._pipeline else None
+
+    @property
+    def mounting(self) -> Mounting | None:
+        """How the camera is mounted, as far as it is learnt; None before the first picture."""
+        return self._pipeline.mounting if self._pipeline else None
 
     def rebuild(self, config: Config) -> None:
         """From the next frame on, a new pipeline with empty tables, once another like it has taken pictures.

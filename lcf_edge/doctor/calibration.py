@@ -1,16 +1,21 @@
 """What the filter must be told about the vehicle, and was not."""
 
+import math
 from collections.abc import Iterator
 
 from lcf_edge.doctor.finding import Context, Finding, edit, ok, warn
 
 _MOUNTING = ("camera.height_m", "camera.pitch_rad")
+_MOUNTED = "camera_{}"  # in the diagnostics
+_MOUNTING_SIGMAS = 3.0  # and
+_MOUNTING_RAD = math.radians(1)  # by which the mounting may differ from what is configured
 
 
 def check(context: Context) -> Iterator[Finding]:
     """Lens, mounting, axes and speed."""
     yield from _lens(context)
     yield from _mounting(context)
+    yield from _learnt_mounting(context)
     yield from _axes(context)
     yield _speed(context)
 
@@ -52,6 +57,26 @@ def _mounting(context: Context) -> Iterator[Finding]:
         )
     else:
         yield ok("calibration", f"camera: {values}")
+
+
+def _learnt_mounting(context: Context) -> Iterator[Finding]:
+    """What the daemon that runs has seen of the mounting while driving."""
+    status = context.daemon.statuses.get("pipeline") if context.daemon else None
+    for key in ("pitch_rad", "yaw_rad"):
+        angle, sigma = _MOUNTED.format(key), _MOUNTED.format(key.replace("_rad", "_sigma_rad"))
+        if status is None or angle not in status.values or sigma not in status.values:
+            continue
+        try:
+            seen_rad, sigma_rad = float(status.values[angle]), float(status.values[sigma])
+        except ValueError:
+            continue  # of another version
+        told_rad: float = getattr(context.config.camera, key)
+        off_rad = abs(seen_rad - told_rad)
+        text = f"camera.{key} is {told_rad:g}, driving shows {seen_rad:.3f} ± {sigma_rad:.3f}"
+        if off_rad > max(_MOUNTING_SIGMAS * sigma_rad, _MOUNTING_RAD):
+            yield warn("calibration", text, edit(context.path, f"[camera] {key} = {seen_rad:.3f}"))
+        else:
+            yield ok("calibration", text)
 
 
 def _axes(context: Context) -> Iterator[Finding]:

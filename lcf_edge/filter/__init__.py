@@ -9,14 +9,19 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``settings``         the configuration's constants, as the loops take them
 ``flow``             directions, flow lines, the ideal camera, rotations as homographies
 ``key_frames``       how the vehicle has turned and moved since each key frame
+``heading``          where it heads in the camera's axes: the mounting, learnt, and how the camera shakes
 ``situation``        the vehicle at this instant: where it heads in the picture, what it is, how it moves
 ``path``             its path over the ground: how far beside it something lies, and how long the way to it is
 ``image_plane``      where a position of the ideal pinhole is seen through the lens
+``least_squares``    of a few unknowns
 ``derotation``       step 0: the camera's rotation is taken out of all that is stored
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one
 ``edge_equations``   the Circle expert's equations for edges: prediction, the five classes λ*, updates, trust
 ``edge_expert``      applies them to the table
+``baselines``        what the displacement since each key frame implies for this picture
+``flow_fit``         what all edges together tell of the camera: errors of its rotation, and of O
+``rest``             whether the vehicle stands, as the picture tells
 ``rebel_detection``  what breaks the flow over a chain of key positions, as equations
 ``alpha``            applies them: chains become rebel edges, rebels that obey go home
 ``circles``          what normal and rebel circles share

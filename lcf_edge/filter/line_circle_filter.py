@@ -67,6 +67,19 @@ class Residual:
 
 
 @dataclass(frozen=True, slots=True)
+class Mounting:
+    """How the camera is mounted, as the flow tells it while the vehicle drives; signs as in ``camera.*_rad``.
+
+    ``pitch_sigma_rad``, ``yaw_sigma_rad``: 1 sigma.
+    """
+
+    pitch_rad: float
+    yaw_rad: float
+    pitch_sigma_rad: float
+    yaw_sigma_rad: float
+
+
+@dataclass(frozen=True, slots=True)
 class Step:
     """What one step tells besides the tables.
 
@@ -135,6 +148,17 @@ class LineCircleFilter:
     def focus(self) -> tuple[float, float]:
         """O: where the vehicle is heading, px."""
         return self._around.focus_x, self._around.focus_y
+
+    @property
+    def mounting(self) -> Mounting:
+        """How the camera is mounted, as far as it is learnt."""
+        heading = self._heading
+        return Mounting(math.atan(heading.mounted_y), -math.atan(heading.mounted_x), heading.sigma_y, heading.sigma_x)
+
+    @property
+    def stands(self) -> bool:
+        """Whether the picture says that the vehicle stands, although a speed is told."""
+        return bool(self._rest.stands)
 
     def step(self, corners: Corners, motion: Motion) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive."""

@@ -57,7 +57,8 @@ def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
 
 def test_notes_of_a_result_line(rows: Rows) -> None:
     sources = "".join(
-        (ROOT / "lcf_edge" / name).read_text(encoding="utf-8") for name in ("ego_motion.py", "picture_quality.py")
+        (ROOT / "lcf_edge" / name).read_text(encoding="utf-8")
+        for name in ("ego_motion.py", "picture_quality.py", "pipeline.py")
     )
     noted = set(re.findall(r'notes\.append\("([^"]+)"\)', sources))
     table = rows("docs/replay.md", "### Notes")

@@ -235,6 +235,16 @@ def test_hours_of_samples_before_the_first_picture_change_nothing(approach: Appr
     assert all("no imu" not in scene.notes for scene in seen)
 
 
+def test_a_picture_that_stands_still_is_noted_although_the_odometry_goes_on(approach: Approach) -> None:
+    drive = list(approach(imu=False))
+    image = next(item.image for item in drive if isinstance(item, Frame))
+    frozen = [replace(item, image=image) if isinstance(item, Frame) else item for item in drive]
+    *_, last = outcomes(frozen, Config(camera=Camera(height_m=0.3)))
+    assert "stands still" in last.scene.notes
+    assert last.scene.vehicle_speed == pytest.approx(2.0)  # as it is told
+    assert not any("stands still" in each.scene.notes for each in outcomes(drive))
+
+
 # Positions
 
 

@@ -179,6 +179,9 @@ def test_diagnostics_tell_of_each_part(config: Config, runs: Runs, link: Any) ->
     assert 0 < float(pipeline.values["latency_p50_ms"]) <= float(pipeline.values["latency_p99_ms"])
     assert pipeline.values["corners_fill"].endswith("/1500")
     assert pipeline.values["evicted"] == "0"
+    assert 0 < float(pipeline.values["camera_pitch_sigma_rad"]) <= 0.06
+    assert abs(float(pipeline.values["camera_pitch_rad"])) < 0.2
+    assert abs(float(pipeline.values["camera_yaw_rad"])) < 0.2
     assert pipeline.values["filter"] == ("uncompiled" if uncompiled() else "compiled")
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
 

@@ -4,10 +4,15 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from lcf_edge.arguments import parser
 from lcf_edge.config import Camera, Config, Imu, Vehicle
+from lcf_edge.diagnostics import DeviceStatus
+from lcf_edge.diagnostics import Level as StatusLevel
 from lcf_edge.doctor import calibration
-from lcf_edge.doctor.finding import Context, Level
+from lcf_edge.doctor.daemon import Daemon
+from lcf_edge.doctor.finding import Context, Finding, Level
 
 Machine = Callable[..., Context]
 AXES = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]
@@ -37,6 +42,38 @@ def test_what_is_set_is_good(machine: Machine) -> None:
 def test_a_mounting_that_is_set_to_the_default_is_measured(machine: Machine) -> None:
     assert "camera.height_m" in warned(machine(given=frozenset({"camera.pitch_rad"})))
     assert "camera.height_m" not in warned(machine(given=frozenset({"camera.height_m", "camera.pitch_rad"})))
+
+
+def learnt(machine: Machine, pitch_rad: str, sigma_rad: str, *, told_rad: float = 0.0) -> list[Finding]:
+    """What is said of the pitch when the daemon that runs has learnt this."""
+    values = {"camera_pitch_rad": pitch_rad, "camera_pitch_sigma_rad": sigma_rad}
+    context = machine(Config(camera=Camera(pitch_rad=told_rad)), path=Path("/etc/lcf-edge/config.toml"))
+    status = DeviceStatus("pipeline", StatusLevel.OK, "runs", values)
+    context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"pipeline": status}, "")
+    return [finding for finding in calibration.check(context) if "driving shows" in finding.text]
+
+
+def test_a_mounting_that_driving_contradicts_is_warned_of_with_the_key_to_set(machine: Machine) -> None:
+    (found,) = learnt(machine, "0.0350", "0.0030")
+    assert found.level is Level.WARN
+    assert found.text == "camera.pitch_rad is 0, driving shows 0.035 ± 0.003"
+    assert found.remedy == "sudoedit /etc/lcf-edge/config.toml  # [camera] pitch_rad = 0.035"
+
+
+@pytest.mark.parametrize(
+    ("pitch_rad", "sigma_rad", "told_rad"),
+    [("0.0350", "0.0030", 0.03), ("0.0350", "0.0200", 0.0), ("0.0150", "0.0010", 0.0)],
+    ids=["as told", "not sure", "less than a degree"],
+)
+def test_a_mounting_that_may_be_right_is_good(
+    machine: Machine, pitch_rad: str, sigma_rad: str, told_rad: float
+) -> None:
+    (found,) = learnt(machine, pitch_rad, sigma_rad, told_rad=told_rad)
+    assert found.level is Level.OK
+
+
+def test_what_a_daemon_of_another_version_tells_is_left_alone(machine: Machine) -> None:
+    assert learnt(machine, "unknown", "0.0030") == []
 
 
 def test_intrinsics_of_another_size_are_noticed(machine: Machine) -> None:

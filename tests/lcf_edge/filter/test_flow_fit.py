@@ -1,0 +1,188 @@
+"""What all edges together tell of the camera: rotation, focus, noise."""
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcf_edge.config import Config, Filter
+from lcf_edge.filter import baselines as lines
+from lcf_edge.filter import flow_fit
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.flow_fit import FlowFit
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.filter.tables import EdgeTable
+
+PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
+SETTINGS = Settings(Filter(), PINHOLE)
+KEY_FRAMES, KEY_S, SPEED_MPS = 12, 0.06, 2.0
+PRIOR_PX = 20.0
+
+Floats = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Seen:
+    """Landmarks seen from a camera that turns at ``rate_radps`` without anybody knowing, and heads ``focus_px`` beside
+    where it should. ``movers``: share that goes its own way.
+    """
+
+    rate_radps: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    focus_px: tuple[float, float] = (0.0, 0.0)
+    movers: float = 0.0
+    noise_px: float = 0.4
+    number: int = 300
+    seed: int = 0
+    fit: FlowFit = field(default_factory=FlowFit)
+    baselines: Baselines = field(default_factory=Baselines)
+
+    def measured(self) -> "Seen":
+        edges, keys = EdgeTable(self.number, 1, 1), KeyFrames()
+        edges.append(self.number)
+        self._look(edges, keys)
+        around = Situation(Config(), PINHOLE)
+        lines.measure(self.baselines, keys, Homography(), PINHOLE, around)
+        self.fit.prior_x = self.fit.prior_y = PRIOR_PX
+        flow_fit.measure(self.fit, edges.columns, keys, self.baselines, PINHOLE, SETTINGS)
+        return self
+
+    def _look(self, edges: EdgeTable, keys: KeyFrames) -> None:
+        """Key frames from the oldest on, and where the edges were at each."""
+        random, n = np.random.default_rng(self.seed), self.number
+        keys.number = KEY_FRAMES
+        depth_m = random.uniform(3, 12, n)
+        now = random.uniform([20, 20], [620, 460], (n, 2))
+        rays = np.column_stack([(now - (PINHOLE.cx, PINHOLE.cy)) / PINHOLE.fx, np.ones(n)])
+        moves = random.random(n) < self.movers
+        own_pxps = np.where(moves[:, None], random.uniform(20, 80, (n, 2)) * random.choice([-1, 1], (n, 2)), 0)
+        for slot in range(KEY_FRAMES):
+            elapsed_s = KEY_S * (KEY_FRAMES - slot)
+            way_m = SPEED_MPS * elapsed_s
+            heading = np.array([*(np.array(self.focus_px) / PINHOLE.fx), 1.0])
+            before = rays * depth_m[:, None] + way_m * heading
+            x, y, z = (before @ self.rotation(elapsed_s)).T  # turned back
+            then = np.stack([PINHOLE.cx + PINHOLE.fx * x / z, PINHOLE.cy + PINHOLE.fy * y / z], axis=1)
+            then += random.normal(0, self.noise_px, (n, 2)) - own_pxps * elapsed_s
+            edges.key_x[:n, slot], edges.key_y[:n, slot] = then.T
+            keys.elapsed_s[slot] = elapsed_s
+            keys.displacement[slot, 2] = way_m
+        edges.x[:n], edges.y[:n] = (now + random.normal(0, self.noise_px, (n, 2))).T
+        edges.born_key[:n] = random.integers(0, KEY_FRAMES, n)
+        edges.trust[:n], edges.matched[:n] = SETTINGS.tr_max, True
+
+    def rotation(self, elapsed_s: float) -> Floats:
+        return np.asarray(cv2.Rodrigues(elapsed_s * np.array(self.rate_radps))[0])
+
+    def rotation_px(self, slot: int) -> float:
+        """By how much the baseline is wrong, rms px over the picture."""
+        turned = self.rotation(self.baselines.elapsed_s[slot])
+        off = []
+        for x, y in ((100.0, 100.0), (540.0, 100.0), (319.0, 240.0), (100.0, 400.0), (540.0, 400.0)):
+            ray = turned @ ((x - PINHOLE.cx) / PINHOLE.fx, (y - PINHOLE.cy) / PINHOLE.fy, 1.0)
+            truth = PINHOLE.cx + PINHOLE.fx * ray[0] / ray[2], PINHOLE.cy + PINHOLE.fy * ray[1] / ray[2]
+            off += [lines.then_x(self.baselines, slot, x, y) - truth[0]]
+            off += [lines.then_y(self.baselines, slot, x, y) - truth[1]]
+        return float(np.sqrt(np.mean(np.square(off))))
+
+
+def draws(movers: float, rate_radps: float, number: int = 40) -> tuple[Floats, Floats]:
+    """Errors of the focus in sigmas, two a draw, and px by which the oldest baseline is wrong, over random errors."""
+    sigmas, off_px = [], []
+    for seed in range(number):
+        random = np.random.default_rng(seed)
+        rate, focus = random.uniform(-rate_radps, rate_radps, 3), random.uniform(-15, 15, 2)
+        seen = Seen(tuple(rate), tuple(focus), movers=movers, seed=seed).measured()
+        fit = seen.fit
+        sigmas += [(fit.focus_x - focus[0]) / fit.focus_sigma_x, (fit.focus_y - focus[1]) / fit.focus_sigma_y]
+        off_px.append(seen.rotation_px(0))
+    return np.abs(sigmas), np.array(off_px)
+
+
+def test_the_focus_is_as_far_off_as_its_sigma_says() -> None:
+    """While the gyro is right within 0.005 rad/s: see the limits."""
+    sigmas, off_px = draws(movers=0.0, rate_radps=0.005)
+    assert np.median(sigmas) < 1.2
+    assert np.quantile(sigmas, 0.9) < 3
+    assert off_px.max() < 2
+
+
+@pytest.mark.parametrize("rate_radps", [0.01, 0.03])
+def test_an_error_of_the_rate_is_found_although_a_third_moves(rate_radps: float) -> None:
+    _, off_px = draws(movers=0.33, rate_radps=rate_radps)
+    assert np.median(off_px) < 1.3
+    assert off_px.max() < 3.5  # of up to 10 px
+
+
+@pytest.mark.parametrize("focus_px", [(12.0, 0.0), (0.0, -12.0), (-8.0, 8.0)])
+def test_an_error_of_the_focus_is_found_although_a_third_moves(focus_px: tuple[float, float]) -> None:
+    fits = [Seen(focus_px=focus_px, movers=0.33, seed=seed).measured().fit for seed in range(9)]
+    found = np.median([(fit.focus_x, fit.focus_y) for fit in fits], axis=0)
+    assert found == pytest.approx(focus_px, abs=3)
+
+
+def test_the_rotation_since_every_key_frame_is_put_right() -> None:
+    rate_radps = (0.02, -0.03, 0.02)
+    wrong = Seen(rate_radps, number=14).measured()  # too few for a fit
+    right = Seen(rate_radps).measured()
+    for slot in range(KEY_FRAMES - 3):
+        assert right.rotation_px(slot) < 0.2 * wrong.rotation_px(slot)
+
+
+def test_what_is_right_stays_right() -> None:
+    seen = Seen().measured()
+    assert math.hypot(seen.fit.focus_x, seen.fit.focus_y) < 3 * max(seen.fit.focus_sigma_x, seen.fit.focus_sigma_y)
+    assert all(seen.rotation_px(slot) < 0.6 for slot in range(KEY_FRAMES))
+
+
+def test_the_rotation_is_fitted_with_a_covariance() -> None:
+    baselines = Seen().measured().baselines
+    assert baselines.is_fitted
+    covariance = np.asarray(baselines.rate_covariance)
+    assert covariance == pytest.approx(covariance.T)
+    assert (np.linalg.eigvalsh(covariance) > 0).all()
+    assert np.sqrt(np.diag(covariance)).max() < 0.01
+
+
+@pytest.mark.parametrize("noise_px", [0.3, 0.6, 1.2])
+@pytest.mark.parametrize("movers", [0.0, 0.2])
+def test_the_scale_is_the_noise_of_two_places(noise_px: float, movers: float) -> None:
+    scales = [Seen(noise_px=noise_px, movers=movers, seed=seed).measured().fit.scale_px for seed in range(5)]
+    assert np.mean(scales) == pytest.approx(math.sqrt(2) * noise_px, rel=0.35)
+
+
+def test_the_scale_grows_with_the_noise() -> None:
+    scales = [Seen(noise_px=noise_px).measured().fit.scale_px for noise_px in (0.2, 0.5, 1.0, 2.0)]
+    assert scales == sorted(scales)
+
+
+def test_too_few_edges_are_no_fit() -> None:
+    seen = Seen((0.02, 0.0, 0.0), (10.0, 0.0), number=14).measured()
+    fit = seen.fit
+    assert (fit.count, fit.focus_x, fit.focus_y, fit.scale_px) == (0, 0.0, 0.0, 0.0)
+    assert (fit.focus_sigma_x, fit.focus_sigma_y) == (PRIOR_PX, PRIOR_PX)
+    assert not seen.baselines.is_fitted
+
+
+def test_of_many_edges_so_many_are_enough() -> None:
+    assert 160 < Seen(number=2000).measured().fit.count <= 320
+
+
+def test_less_is_sure_with_fewer_edges() -> None:
+    few, many = (Seen(number=number).measured().fit for number in (40, 300))
+    assert few.focus_sigma_x > many.focus_sigma_x
+    assert few.focus_sigma_y > many.focus_sigma_y
+
+
+@given(st.floats(0, 100), st.floats(0.1, 10))
+def test_what_is_off_counts_less(rest_px: float, width_px: float) -> None:
+    weight: Any = flow_fit.weight_of
+    assert 0 < weight(rest_px + 0.1, width_px) < weight(rest_px, width_px) <= 1
