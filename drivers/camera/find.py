@@ -4,7 +4,7 @@ import contextlib
 import errno
 from collections.abc import Iterator
 
-from drivers.camera.v4l2_errors import driver_error
+from drivers.camera.v4l2_errors import NEEDS_LIBCAMERA, driver_error
 from drivers.camera.v4l2_ioctl import CAP_VIDEO_CAPTURE_MPLANE, LINUX, Kernel, Node
 from drivers.errors import DeviceMissingError, WrongDeviceError
 
@@ -14,7 +14,7 @@ def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
 
     A name may be a part of the camera's, in any case; whole names go first. Raises ``DriverError``, among them
     ``DeviceMissingError`` that tells which cameras there are, and ``WrongDeviceError`` for a node that gives no
-    pictures and for a name that two cameras have.
+    pictures, or only through libcamera, and for a name that two cameras have.
     """
     return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)
 
@@ -37,6 +37,8 @@ def _by_path(path: str, kernel: Kernel) -> Node:
     if node.is_camera:
         return node
     node.close()
+    if node.needs_libcamera:
+        raise WrongDeviceError(f"{path}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
     if node.caps & CAP_VIDEO_CAPTURE_MPLANE:
         raise WrongDeviceError(
             f"{path}: speaks only the multi-planar interface, which is not supported; {_found(kernel)}"
@@ -46,12 +48,15 @@ def _by_path(path: str, kernel: Kernel) -> Node:
 
 def _by_name(name: str, kernel: Kernel) -> Node:
     cards: dict[str, str] = {}
+    through_libcamera: set[str] = set()  # names
     refused: OSError | None = None
     for path in kernel.nodes():
         try:
             with contextlib.closing(Node(path, path, kernel)) as node:
                 if node.is_camera:
                     cards[path] = node.card.casefold()
+                elif node.needs_libcamera:
+                    through_libcamera.add(node.card.casefold())
         except OSError as error:
             refused = error
     wanted = name.casefold()
@@ -60,6 +65,8 @@ def _by_name(name: str, kernel: Kernel) -> Node:
     if not paths:
         if refused is not None and refused.errno in {errno.EACCES, errno.EPERM}:
             raise driver_error(name, refused) from refused
+        if any(wanted in card for card in through_libcamera):
+            raise WrongDeviceError(f"{name}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
         raise DeviceMissingError(f"{name}: no camera of that name; {_found(kernel)}")
     if len(paths) > 1:
         raise WrongDeviceError(f"{name}: {' and '.join(paths)} are called so; name one by /dev/v4l/by-id/…")
@@ -71,4 +78,4 @@ def _by_name(name: str, kernel: Kernel) -> Node:
 
 def _found(kernel: Kernel) -> str:
     found = ", ".join(f"{node.path} ({node.card})" for node in cameras(kernel))
-    return f"found: {found}" if found else "no camera is plugged in"
+    return f"found: {found}" if found else "no other camera is plugged in"

@@ -20,7 +20,7 @@ from drivers.by_hand import watch
 from drivers.camera import controls, offers
 from drivers.camera.find import cameras, open_camera_node
 from drivers.camera.luminance import PIXEL_FORMATS, FrameError, Grey, least_stride, luminance
-from drivers.camera.v4l2_errors import NOT_IMPLEMENTED, told
+from drivers.camera.v4l2_errors import NOT_IMPLEMENTED, started, told
 from drivers.camera.v4l2_ioctl import (
     CAP_TIMEPERFRAME,
     DQBUF,
@@ -121,7 +121,8 @@ class V4l2Camera:
             self._queued_ns = [0] * len(self._memory)
             for index in range(len(self._memory)):
                 self._queue(index)
-            self._node.ask(STREAMON, BufferType(VIDEO_CAPTURE))
+            with started(device):
+                self._node.ask(STREAMON, BufferType(VIDEO_CAPTURE))
             resources.callback(self._node.ask, STREAMOFF, BufferType(VIDEO_CAPTURE))
             self._resources = resources.pop_all()
         self._interval_ns = round(1e9 / self.mode.fps)

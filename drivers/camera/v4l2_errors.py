@@ -14,6 +14,11 @@ from drivers.errors import (
     WrongDeviceError,
 )
 
+NEEDS_LIBCAMERA = (
+    "gives pictures only through libcamera, as ribbon-cable cameras do, which is not supported;"
+    " use a USB camera (docs/raspberry-pi.md)"
+)
+NOT_SET_UP = (errno.EINVAL, errno.EPIPE, errno.ENOLINK)  # of STREAMON: the pipeline does not fit, or leads nowhere
 NOT_IMPLEMENTED = (errno.EINVAL, errno.ENOTTY)  # what a driver answers to a request that it does not know
 
 
@@ -40,6 +45,18 @@ def driver_error(name: str, error: OSError) -> DriverError:
         return DeviceLostError(f"{name}: fails ({error.strerror}); check cable and power")
     kind, text = known
     return kind(f"{name}: {text}")
+
+
+@contextmanager
+def started(name: str) -> Iterator[None]:
+    """Raises ``WrongDeviceError`` where a node that took its settings does not start: it is part of a pipeline."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno not in NOT_SET_UP:
+            raise
+        text = f"does not start as a camera of its own ({error.strerror}); most likely it {NEEDS_LIBCAMERA}"
+        raise WrongDeviceError(f"{name}: {text}") from error
 
 
 @contextmanager

@@ -20,6 +20,7 @@ MEMORY_MMAP = 1
 CAP_VIDEO_CAPTURE = 0x0000_0001
 CAP_VIDEO_CAPTURE_MPLANE = 0x0000_1000
 CAP_STREAMING = 0x0400_0000
+CAP_IO_MC = 0x2000_0000  # a part of a pipeline that somebody must set up through the media controller
 CAP_DEVICE_CAPS = 0x8000_0000  # the node's own capabilities are told apart from those of the whole device
 CAP_TIMEPERFRAME = 0x1000  # of StreamParm: the rate can be set
 
@@ -332,8 +333,16 @@ class Node:
 
     @property
     def is_camera(self) -> bool:
-        """Whether it delivers pictures; nodes of metadata, sound and radio do not."""
-        return self.caps & CAP_VIDEO_CAPTURE != 0 and self.caps & CAP_STREAMING != 0
+        """Whether it delivers pictures by itself; nodes of metadata, sound and radio do not."""
+        return self.caps & CAP_VIDEO_CAPTURE != 0 and self.caps & CAP_STREAMING != 0 and not self.needs_libcamera
+
+    @property
+    def needs_libcamera(self) -> bool:
+        """Whether pictures come only when sensor and pipeline are run through the media controller.
+
+        So are cameras at the ribbon cable: the node takes sizes and formats, and then does not start.
+        """
+        return self.caps & CAP_IO_MC != 0 and self.caps & (CAP_VIDEO_CAPTURE | CAP_VIDEO_CAPTURE_MPLANE) != 0
 
     def ask(self, request: int, argument: Argument) -> Argument:
         """The argument as the kernel left it. Raises ``OSError``."""

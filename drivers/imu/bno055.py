@@ -7,12 +7,18 @@ BNO055 data sheet, BST-BNO055-DS000-14 revision 1.4. In the modes without fusion
 There is no FIFO: the registers are polled, and what they still hold from last time is dropped. The chip stretches the
 clock; bus masters that do not wait for it (Raspberry Pi) read bytes with a flipped top bit. So a jump must be seen in
 two reads, else it is refused; a software bus (i2c-gpio) or a slower clock cures it.
+
+A reset takes 650 ms, in which the chip acknowledges nothing, often not even the reset itself. So it is not reset at
+each start but switched to CONFIG, the mode in which it takes settings; only a system error asks for a reset.
 """
 
 import struct
 import sys
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 
+from drivers.errors import DeviceLostError
+from drivers.imu.i2c_bus import TransferError
 from drivers.imu.i2c_chips import run_by_hand
 from drivers.imu.i2c_imu import Counts, I2cImu, Range, Thermometer
 from drivers.records import ImuSample
@@ -26,13 +32,20 @@ UNIT_SEL = 0x3B
 OPR_MODE = 0x3D  # 3:0
 PWR_MODE = 0x3E
 SYS_TRIGGER = 0x3F
+AXIS_MAP_CONFIG = 0x41
+AXIS_MAP_SIGN = 0x42
 
 RESET = 0x20  # SYS_TRIGGER
 SI_AND_DEGREES = 0x00  # UNIT_SEL: m/s², °/s, °C
-IMU_MODE = 0x08  # OPR_MODE
+CONFIG_MODE = 0x00  # OPR_MODE
+IMU_MODE = 0x08
+CHIP_AXES = 0x24  # AXIS_MAP_CONFIG: x, y, z as they are
 SYSTEM_ERROR = 1  # SYS_STATUS
-RESET_S = 0.75
-SWITCH_S = 0.03  # between modes
+BOOT_S = 0.65  # from a reset until it is in CONFIG
+LONGEST_BOOT_S = 1.0
+BOOT_LOOK_S = 0.05
+TO_CONFIG_S = 0.02  # 19 ms from any mode
+SWITCH_S = 0.03  # to a mode with fusion
 
 RATE_HZ = 100.0
 DATA = struct.Struct("<3h6x3h")
@@ -66,11 +79,33 @@ class Bno055(I2cImu):
         return RATE_HZ
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:  # noqa: ARG002
-        return {PAGE_ID: 0, PWR_MODE: 0, UNIT_SEL: SI_AND_DEGREES}
+        return {
+            PAGE_ID: 0,
+            PWR_MODE: 0,
+            UNIT_SEL: SI_AND_DEGREES,
+            AXIS_MAP_CONFIG: CHIP_AXES,
+            AXIS_MAP_SIGN: 0,
+        }
 
     def _reset(self) -> None:
-        self._write(SYS_TRIGGER, RESET)
-        self._clock.sleep_s(RESET_S)
+        self._write(PAGE_ID, 0)
+        if self._read(SYS_STATUS, 1)[0] == SYSTEM_ERROR:
+            self._reboot()
+        self._write(OPR_MODE, CONFIG_MODE)
+        self._clock.sleep_s(TO_CONFIG_S)
+
+    def _reboot(self) -> None:
+        """Reset the chip and wait until it says who it is. Raises ``DeviceLostError``."""
+        with suppress(TransferError):  # it is gone before it would acknowledge
+            self._bus.write(self.address, SYS_TRIGGER, bytes([RESET]), tries=1)
+        end_ns = self._clock.monotonic_ns() + round(LONGEST_BOOT_S * 1e9)
+        self._clock.sleep_s(BOOT_S)
+        while self._clock.monotonic_ns() < end_ns:
+            with suppress(TransferError):
+                if self._read(CHIP_ID, 1, tries=1)[0] in self.identities:
+                    return
+            self._clock.sleep_s(BOOT_LOOK_S)
+        raise DeviceLostError(f"{self.name}: does not come back from a reset; switch its supply off and on")
 
     def _begin(self) -> None:
         self._write(OPR_MODE, IMU_MODE)

@@ -95,12 +95,12 @@ class I2cBus:
             self._try(address, tries, lambda: self._smbus.read_i2c_block_data(address, register, length)),
         )
 
-    def write(self, address: int, register: int, data: bytes) -> None:
+    def write(self, address: int, register: int, data: bytes, tries: int = TRIES) -> None:
         """Write 1 to 32 bytes from ``register`` on. Raises ``TransferError``."""
         if len(data) == 1:
-            self._try(address, TRIES, lambda: self._smbus.write_byte_data(address, register, data[0]))
+            self._try(address, tries, lambda: self._smbus.write_byte_data(address, register, data[0]))
         else:
-            self._try(address, TRIES, lambda: self._smbus.write_i2c_block_data(address, register, list(data)))
+            self._try(address, tries, lambda: self._smbus.write_i2c_block_data(address, register, list(data)))
 
     def scan(self, addresses: Iterable[int] = ADDRESSES) -> list[int]:
         """Addresses at which somebody acknowledges, or that a kernel driver owns; ends early when the bus hangs."""

@@ -24,6 +24,7 @@ from drivers.records import STANDARD_GRAVITY_MPS2
 GYRO = tuple(f"in_anglvel_{axis}" for axis in "xyz")
 ACCEL = tuple(f"in_accel_{axis}" for axis in "xyz")
 STAMP = "in_timestamp"
+GYRO_SUFFIX = re.compile("[-_]gyro$")  # st_lsm6dsx; inv_icm42600 and inv_icm45600 have a hyphen
 
 SCAN_TYPE = re.compile(r"(?P<order>[bl])e:(?P<sign>[su])(?P<bits>\d+)/(?P<storage>8|16|32|64)(?:X1)?>>(?P<shift>\d+)")
 
@@ -43,9 +44,10 @@ def find(device: str, root: Path) -> tuple[Path, Path]:
     names = {folder: text_of(folder / "name") for folder in folders}
     gyros = [folder for folder in folders if (folder / "in_anglvel_x_raw").exists()]
     for gyro in gyros:
-        if device in ("", gyro.name, names[gyro], names[gyro].removesuffix("_gyro")):
-            other = names[gyro].removesuffix("_gyro") + "_accel"
-            for accel in (gyro, *(folder for folder in folders if names[folder] == other)):
+        chip = GYRO_SUFFIX.sub("", names[gyro])
+        if device in ("", gyro.name, names[gyro], chip):
+            others = (f"{chip}_accel", f"{chip}-accel")
+            for accel in (gyro, *(folder for folder in folders if names[folder] in others)):
                 if (accel / "in_accel_x_raw").exists():
                     return gyro, accel
             raise WrongDeviceError(f"{names[gyro]} ({gyro.name}): has no accelerometer; set imu.device to another")

@@ -1,5 +1,7 @@
 """What all simulated chips share: registers, a clock of their own, samples at the rate that is set, a FIFO."""
 
+import errno
+import os
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from typing import ClassVar
@@ -70,6 +72,10 @@ class SimulatedChip(ABC):
     @abstractmethod
     def clear_fifo(self) -> None:
         """Empty it."""
+
+    def not_acknowledged(self) -> OSError:
+        """What a transfer ends with that the chip leaves without an answer."""
+        return OSError(errno.EREMOTEIO, os.strerror(errno.EREMOTEIO))
 
     def _burst(self, register: int, length: int) -> bytes:
         return bytes(self.registers[register : register + length])

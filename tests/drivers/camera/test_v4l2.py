@@ -71,6 +71,12 @@ def take(camera: V4l2Camera, count: int) -> list[Frame]:
     raise AssertionError(f"only {len(frames)} of {count} pictures came: {camera.counts}")
 
 
+def ribbon_camera(interface: int = v4l2.CAP_VIDEO_CAPTURE) -> MockCamera:
+    """As the kernel's rp1-cfe: formats are offered and granted, starting is refused."""
+    caps = interface | v4l2.CAP_STREAMING | 0x2000_0000  # V4L2_CAP_IO_MC
+    return MockCamera(card="rp1-cfe", caps=caps, controls={}, tells_rate=False, start_error=errno.EINVAL)
+
+
 def counted(camera: V4l2Camera) -> Counter[str]:
     """Without zeros."""
     return +camera.counts
@@ -430,6 +436,41 @@ class TestNames:
         webcam.caps = v4l2.CAP_VIDEO_CAPTURE_MPLANE | v4l2.CAP_STREAMING
         with pytest.raises(WrongDeviceError, match="multi-planar"):
             open_camera()
+
+    @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
+    @pytest.mark.parametrize("name", [PATH, "rp1-cfe"])
+    def test_a_ribbon_cable_camera_is_told_at_once_with_the_remedy(
+        self, open_camera: Open, kernel: MockKernel, clock: VirtualClock, name: str, interface: int
+    ) -> None:
+        kernel.unplug(PATH)
+        kernel.plug(PATH, ribbon_camera(interface))
+        kept = KeptOpen("camera", partial(open_camera, name), clock)
+        kept.read()
+        assert isinstance(kept.error, WrongDeviceError)
+        assert str(kept.error) == (
+            f"{name}: gives pictures only through libcamera, as ribbon-cable cameras do, which is not supported;"
+            " use a USB camera (docs/raspberry-pi.md); no other camera is plugged in"
+        )
+        assert not kept.error.retry
+        assert kernel.open_files == 0
+
+    def test_a_ribbon_cable_camera_is_not_offered_but_the_usb_camera_beside_it(
+        self, open_camera: Open, kernel: MockKernel
+    ) -> None:
+        kernel.plug("/dev/video1", ribbon_camera())
+        assert [node.path for node in cameras(kernel)] == [PATH]
+        with pytest.raises(WrongDeviceError, match=r"libcamera.*; found: /dev/video0 \(Mock Webcam\)$"):
+            open_camera("/dev/video1")
+
+    @pytest.mark.parametrize("number", [errno.EINVAL, errno.EPIPE, errno.ENOLINK])
+    def test_a_pipeline_whose_node_does_not_tell_is_known_by_not_starting(
+        self, open_camera: Open, kernel: MockKernel, webcam: MockCamera, number: int
+    ) -> None:
+        """As older kernels' nodes of ribbon-cable cameras do: they grant formats, and then do not start."""
+        webcam.start_error = number
+        with pytest.raises(WrongDeviceError, match=r"does not start as a camera of its own .* through libcamera"):
+            open_camera()
+        assert kernel.open_files == 0
 
     def test_a_name_that_two_cameras_have_is_refused(self, open_camera: Open, kernel: MockKernel) -> None:
         kernel.plug("/dev/video2", MockCamera())

@@ -6,6 +6,10 @@ from typing import Any
 
 import pytest
 
+from drivers.device import KeptOpen
+from drivers.errors import DeviceLostError
+from hil_mocks.i2c.bno055 import BOOT_S, TO_CONFIG_S
+
 ACC_DATA = 0x08
 RigMaker = Callable[..., Any]
 
@@ -79,9 +83,63 @@ def test_perfect_rest_is_no_silence(rig: RigMaker, at_rest: Any) -> None:
 
 
 def test_a_system_error_is_mended_by_a_reset(rig: RigMaker) -> None:
+    """Though it does not acknowledge that, nor anything until it has booted."""
     bench = rig("bno055")
     bench.read_for(0.5)
     bench.chip.registers[0x39] = 1
     bench.read_for(2)
-    assert bench.device.counts["chip_reset"] == 1
+    assert bench.device.counts["chip_reset"] == bench.chip.resets == 1
     assert bench.chip.registers[0x39] == 5
+
+
+def test_a_chip_that_never_comes_back_from_its_reset_is_told(rig: RigMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("hil_mocks.i2c.bno055.BOOT_S", 60.0)
+    bench = rig("bno055")
+    bench.read_for(0.5)
+    bench.chip.registers[0x39] = 1
+    with pytest.raises(DeviceLostError, match="does not come back from a reset; switch its supply off and on"):
+        bench.read_for(2)
+
+
+def test_it_starts_without_a_reset_and_at_once(rig: RigMaker) -> None:
+    bench = rig("bno055")
+    assert bench.read_for(0.2)
+    assert bench.chip.resets == 0
+    assert bench.clock.monotonic_ns() - bench.began_ns < 0.3e9
+
+
+def test_settings_that_another_program_left_are_written_anew(rig: RigMaker) -> None:
+    """Units of mg and radians, turned axes, a running fusion mode, in which no setting is taken."""
+    bench = rig("bno055", motion=lambda _: ((0.2, -0.1, 0.3), (1.0, -2.0, 9.8)))
+    left = bench.chip.registers
+    left[0x07], left[0x3B], left[0x3D], left[0x41] = 0, 0x83, 0x0C, 0x21
+    samples = bench.read_for(0.3)
+    assert samples[-1].gyro == pytest.approx((0.2, -0.1, 0.3), abs=0.001)
+    assert samples[-1].accel == pytest.approx((1.0, -2.0, 9.8), abs=0.01)
+    assert bench.chip.resets == 0
+
+
+def test_after_a_brown_out_it_is_back_when_it_has_booted(rig: RigMaker) -> None:
+    bench = rig("bno055")
+    kept = KeptOpen("imu", bench.open, bench.clock)
+    while not kept.read():
+        pass
+    bench.chip.brown_out()
+    began_ns = bench.clock.monotonic_ns()
+    while not kept.read():
+        assert bench.clock.monotonic_ns() - began_ns < 2e9
+    assert bench.clock.monotonic_ns() - began_ns > BOOT_S * 1e9
+    assert bench.chip.resets == 1
+
+
+def test_the_model_takes_no_setting_before_it_is_in_config(rig: RigMaker) -> None:
+    bench = rig("bno055")
+    bench.read_for(0.2)
+    chip = bench.chip
+    chip.write(0x3D, b"\0")
+    bench.clock.sleep_s(TO_CONFIG_S - 0.001)
+    chip.write(0x3B, b"\x80")
+    assert chip.read(0x3B, 1) == b"\0"
+    bench.clock.sleep_s(0.001)
+    chip.write(0x3B, b"\x80")
+    assert chip.read(0x3B, 1) == b"\x80"

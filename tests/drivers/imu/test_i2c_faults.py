@@ -215,7 +215,7 @@ def test_whatever_another_program_left_behind_is_reset(
     monkeypatch.setattr(bench.chip, "power_up", lambda: (resets.append(1), power_up()))
     bench.chip.registers[0x7F] = 0x20  # an ICM-20948's bank
     assert_true(bench, bench.read_for(0.3), within_s=0.01)
-    assert resets == [1]
+    assert len(resets) == (driver != "bno055")  # which is not reset but configured anew
 
 
 @every_chip

@@ -150,17 +150,18 @@ def test_a_range_of_rates_is_kept_to(tree: Tree) -> None:
     assert polled(root, VirtualClock()).rate_hz == 100
 
 
-def test_gyro_and_accelerometer_may_be_two_devices(tree: Tree) -> None:
+@pytest.mark.parametrize(("chip", "joint"), [("lsm6dso", "_"), ("icm42688", "-"), ("icm45686", "-")])
+def test_gyro_and_accelerometer_may_be_two_devices(tree: Tree, chip: str, joint: str) -> None:
     gyro = {name: value for name, value in MPU6050.items() if "accel" not in name}
     root = tree()
     for path in (root / "iio:device0").glob("in_accel*"):
         path.unlink()
-    (root / "iio:device0/name").write_text("lsm6dso_gyro\n")
-    tree("iio:device1", files={"name": "lsm6dso_accel"})
+    (root / "iio:device0/name").write_text(f"{chip}{joint}gyro\n")
+    tree("iio:device1", files={"name": f"{chip}{joint}accel"})
     for name in gyro:
         if "anglvel" in name:
             (root / "iio:device1" / name).unlink()
-    device = polled(root, VirtualClock(), "lsm6dso")
+    device = polled(root, VirtualClock(), chip)
     (sample,) = device.read()
     assert sample.accel[0] == pytest.approx(-2000 * ACCEL_SCALE)
     device.close()
