@@ -74,7 +74,8 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
     if number < 0 or not known:
         return
     for i in range(edges.count):
-        seen = edges.matched[i] != 0 and not edges.is_own_part(i)
+        # while it stands, all that is seen stays where it is, and is no part of the vehicle for that
+        seen = edges.matched[i] != 0 and (stood or not edges.is_own_part(i))
         if seen and key_frames.oldest_key(edges, i, keys) <= number:
             look(test, edges, i, number % KEYS, baselines, around)
     shows_ground = test.ground >= MIN_GROUND_EDGES
