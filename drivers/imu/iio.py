@@ -2,7 +2,8 @@
 
 Linux, ``Documentation/ABI/testing/sysfs-bus-iio``. With a buffer (and its trigger, where it has one) whole scans come
 from ``/dev/iio:deviceN`` with the kernel's stamps; without, the values are polled. Some drivers show gyro and
-accelerometer as two devices (``lsm6dso_gyro``, ``lsm6dso_accel``; ``icm42688-gyro``, ``icm42688-accel``): these are polled together.
+accelerometer as two devices (``lsm6dso_gyro``, ``lsm6dso_accel``; ``icm42688-gyro``, ``icm42688-accel``): these are
+polled together.
 """
 
 import argparse
