@@ -48,6 +48,7 @@ ImuDriver = Literal[
     "icm20948",
     "lsm6ds3",
     "lsm6dso",
+    "lsm6dso32",
     "bmi160",
     "bmi270",
     "bno055",
@@ -106,7 +107,7 @@ class Imu(Table, frozen=True):
     recording: str = ""  # what driver = "recording" replays
     rate_hz: Annotated[float, msgspec.Meta(ge=10, le=1000)] = 200.0
     gyro_range_dps: Literal[250, 500, 1000, 2000] = 500
-    accel_range_g: Literal[2, 4, 8, 16] = 4
+    accel_range_g: Literal[2, 4, 8, 16, 32] = 4
     axes: list[
         list[Annotated[float, msgspec.Meta(ge=-2, le=2)]]
     ] = []  # 3x3 rotation into the camera frame; empty: the recording's, else identity

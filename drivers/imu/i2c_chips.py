@@ -21,6 +21,7 @@ CHIPS = {
     "icm20948": "Icm20948",
     "lsm6ds3": "Lsm6ds3",
     "lsm6dso": "Lsm6dso",
+    "lsm6dso32": "Lsm6dso32",
     "bmi160": "Bmi160",
     "bmi270": "Bmi270",
     "bno055": "Bno055",

@@ -1,13 +1,16 @@
 """ST LSM6DSO and LSM6DSOX, which say the same of themselves: an LSM6DS3 with another FIFO.
 
 LSM6DSO data sheet DS12140 revision 2; LSM6DSOX data sheet DS12814 revision 3. Each word of the FIFO has a tag that
-says which sensor it is of and, by a count of two bits, of which moment.
+says which sensor it is of and, by a count of two bits, of which moment. The LSM6DSO32 says the same of itself too, but
+its counts of acceleration are worth twice as much: only gravity at rest tells them apart.
 """
 
 import struct
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 
+from drivers.errors import WrongDeviceError
+from drivers.imu.gravity import Gravity
 from drivers.imu.i2c_chips import run_by_hand
 from drivers.imu.i2c_imu import Counts, Thermometer
 from drivers.imu.lsm6ds3 import (
@@ -21,6 +24,7 @@ from drivers.imu.lsm6ds3 import (
     STEADY_WORDS,
     Lsm6ds3,
 )
+from drivers.records import ImuSample
 
 FIFO_CTRL3 = 0x09  # 7:4 BDR_GY, 3:0 BDR_XL
 FIFO_CTRL4 = 0x0A  # 2:0 FIFO_MODE
@@ -29,11 +33,16 @@ FIFO_DATA_OUT_TAG = 0x78  # 7:3 TAG_SENSOR, 2:1 TAG_CNT; a burst goes round to h
 GYRO, ACCEL = 1, 2  # TAG_SENSOR
 OVER_RUN_OR_FULL = 0x6800  # FIFO_OVR_IA, FIFO_FULL_IA, FIFO_OVR_LATCHED; of FIFO_STATUS1 and 2
 
+LEAST_GRAVITY, MOST_GRAVITY = 0.75, 1.35  # g; one chip taken for the other measures a half or two
+
 IDENTITIES = {0x6C: "LSM6DSO or LSM6DSOX"}
 
 
 class Lsm6dso(Lsm6ds3):
-    """LSM6DSO or LSM6DSOX; see ``I2cImu``. ``counts["unpaired"]``: words whose other half never came."""
+    """LSM6DSO or LSM6DSOX; see ``I2cImu``. ``counts["unpaired"]``: words whose other half never came.
+
+    Reading raises ``WrongDeviceError`` when what is measured at rest is not about 1 g.
+    """
 
     chip = "LSM6DSO"
     identities = IDENTITIES
@@ -42,6 +51,8 @@ class Lsm6dso(Lsm6ds3):
     fifo_bytes = 512 * 7
     word_bytes = 7
     frame = struct.Struct("<B3h")
+    twin = ("lsm6dso32", 0.5)  # the driver of the chip that says the same of itself, and what that would measure, g
+    _gravity: Gravity | None = None
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
         odr = ODR_HZ[self.rate_hz]
@@ -61,6 +72,18 @@ class Lsm6dso(Lsm6ds3):
         self._write(FIFO_CTRL4, CONTINUOUS)
         self._halves: dict[int, Counts] = {}  # of the sample that is coming, by sensor
         self._moment = 0
+
+    def _samples(self) -> list[ImuSample]:
+        samples = super()._samples()
+        if self._gravity is None:
+            self._gravity = Gravity(self.rate_hz)
+        gravity = self._gravity.measured_g(samples)
+        if gravity is not None and not LEAST_GRAVITY <= gravity <= MOST_GRAVITY:
+            driver, expected = self.twin
+            is_twin = LEAST_GRAVITY <= gravity / expected <= MOST_GRAVITY
+            remedy = f"set imu.driver to {driver}" if is_twin else "its accelerometer is broken; take another board"
+            raise WrongDeviceError(f"{self.name}: measures {gravity:.2f} g at rest instead of 1 g; {remedy}")
+        return samples
 
     def _frames(self, data: bytes) -> Iterator[tuple[Counts, Counts]]:
         for tag, x, y, z in self.frame.iter_unpack(data):

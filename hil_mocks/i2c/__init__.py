@@ -10,7 +10,7 @@ from hil_mocks.i2c.bno055 import Bno055
 from hil_mocks.i2c.bus import SimulatedBus
 from hil_mocks.i2c.chip import SimulatedChip
 from hil_mocks.i2c.icm20948 import Icm20948
-from hil_mocks.i2c.lsm6 import Lsm6ds3, Lsm6dso
+from hil_mocks.i2c.lsm6 import Lsm6ds3, Lsm6dso, Lsm6dso32
 from hil_mocks.i2c.motion import Motion, replay
 from hil_mocks.i2c.mpu import Mpu6050, Mpu6500, Mpu9250
 
@@ -21,6 +21,7 @@ CHIPS: dict[str, type[SimulatedChip]] = {
     "icm20948": Icm20948,
     "lsm6ds3": Lsm6ds3,
     "lsm6dso": Lsm6dso,
+    "lsm6dso32": Lsm6dso32,
     "bmi160": Bmi160,
     "bmi270": Bmi270,
     "bno055": Bno055,

@@ -21,6 +21,7 @@ class Lsm6(SimulatedChip):
 
     address = 0x6A
     lsb_per_c: float
+    force_mg_per_count = FORCE_MG_PER_COUNT
 
     def rate_hz(self) -> float:
         """Sample rate; 0 switched off."""
@@ -29,7 +30,7 @@ class Lsm6(SimulatedChip):
     def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
         """OUT_TEMP_L to OUTZ_H_XL."""
         turn_radps = math.radians(TURN_MDPS_PER_COUNT[self.registers[0x11] >> 2 & 3]) / 1e3
-        force_mps2 = G_MPS2 * FORCE_MG_PER_COUNT[self.registers[0x10] >> 2 & 3] / 1e3
+        force_mps2 = G_MPS2 * self.force_mg_per_count[self.registers[0x10] >> 2 & 3] / 1e3
         warmth = round((self.celsius - 25) * self.lsb_per_c)
         return {
             0x20: warmth.to_bytes(2, "little", signed=True),
@@ -129,3 +130,9 @@ class Lsm6dso(Lsm6):
             return super()._burst(register, length)
         words = [self._fifo.popleft() for _ in range(min(-(-length // 7), len(self._fifo)))]
         return b"".join(words).ljust(length, b"\x00")[:length]
+
+
+class Lsm6dso32(Lsm6dso):
+    """LSM6DSO32: an LSM6DSO whose codes mean 4, 32, 8, 16 g, with the same identity."""
+
+    force_mg_per_count = (0.122, 0.976, 0.244, 0.488)

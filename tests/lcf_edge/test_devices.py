@@ -15,7 +15,7 @@ from hil_mocks.virtual_clock import VirtualClock
 from lcf_edge.config import Config, ImuDriver, load
 from lcf_edge.devices import SERIAL, open_camera, open_imu, open_speed
 
-I2C = ("mpu6050", "mpu6500", "mpu9250", "icm20948", "lsm6ds3", "lsm6dso", "bmi160", "bmi270", "bno055")
+I2C = ("mpu6050", "mpu6500", "mpu9250", "icm20948", "lsm6ds3", "lsm6dso", "lsm6dso32", "bmi160", "bmi270", "bno055")
 
 
 def write_recording(folder: Path, *, imu: bool = True) -> Path:

@@ -32,12 +32,12 @@ BMI_GYRO = {250: 133e-6, 500: 266e-6, 1000: 532e-6, 2000: 1065e-6}
 BNO_GYRO = dict.fromkeys((250, 500, 1000, 2000), math.radians(1) / 16)  # data sheet: 16 counts for 1 °/s
 KERNEL_GYRO = {
     **dict.fromkeys(("mpu6050", "mpu6500", "mpu9250", "icm20948"), INV_GYRO),
-    **dict.fromkeys(("lsm6ds3", "lsm6dso"), ST_GYRO),
+    **dict.fromkeys(("lsm6ds3", "lsm6dso", "lsm6dso32"), ST_GYRO),
     **dict.fromkeys(("bmi160", "bmi270"), BMI_GYRO),
     "bno055": BNO_GYRO,
 }
 KERNEL_ACCEL = {2: 598e-6, 4: 1197e-6, 8: 2394e-6, 16: 4788e-6}
-ST_ACCEL = {2: 61e-6 * 9.80665, 4: 122e-6 * 9.80665, 8: 244e-6 * 9.80665, 16: 488e-6 * 9.80665}
+ST_ACCEL = {2: 61e-6 * 9.80665, 4: 122e-6 * 9.80665, 8: 244e-6 * 9.80665, 16: 488e-6 * 9.80665, 32: 976e-6 * 9.80665}
 
 
 @every_chip
@@ -104,13 +104,21 @@ def test_gyro_count_is_the_kernels(rig: RigMaker, driver: str, gyro_range_dps: i
 
 
 @every_chip
-@pytest.mark.parametrize("accel_range_g", [2, 4, 8, 16])
+@pytest.mark.parametrize("accel_range_g", [2, 4, 8, 16, 32])
 def test_accelerometer_count_is_the_kernels(rig: RigMaker, driver: str, accel_range_g: int) -> None:
     settings = ImuSettings(accel_range_g=accel_range_g)
+    if accel_range_g == 32 and driver != "lsm6dso32":
+        with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 2, 4"):
+            rig(driver, settings=settings).open()
+        return
     if driver == "bno055":
         if accel_range_g > 4:
             with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 2, 4"):
                 rig(driver, settings=settings).open()
+        return
+    if driver == "lsm6dso32" and accel_range_g == 2:
+        with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 4, 8, 16, 32"):
+            rig(driver, settings=settings).open()
         return
     expected = (ST_ACCEL if driver.startswith("lsm") else KERNEL_ACCEL)[accel_range_g]
 

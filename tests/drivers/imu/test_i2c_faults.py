@@ -27,6 +27,7 @@ from hil_mocks.i2c import CHIPS as MODELS
 RigMaker = Callable[..., Any]
 every_chip = pytest.mark.parametrize("driver", CHIPS)
 FIFO_CHIPS = [driver for driver in CHIPS if driver != "bno055"]
+ST = ("lsm6ds3", "lsm6dso", "lsm6dso32")
 every_fifo_chip = pytest.mark.parametrize("driver", FIFO_CHIPS)
 
 FIFO_REGISTER = {
@@ -34,6 +35,7 @@ FIFO_REGISTER = {
     "icm20948": 0x72,
     "lsm6ds3": 0x3E,
     "lsm6dso": 0x78,
+    "lsm6dso32": 0x78,
     "bmi160": 0x24,
     "bmi270": 0x26,
 }
@@ -190,7 +192,7 @@ def test_a_chip_that_does_not_keep_a_setting_is_told(
     rig: RigMaker, driver: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = rig(driver)
-    scale = {"icm20948": 0x2001, "bmi160": 0x43, "bmi270": 0x43, "lsm6ds3": 0x11, "lsm6dso": 0x11}.get(driver, 0x1B)
+    scale = {"icm20948": 0x2001, "bmi160": 0x43, "bmi270": 0x43, **dict.fromkeys(ST, 0x11)}.get(driver, 0x1B)
     honest = bench.chip._burst
 
     def counterfeit(register: int, length: int) -> bytes:
@@ -299,6 +301,39 @@ def test_unplugged_and_plugged_in_again_it_comes_back(rig: RigMaker, driver: str
         samples = list(kept.read())
     assert bench.clock.monotonic_ns() - plugged_ns < 2.5e9
     assert kept.counts["opened"] == 2
+
+
+@pytest.mark.parametrize(("driver", "model", "gravity"), [("lsm6dso", "lsm6dso32", 0.5), ("lsm6dso32", "lsm6dso", 2.0)])
+def test_a_twin_that_says_the_same_of_itself_is_known_by_gravity_at_rest(
+    rig: RigMaker, at_rest: Any, driver: str, model: str, gravity: float
+) -> None:
+    bench = rig(driver, motion=at_rest)
+    bench.wire.chips = {0x6A: rig(model, motion=at_rest).chip}
+    bench.wire.chips[0x6A]._clock = bench.clock
+    with pytest.raises(WrongDeviceError) as told:
+        bench.read_for(1.5)
+    assert str(told.value) == (
+        f"{bench.device.name}: measures {gravity:.2f} g at rest instead of 1 g; set imu.driver to {model}"
+    )
+
+
+def test_a_broken_accelerometer_is_told(rig: RigMaker) -> None:
+    bench = rig("lsm6dso", motion=lambda _: ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
+    with pytest.raises(WrongDeviceError, match=r"0\.00 g at rest instead of 1 g; its accelerometer is broken"):
+        bench.read_for(1.5)
+
+
+def test_a_vehicle_that_drives_off_is_not_judged_before_it_rests(rig: RigMaker, at_rest: Any) -> None:
+    def driving(t: float) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        return (0.0, 0.0, math.sin(9 * t)), (0.0, 0.0, 9.8 + 3 * math.sin(20 * t))
+
+    bench = rig("lsm6dso", motion=lambda t: driving(t) if t < 3 else at_rest(t))
+    twin = rig("lsm6dso32", motion=bench.chip._motion).chip
+    twin._clock = bench.clock
+    bench.wire.chips = {0x6A: twin}
+    assert bench.read_for(2.8)
+    with pytest.raises(WrongDeviceError, match=r"set imu\.driver to lsm6dso32"):
+        bench.read_for(2)
 
 
 def test_lsm6dso_pairs_words_by_their_moment(rig: RigMaker) -> None:

@@ -89,7 +89,8 @@ def test_a_chip_at_rest_is_told_with_rate_gravity_and_bias(look: Look, driver: s
 def test_every_chip_is_recognised_at_both_addresses(clock: VirtualClock, driver: str, last: int) -> None:
     address = CHIPS[driver].address | last
     found = list(wiring.chips(Bus(clock, driver, resting(), address).open(1)))
-    assert [(chip.driver, chip.address) for chip in found] == [(driver, address)]
+    named = driver if driver != "lsm6dso32" else "lsm6dso"  # which says the same of itself
+    assert [(chip.driver, chip.address) for chip in found] == [(named, address)]
 
 
 def test_a_chip_at_the_other_address_comes_with_the_setting(look: Look) -> None:
