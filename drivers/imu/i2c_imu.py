@@ -94,6 +94,7 @@ class I2cImu(ABC):
     usual_address: ClassVar[int]
     identity_register: ClassVar[int]
     identities: ClassVar[Mapping[int, str]]  # value → model
+    relatives: ClassVar[Mapping[int, str]] = {}  # value → driver, of chips at the same address and register
     gyro_ranges: ClassVar[Mapping[int, Range]]  # by °/s
     accel_ranges: ClassVar[Mapping[int, Range]]  # by g
     thermometer: Thermometer
@@ -195,9 +196,11 @@ class I2cImu(ABC):
             ) from error
         if found not in self.identities:
             known = ", ".join(f"0x{value:02x}" for value in self.identities)
+            driver = self.relatives.get(found)
+            remedy = f"set imu.driver to {driver}" if driver else "set imu.driver or imu.address"
             raise WrongDeviceError(
                 f"{self._bus.path}: the chip at 0x{self.address:02x} says 0x{found:02x}, a {self.chip} says {known};"
-                " set imu.driver or imu.address"
+                f" {remedy}"
             )
         return self.identities[found]
 

@@ -36,6 +36,12 @@ FILTERS_HZ = {1: 184, 2: 92, 3: 41, 4: 20, 5: 10, 6: 5}  # DLPF_CFG: the narrowe
 RESET_S = 0.1
 
 IDENTITIES = {0x68: "MPU-6050"}
+FAMILY = {
+    0x68: "mpu6050",
+    **dict.fromkeys((0x70, 0x72, 0x74, 0x78, 0x98), "mpu6500"),
+    **dict.fromkeys((0x71, 0x73), "mpu9250"),
+}
+"""What they say of themselves → driver; boards sold as one carry another."""
 GYRO_RANGES = {250: Range(0, 131.0), 500: Range(1, 65.5), 1000: Range(2, 32.8), 2000: Range(3, 16.4)}
 ACCEL_RANGES = {2: Range(0, 16384), 4: Range(1, 8192), 8: Range(2, 4096), 16: Range(3, 2048)}
 
@@ -47,6 +53,7 @@ class Mpu6050(FifoImu):
     usual_address = 0x68
     identity_register = WHO_AM_I
     identities = IDENTITIES
+    relatives = FAMILY
     gyro_ranges = GYRO_RANGES
     accel_ranges = ACCEL_RANGES
     thermometer = Thermometer(TEMP_OUT, "big", lsb_per_c=340, zero_c=36.53)

@@ -1,7 +1,9 @@
 """TDK InvenSense MPU-6500: an MPU-6050 with another thermometer, half the FIFO and a filter of the accelerometer's own.
 
 MPU-6500 Register Map and Descriptions, RM-MPU-6500A-00 revision 2.1; Product Specification, PS-MPU-6500A-01
-revision 1.3.
+revision 1.3. The MPU-6515 and MPU-6880 differ in what they say of themselves alone, as Linux has it (inv_mpu_iio.h);
+0x72 is said by copies. 0x98 is the ICM-20689, found on many boards that are sold with an MPU-6050: its thermometer is
+another (ICM-20689 data sheet, DS-000143, and Linux), and no more than 512 bytes of its FIFO are used.
 """
 
 import sys
@@ -13,7 +15,14 @@ from drivers.imu.mpu6050 import TEMP_OUT, Mpu6050
 
 ACCEL_CONFIG_2 = 0x1D  # 2:0 A_DLPF_CFG, the same codes as DLPF_CFG
 
-IDENTITIES = {0x70: "MPU-6500"}
+IDENTITIES = {
+    0x70: "MPU-6500",
+    0x72: "MPU-6500 (a copy)",
+    0x74: "MPU-6515",
+    0x78: "MPU-6880",
+    0x98: "ICM-20689",
+}
+ICM20689_THERMOMETER = Thermometer(TEMP_OUT, "big", lsb_per_c=326.8, zero_c=25.0)
 
 
 class Mpu6500(Mpu6050):
@@ -23,6 +32,11 @@ class Mpu6500(Mpu6050):
     identities = IDENTITIES
     thermometer = Thermometer(TEMP_OUT, "big", lsb_per_c=333.87, zero_c=21.0)
     fifo_bytes = 512
+
+    def _reset(self) -> None:
+        if self.model == "ICM-20689":
+            self.thermometer = ICM20689_THERMOMETER
+        super()._reset()
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
         return {**super()._registers(gyro_code, accel_code), ACCEL_CONFIG_2: self._filter()}

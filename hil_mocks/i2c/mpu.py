@@ -82,3 +82,15 @@ class Mpu9250(Mpu6500):
     """MPU-9250."""
 
     power_on: ClassVar[Mapping[int, int]] = {0x6B: 0x01, 0x75: 0x71}
+
+
+class Icm20689(Mpu6500):
+    """ICM-20689, as boards have it that are sold with an MPU-6050. ACCEL_CONFIG_2 has the size of its FIFO."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x1D: 0x80, 0x6B: 0x40, 0x75: 0x98}
+    lsb_per_c, zero_c = 326.8, 25.0
+
+    def push(self, packed: Mapping[int, bytes]) -> None:
+        """7:6 FIFO_SIZE: 512, 1024, 2048 or 4096 bytes."""
+        self.fifo_bytes = 512 << (self.registers[0x1D] >> 6)
+        super().push(packed)

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from drivers.clock import SYSTEM_CLOCK
-from drivers.errors import DeviceLostError, UnsupportedSettingError
+from drivers.errors import DeviceLostError, UnsupportedSettingError, WrongDeviceError
 from drivers.imu import mpu6050
 from drivers.imu.i2c_bus import I2cBus
 from drivers.imu.i2c_chips import CHIPS, chip_on, open_chip
@@ -19,6 +19,7 @@ from drivers.records import ImuSample
 from hil_mocks.i2c import CHIPS as CHIP_MODELS
 from hil_mocks.i2c import SimulatedBus, replay
 from hil_mocks.i2c.lsm6 import Lsm6dsTrC
+from hil_mocks.i2c.mpu import Icm20689
 from hil_mocks.virtual_clock import VirtualClock
 
 RigMaker = Callable[..., Any]
@@ -174,6 +175,46 @@ def test_lsm6ds3tr_c_has_a_thermometer_of_its_own() -> None:
     for _ in range(10):
         device.read()
     assert device.temperature_c == pytest.approx(41.0, abs=0.1)
+
+
+def test_an_icm20689_sold_as_mpu6050_runs_as_mpu6500_with_its_own_thermometer(rig: RigMaker) -> None:
+    bench = rig("mpu6500")
+    chip = Icm20689(bench.motion, bench.clock, celsius=41.0)
+    bench.wire.chips = {0x68: chip}
+    bench.read_for(1.2)
+    assert bench.device.model == "ICM-20689"
+    assert bench.device.temperature_c == pytest.approx(41.0, abs=0.1)
+    bench.clock.sleep_s(2)  # its FIFO runs over
+    bench.device.read()
+    assert bench.device.counts["fifo_overflow"] == 1
+    for sample in bench.read_for(0.5):
+        assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.01)
+
+
+@pytest.mark.parametrize("identity", [0x70, 0x72, 0x74, 0x78])
+def test_the_whole_6500_family_is_known(rig: RigMaker, identity: int) -> None:
+    bench = rig("mpu6500")
+    bench.chip.registers[0x75] = identity
+    bench.chip.power_on = {**bench.chip.power_on, 0x75: identity}
+    for sample in bench.read_for(0.5):
+        assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.01)
+
+
+@pytest.mark.parametrize(
+    ("driver", "identity", "remedy"),
+    [
+        *(("mpu6050", identity, "mpu6500") for identity in (0x70, 0x72, 0x74, 0x78, 0x98)),
+        ("mpu6050", 0x71, "mpu9250"),
+        ("mpu6500", 0x68, "mpu6050"),
+        ("mpu6500", 0x73, "mpu9250"),
+        ("mpu9250", 0x70, "mpu6500"),
+    ],
+)
+def test_a_relative_is_told_with_its_driver(rig: RigMaker, driver: str, identity: int, remedy: str) -> None:
+    bench = rig(driver)
+    bench.chip.registers[0x75] = identity
+    with pytest.raises(WrongDeviceError, match=rf"says 0x{identity:02x}, .*; set imu\.driver to {remedy}$"):
+        bench.open()
 
 
 @every_chip
