@@ -76,6 +76,7 @@ class Lsm6ds3(FifoImu):
         if self.model == "LSM6DS3TR-C":
             self.thermometer = Thermometer(OUT_TEMP_L, "little", lsb_per_c=256, zero_c=25.0)
             self.fifo_bytes = 4096
+        self._write(FIFO_CTRL5, 0)  # a reset while the FIFO fills is not acknowledged (richcreations/imud#72)
         self._write(CTRL3_C, SW_RESET)
         self._clock.sleep_s(RESET_S)
 

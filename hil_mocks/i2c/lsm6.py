@@ -17,7 +17,7 @@ TURN_MDPS_PER_COUNT = (8.75, 17.5, 35.0, 70.0)  # by FS_G
 
 
 class Lsm6(SimulatedChip):
-    """What both have alike."""
+    """What both have alike. A reset while the FIFO fills is neither acknowledged nor done."""
 
     address = 0x6A
     lsb_per_c: float
@@ -40,6 +40,8 @@ class Lsm6(SimulatedChip):
 
     def _set(self, register: int, value: int) -> None:
         if register == 0x12 and value & 0x01:
+            if self.registers[self.mode_register] & 7:
+                raise self.not_acknowledged()
             self.power_up()
         elif register == self.mode_register and not value & 7:
             super()._set(register, value)

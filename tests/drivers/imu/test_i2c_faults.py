@@ -220,6 +220,15 @@ def test_whatever_another_program_left_behind_is_reset(
     assert len(resets) == (driver != "bno055")  # which is not reset but configured anew
 
 
+@pytest.mark.parametrize("driver", ST)
+def test_a_chip_whose_fifo_another_program_left_filling_is_reset_all_the_same(rig: RigMaker, driver: str) -> None:
+    bench = rig(driver)
+    bench.read_for(0.3)
+    again = bench.open()
+    assert again.read() is not None
+    assert again.counts["nack"] == 0
+
+
 @every_chip
 def test_a_chip_that_reset_itself_is_set_up_again(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
