@@ -28,8 +28,10 @@ from drivers.records import ImuSample
 
 FIFO_CTRL3 = 0x09  # 7:4 BDR_GY, 3:0 BDR_XL
 FIFO_CTRL4 = 0x0A  # 2:0 FIFO_MODE
+CTRL9_XL = 0x18
 FIFO_DATA_OUT_TAG = 0x78  # 7:3 TAG_SENSOR, 2:1 TAG_CNT; a burst goes round to here after the 6 bytes of data
 
+NO_I3C = 0xE2  # CTRL9_XL: I3C_disable, else as at power-on: what passes on the wire might be taken for I3C
 GYRO, ACCEL = 1, 2  # TAG_SENSOR
 OVER_RUN_OR_FULL = 0x6800  # FIFO_OVR_IA, FIFO_FULL_IA, FIFO_OVR_LATCHED; of FIFO_STATUS1 and 2
 
@@ -57,6 +59,7 @@ class Lsm6dso(Lsm6ds3):
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
         odr = ODR_HZ[self.rate_hz]
         return {
+            CTRL9_XL: NO_I3C,
             CTRL3_C: STEADY_WORDS,
             CTRL1_XL: odr << 4 | accel_code << 2,
             CTRL2_G: odr << 4 | gyro_code << 2,

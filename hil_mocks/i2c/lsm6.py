@@ -102,10 +102,15 @@ class Lsm6dsTrC(Lsm6ds3):
 class Lsm6dso(Lsm6):
     """LSM6DSO: a FIFO of tagged words of 7 bytes."""
 
-    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6C, 0x12: 0x04}
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6C, 0x12: 0x04, 0x18: 0xE0}
     lsb_per_c = 256.0
     mode_register = 0x0A
     _moment = 0
+
+    @property
+    def listens_to_i3c(self) -> bool:
+        """CTRL9_XL: until I3C_disable is set."""
+        return not self.registers[0x18] & 0x02
 
     def push(self, packed: Mapping[int, bytes]) -> None:
         """Both sensors at the rates of FIFO_CTRL3."""

@@ -345,6 +345,14 @@ def test_a_vehicle_that_drives_off_is_not_judged_before_it_rests(rig: RigMaker, 
         bench.read_for(2)
 
 
+@pytest.mark.parametrize("driver", ["lsm6dso", "lsm6dso32"])
+def test_lsm6dso_speaks_i2c_alone(rig: RigMaker, driver: str) -> None:
+    bench = rig(driver)
+    assert bench.chip.listens_to_i3c
+    bench.read_for(0.1)
+    assert not bench.chip.listens_to_i3c
+
+
 def test_lsm6dso_pairs_words_by_their_moment(rig: RigMaker) -> None:
     bench = rig("lsm6dso")
     bench.read_for(1)
