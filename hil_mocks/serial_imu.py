@@ -80,18 +80,20 @@ class RvcEncoder:
 class XsensEncoder:
     """MTData2 with packet counter, sample time, acceleration, rate of turn and status.
 
-    ``form``: 0 float32, 1 fixed 12.20, 2 fixed 16.32, 3 float64.
+    ``form``: 0 float32, 1 fixed 12.20, 2 fixed 16.32, 3 float64. ``wrap``: after how many ticks of 0.1 ms the sample
+    time goes on from 0; 864,000,000 in the MTi-10 and 100 series.
     """
 
     baud = 115200
 
-    def __init__(self, form: int = 0) -> None:
+    def __init__(self, form: int = 0, wrap: int = 2**32) -> None:
         self._form = form
+        self._wrap = wrap
         self._packet = 0
 
     def __call__(self, sample: ImuSample) -> bytes:
         """See ``Encoder``."""
-        ticks = sample.stamp_ns // 100_000 % 2**32
+        ticks = sample.stamp_ns // 100_000 % self._wrap
         items = [
             (xsens.PACKET_COUNTER, struct.pack(">H", self._packet)),
             (xsens.SAMPLE_TIME_FINE, struct.pack(">I", ticks)),

@@ -18,7 +18,7 @@ FIRST_BYTE_S = 4.0  # many boards start anew when their port is opened
 STALLED_S = 1.0
 LONGEST_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
 FRAMES_BY_CHANCE = 3  # that noise can look like
-TICKS = 2**32  # counters of devices begin anew after so many
+TICKS = 2**32  # counters of most devices begin anew after so many
 LONGEST_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
 
 
@@ -32,6 +32,7 @@ class SerialProtocol:
     needs: str  # what must be switched on in the IMU, for the user
     rate_hz: float | None = None  # where it is always the same
     tick_hz: float | None = None  # of the device's own clock, where readings can have its time
+    wraps: tuple[int, ...] = (TICKS,)  # after how many ticks it goes on from 0, by series
 
 
 class SerialImu:
@@ -118,7 +119,7 @@ class SerialImu:
         before, self._ticks = self._ticks, reading.ticks
         if before is None:
             return 1
-        step = (reading.ticks - before) % TICKS
+        step = min((reading.ticks - before) % wrap for wrap in self._protocol.wraps)  # short with the right one
         return step if step <= LONGEST_PAUSE_S * self._unit_hz else 0
 
     def _sample(self, reading: Reading, stamp_ns: int) -> ImuSample:

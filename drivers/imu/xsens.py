@@ -29,6 +29,7 @@ TYPE_MASK = 0xFFF0
 FORMAT_MASK = 0x0003  # 0 float32, 1 fixed 12.20, 2 fixed 16.32, 3 float64
 
 SAMPLE_TIME_HZ = 10_000.0
+SAMPLE_TIME_WRAPS = (2**32, 864_000_000)  # MTi-1 and 600 series; MTi-10 and 100 series: after a day
 CLIPPED = 0x3F00  # StatusWord: an axis of the accelerometer (bits 8 to 10) or gyro (11 to 13) is out of range
 LONGEST_GAP = 1000  # packets; more means that the counter began anew
 
@@ -130,6 +131,7 @@ PROTOCOL = SerialProtocol(
     parser=XsensParser,
     needs="RateOfTurn and Acceleration in one message",
     tick_hz=SAMPLE_TIME_HZ,
+    wraps=SAMPLE_TIME_WRAPS,
 )
 
 

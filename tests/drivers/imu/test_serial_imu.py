@@ -326,6 +326,21 @@ def test_a_device_clock_goes_on_over_its_end(plug: Plug) -> None:
     device.close()
 
 
+@pytest.mark.parametrize("wrap", [2**32, 864_000_000])
+def test_an_xsens_clock_goes_on_over_the_end_of_its_series(plug: Plug, wrap: int) -> None:
+    encoder = XsensEncoder(wrap=wrap)
+    stand_in = plug(encoder)
+    clock = TurnedClock()
+    device = opened("xsens", stand_in, clock)
+    for sample in islice(still(100, start_ns=wrap * 100_000 - 50_000_000), 10):
+        clock.now_ns += 10_000_000
+        stand_in.send_bytes(encoder(sample))
+        read(device, 1)
+
+    assert not +device.counts
+    device.close()
+
+
 def test_rates_of_angles_are_in_seconds_of_the_vehicle(plug: Plug) -> None:
     """A BNO08x whose clock runs 3 % slow sends 97 frames a second; its turns are still right."""
     stand_in = plug(RvcEncoder())
