@@ -128,7 +128,7 @@ class Bmi270(Bmi160):
         self._lean = (factor - 0x80 if factor & 0x40 else factor) / 512
 
     def _read_firmware(self) -> bytes:
-        remedy = f"put Bosch's {FIRMWARE.name} there or set imu.firmware"
+        remedy = f"put Bosch's {FIRMWARE.name} there (docs/imus.md tells how to make it) or set imu.firmware"
         try:
             with self._firmware.open("rb") as file:
                 data = file.read(FIRMWARE_BYTES + 1)

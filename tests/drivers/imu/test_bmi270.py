@@ -1,5 +1,7 @@
 """BMI270: the vendor's configuration file, and the gyro's lean."""
 
+import re
+import subprocess
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -20,10 +22,27 @@ def test_a_missing_file_is_told(rig: RigMaker, tmp_path: Path) -> None:
         bench.open()
     assert str(told.value) == (
         f"{tmp_path}/nothing.fw: cannot be read (No such file or directory);"
-        " put Bosch's bmi270-init-data.fw there or set imu.firmware"
+        " put Bosch's bmi270-init-data.fw there (docs/imus.md tells how to make it) or set imu.firmware"
     )
     assert not told.value.retry
     assert bench.wire.closed
+
+
+def test_the_documents_recipe_makes_the_file_of_boschs_source(rig: RigMaker, tmp_path: Path) -> None:
+    document = (Path(__file__).parents[3] / "docs/imus.md").read_text(encoding="utf-8")
+    (recipe,) = re.findall(r"^```bash\n(.*?bmi270.*?)^```$", document, re.M | re.S)
+    rows = [", ".join(f"0x{byte:02x}" for byte in Bmi270.firmware[at : at + 14]) for at in range(0, 8192, 14)]
+    (tmp_path / "bmi270.c").write_text(
+        "#define BMI270_CHIP_ID 0x24\n"
+        "/*! @name  Global array that stores the configuration file of BMI270 */\n"
+        "const uint8_t bmi270_config_file[] = {\n    " + ",\n    ".join(rows) + "\n};\n\n"
+        "const struct bmi2_feature_config bmi270_feat_in[] = { { .page = 0x01, .start_addr = 0x0C } };\n"
+    )
+    said = subprocess.run(["bash", "-ec", recipe], cwd=tmp_path, check=True, capture_output=True, text=True).stdout
+    assert said.startswith("8192 ")
+    bench = rig("bmi270")
+    bench.firmware = tmp_path / "bmi270-init-data.fw"
+    assert bench.read_for(0.2)
 
 
 @pytest.mark.parametrize("size", [0, 8191, 8193, 100_000])
