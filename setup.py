@@ -40,7 +40,8 @@ MACROS = [
     ("CYTHON_LIMITED_API", "1"),
     ("CYTHON_CLINE_IN_TRACEBACK", "0"),
 ]
-FLAGS = ["-O3", "-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
+FLAGS = ["-O2", "-fvect-cost-model=dynamic"]  # as fast as -O3, and a twelfth smaller
+FLAGS += ["-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
 FLAGS += ["-g0", "-fno-asynchronous-unwind-tables"]  # a tenth smaller
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
@@ -107,7 +108,7 @@ def extensions() -> list[Extension]:
             [BOOTSTRAP, *(source for each in translated for source in each.sources)],
             define_macros=[*MACROS, ("SOURCES", quoted(sums)), ("MODULES", quoted((SHARED, *modules)))],
             extra_compile_args=FLAGS,
-            extra_link_args=["-s"],
+            extra_link_args=["-s", "-Wl,-z,noseparate-code"],
             py_limited_api=True,
         )
     ]

@@ -10,8 +10,8 @@ cdef double STILL_M
 cdef double MIN_R_PX
 
 cdef class Baselines:
-    cdef public double[:, ::1] h, rate_covariance
-    cdef public double[::1] focus_x, focus_y, depth_m, elapsed_s, sigma_px
+    cdef readonly double[:, ::1] h, rate_covariance
+    cdef readonly double[::1] focus_x, focus_y, depth_m, elapsed_s, sigma_px
     cdef public bint is_fitted
 
 cpdef void measure(Baselines baselines, KeyFrames keys, Homography h, Pinhole pinhole, Situation around) noexcept nogil

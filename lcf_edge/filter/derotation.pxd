@@ -16,8 +16,8 @@ cdef double MIN_SIGMA_PX
 
 cdef class OffLine:
     cdef public Py_ssize_t count
-    cdef public double[::1] pitch, yaw, roll, px, alone, alone_sigma
-    cdef public NormalEquations equations
+    cdef readonly double[::1] pitch, yaw, roll, px, alone, alone_sigma
+    cdef readonly NormalEquations equations
     cdef public double turn_x, turn_y, turn_z, sigma
 
 cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept nogil

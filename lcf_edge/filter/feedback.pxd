@@ -17,7 +17,7 @@ cdef int CIRCLE_SHAPE
 cdef int RECTANGLE_SHAPE
 
 cdef class Candidates:
-    cdef public unsigned char[::1] ignored, passing, ready
+    cdef readonly unsigned char[::1] ignored, passing, ready
     cdef int[::1] members, watched
 
 cpdef void advance(PsiColumns psi, CircleColumns normal, Situation around) noexcept nogil

@@ -40,20 +40,20 @@ cdef int FOCUS_Y
 cdef class FlowFit:
     cdef public int count
     cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px
-    cdef public double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, rest
-    cdef public int[::1] slot, cell, cells, bins
+    cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, rest
+    cdef readonly int[::1] slot, cell, cells, bins
     cdef public NormalEquations equations
 
-cpdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
-cpdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
-cpdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
-cpdef double quantile(FlowFit fit, double share) noexcept nogil
+cdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
+cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
+cdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
+cdef double quantile(FlowFit fit, double share) noexcept nogil
 cpdef double weight_of(double rest_px, double width_px) noexcept nogil
-cpdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
-cpdef double explained(FlowFit fit) noexcept nogil
-cpdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
+cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
+cdef double explained(FlowFit fit) noexcept nogil
+cdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
 cpdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
-cpdef void turn_slot(FlowFit fit, int k, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
-cpdef int slot_edges(FlowFit fit, int k) noexcept nogil
-cpdef void apply(FlowFit fit, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
+cdef void turn_slot(FlowFit fit, int k, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
+cdef int slot_edges(FlowFit fit, int k) noexcept nogil
+cdef void apply(FlowFit fit, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
 cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil

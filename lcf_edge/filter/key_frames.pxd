@@ -5,9 +5,9 @@ from lcf_edge.filter.columns cimport EdgeColumns
 cdef int KEYS
 
 cdef class KeyFrames:
-    cdef public double[:, :, ::1] rotation
-    cdef public double[:, ::1] displacement
-    cdef public double[::1] elapsed_s, sigma_rad
+    cdef readonly double[:, :, ::1] rotation
+    cdef readonly double[:, ::1] displacement
+    cdef readonly double[::1] elapsed_s, sigma_rad
     cdef public int number
     cdef public double since_s
 
@@ -16,5 +16,5 @@ cpdef void advance(KeyFrames keys, const double[:, :, ::1] rotation, double ahea
 cpdef void inflate(KeyFrames keys, double sigma_rad) noexcept nogil
 cpdef void stop(KeyFrames keys) noexcept nogil
 cpdef int mark(KeyFrames keys) noexcept nogil
-cpdef int oldest_key(EdgeColumns edges, Py_ssize_t i, KeyFrames keys) noexcept nogil
-cpdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double least_s) noexcept nogil
+cdef int oldest_key(EdgeColumns edges, Py_ssize_t i, KeyFrames keys) noexcept nogil
+cdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double least_s) noexcept nogil

@@ -6,15 +6,15 @@ cdef double MIN_PIVOT
 
 cdef class NormalEquations:
     cdef public int unknowns
-    cdef public double[::1] row, right, answer
-    cdef public double[:, ::1] matrix, factor, inverse
+    cdef readonly double[::1] row, right, answer
+    cdef readonly double[:, ::1] matrix, factor, inverse
 
 cpdef void begin(NormalEquations equations, int unknowns) noexcept nogil
 cpdef void add_prior(NormalEquations equations, Py_ssize_t i, double weight) noexcept nogil
 cpdef void add(NormalEquations equations, double weight, double measured) noexcept nogil
 @cython.locals(rest=double, i=int, j=int, k=int)
-cpdef void factorise(NormalEquations equations) noexcept nogil
+cdef void factorise(NormalEquations equations) noexcept nogil
 @cython.locals(rest=double, last=int, i=int, j=int, k=int)
-cpdef void substitute(NormalEquations equations) noexcept nogil
+cdef void substitute(NormalEquations equations) noexcept nogil
 cpdef void solve(NormalEquations equations) noexcept nogil
 cpdef void invert(NormalEquations equations) noexcept nogil

@@ -39,12 +39,12 @@ cdef double NAN
 
 cdef class RebelGroups:
     cdef public Py_ssize_t count, groups
-    cdef public int[::1] verdict, label, group
-    cdef public double[::1] vx, vy, elapsed_s
-    cdef public Members members
-    cdef public double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
-    cdef public double[::1] rate_below, r2_below2
-    cdef public int[::1] standing, inwards, flowing, circle
+    cdef readonly int[::1] verdict, label, group
+    cdef readonly double[::1] vx, vy, elapsed_s
+    cdef readonly Members members
+    cdef readonly double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
+    cdef readonly double[::1] rate_below, r2_below2
+    cdef readonly int[::1] standing, inwards, flowing, circle
     cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
     cdef unsigned char[::1] odd, updated, missed

@@ -32,9 +32,9 @@ cdef double MIN_FIRST_LINK_PX
 
 cdef class Verdicts:
     cdef public Py_ssize_t count
-    cdef public int[::1] row, slot, oldest, near
-    cdef public double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
-    cdef public unsigned char[::1] mover, incoming
+    cdef readonly int[::1] row, slot, oldest, near
+    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
+    cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
     cdef double shared, ground, total
 

@@ -22,7 +22,7 @@ cdef class RestTest:
     cdef public bint stands
     cdef public double told_mps, still_s
 
-cpdef int latest_key(KeyFrames keys) noexcept nogil
+cdef int latest_key(KeyFrames keys) noexcept nogil
 cpdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(stood=bint, known=bint, seen=bint, shows_ground=bint)
 cpdef void measure(RestTest test, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around) noexcept nogil

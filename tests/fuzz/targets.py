@@ -15,6 +15,7 @@ import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -43,6 +44,7 @@ from lcf_edge.recordings import open_recording
 from lcf_edge.recordings.decoding import PictureError, decode_picture
 from lcf_edge.recordings.sensor_yaml import SensorYaml
 from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+from lcf_edge.view.doorkeeper import Doorkeeper
 from lcf_edge.view.guard import Guard
 from lcf_edge.view.server import Server
 from lcf_edge.view.update import Audience
@@ -503,6 +505,9 @@ HTTP = (
 )
 
 
+STARTS_WITHIN_S = 30.0
+
+
 class _Page:
     """A real server in a thread of its own; what it complains about is kept."""
 
@@ -511,18 +516,21 @@ class _Page:
         self._ready = threading.Event()
         self._thread = threading.Thread(target=lambda: asyncio.run(self._serve()), name="page")
         self._thread.start()
-        self._ready.wait()
+        if not self._ready.wait(STARTS_WITHIN_S):
+            raise RuntimeError("the page does not start")
 
     async def _serve(self) -> None:
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(lambda _, context: self.complaints.append(str(context)))
-        server = Server(Source("tcp/127.0.0.1:9"))
-        runner = web.AppRunner(server.application(Guard("127.0.0.1")), access_log=None, shutdown_timeout=0.1)
+        server, door = Server(Source("tcp/127.0.0.1:9")), Doorkeeper()
+        runner = web.AppRunner(server.application(Guard("127.0.0.1"), door), access_log=None, shutdown_timeout=0.1)
         await runner.setup()
-        await web.TCPSite(runner, "127.0.0.1", 0).start()
-        self.address = runner.addresses[0][:2]
+        assert runner.server is not None
+        listening = await self._loop.create_server(partial(door.protocol, runner.server), "127.0.0.1", 0)
+        self.address = listening.sockets[0].getsockname()[:2]
         self._ready.set()
         await self._end.wait()
+        listening.close()
         await runner.cleanup()
         server.close()
 
