@@ -15,10 +15,10 @@ cdef double SCATTER
 cdef double MIN_SIGMA_PX
 
 cdef class OffLine:
-    cdef public Py_ssize_t count
+    cdef readonly Py_ssize_t count
     cdef readonly double[::1] pitch, yaw, roll, px, alone, alone_sigma
     cdef readonly NormalEquations equations
-    cdef public double turn_x, turn_y, turn_z, sigma
+    cdef readonly double turn_x, turn_y, turn_z, sigma
 
 cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept nogil
 cpdef void derotate_circles(CircleColumns circles, Homography h, double roll) noexcept nogil

@@ -14,7 +14,7 @@ cdef double MIN_SPEED_MPS
 cdef double MIN_VARIANCE
 
 cdef class Heading:
-    cdef public double mounted_x, mounted_y, ray_x, ray_y, sigma_x, sigma_y
+    cdef readonly double mounted_x, mounted_y, ray_x, ray_y, sigma_x, sigma_y
 
 cpdef void turn_heading(Heading heading, const double[:, :, ::1] rotation, double yaw_rate_radps, double dt_s) noexcept nogil
 cpdef double focus_sigma_rad(double mounting_sigma_rad) noexcept nogil

@@ -5,7 +5,7 @@ cdef int MAX_UNKNOWNS
 cdef double MIN_PIVOT
 
 cdef class NormalEquations:
-    cdef public int unknowns
+    cdef readonly int unknowns
     cdef readonly double[::1] row, right, answer
     cdef readonly double[:, ::1] matrix, factor, inverse
 

@@ -18,9 +18,10 @@ cdef double STILL_GROUND_PX
 cdef double STILL_SHARE
 
 cdef class RestTest:
-    cdef public int edges, still, ground, still_ground
-    cdef public bint stands
-    cdef public double told_mps, still_s
+    cdef readonly int edges, still, ground, still_ground
+    cdef readonly bint stands
+    cdef public double told_mps
+    cdef readonly double still_s
 
 cdef int latest_key(KeyFrames keys) noexcept nogil
 cpdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil
