@@ -44,8 +44,6 @@ _REST_SIGMA_RADPS = 1e-3  # 1 sigma of how still a rest is
 # Rotation, 1 sigma of the rate where nothing measures it.
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
 _SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
-_SCALE_SIGMA = 0.02  # share of the rate: scale and axes of a gyro that nobody has calibrated
-_TIME_SIGMA_S = 0.01  # by which gyro and camera disagree about the time
 _SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
 _GUESS_TIME_S = 0.5  # over which that is averaged
 _GUESS_LEAST_RADPS, _GUESS_MOST_RADPS = 0.04, 2.0
@@ -104,7 +102,6 @@ class EgoMotionEstimator:
         self._imu = Ring("imu", IMU_CAPACITY, 7, self.refused)  # gyro, specific force, whether saturated
         self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
-        self._rate_radps: Floats = np.zeros(3)  # over the last interval
         self._path_yaw_radps = 0.0
         self._guess_variance: Floats = np.full(3, _SIGMA_UNKNOWN_RADPS**2)  # of rates that no gyro measures
         self._noisy = False  # as a real gyro; made-up samples have no noise
@@ -142,8 +139,7 @@ class EgoMotionEstimator:
         no interval; neither has one whose stamp goes back, which is counted.
 
         ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
-        interval) (white noise), shares of rate and of its change for what is wrong with the gyro's scale and time, and
-        stated rates over what was held, missed or saturated. Without a gyro: by how much
+        interval) (white noise), and stated rates over what was held, missed or saturated. Without a gyro: by how much
         rates were lately guessed wrong.
         """
         notes: list[str] = []
@@ -202,10 +198,6 @@ class EgoMotionEstimator:
         sigma_rad = left_radps * span.dt_s + self._noise_radps * sqrt(span.dt_s * period_s)
         sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
         sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
-        rate_radps = whole[:3] - self.bias.mean_radps
-        changed_radps = hypot(*(rate_radps - self._rate_radps))
-        self._rate_radps = rate_radps
-        sigma_rad = hypot(sigma_rad, _SCALE_SIGMA * hypot(*rate_radps) * span.dt_s, _TIME_SIGMA_S * changed_radps)
         interval.measured = not self._stuck(span.end_ns, gap_limit_s, period_s, may_rest)
         if not interval.measured:
             interval.notes.append("gyro stuck")

@@ -6,12 +6,11 @@ Needs root, for ``mmdebstrap`` and ``chroot``. The cache is the folder that ``LC
 
 import hashlib
 import os
-import re
 import shutil
 import subprocess
 import sys
 import tomllib
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -45,6 +44,7 @@ LEFT_OUT = (
     "/lib/modules/*/kernel/sound/*",
 )
 BOOTS_WITH = ("virtio_pci", "virtio_blk", "ext4")
+LOCK = "requirements.lock"
 SOURCES = (
     "lcf_edge",
     "drivers",
@@ -55,6 +55,7 @@ SOURCES = (
     "README.md",
     "LICENSE",
     "Makefile",
+    LOCK,
 )
 TOOLS = {  # what brings them on Debian and its relatives
     "mmdebstrap": "mmdebstrap",
@@ -101,13 +102,18 @@ def cache() -> Path:
 
 def image() -> Image:
     """The image of this working copy, made as far as it is not there. Raises ``ImageError``."""
-    requirements = _requirements()
     place = cache() / _digest([SUITE, *PACKAGES, *LEFT_OUT, *BOOTS_WITH])
     root, wheels, disk, known = (
-        place / name for name in ("root", f"wheels-{_digest([PYTHON, *requirements])}", "disk.img", "project")
+        place / name
+        for name in (
+            "root",
+            f"wheels-{_digest([PYTHON, *_builders(), *_contents([PROJECT / LOCK])])}",
+            "disk.img",
+            "project",
+        )
     )
     _once(root, _install_debian)
-    _once(wheels, lambda folder: _fetch(requirements, folder))
+    _once(wheels, _fetch)
     project = _digest(_contents(PROJECT / name for name in SOURCES))
     if not known.exists() or known.read_text(encoding="ascii") != project:
         known.unlink(missing_ok=True)
@@ -138,24 +144,21 @@ def _install_debian(root: Path) -> None:
     _do("mmdebstrap", *options, f"--include={','.join(PACKAGES)}", SUITE, str(root))
 
 
-def _requirements() -> list[str]:
-    """What the project needs with the extras that `make install` takes, and what builds it."""
+def _builders() -> list[str]:
+    """What builds the project."""
     project = tomllib.loads((PROJECT / "pyproject.toml").read_text(encoding="utf-8"))
-    extras = project["project"]["optional-dependencies"]
-    installed = re.search(
-        r"\$\(PROGRAM\)/bin/python\" -m pip install .*\[([\w,]+)\]\"",
-        (PROJECT / "Makefile").read_text(encoding="utf-8"),
-    )
-    wanted = [need for extra in installed[1].split(",") for need in extras[extra]] if installed else []
-    return [*project["project"]["dependencies"], *wanted, *project["build-system"]["requires"]]
+    needed: list[str] = project["build-system"]["requires"]
+    return needed
 
 
-def _fetch(requirements: Sequence[str], wheels: Path) -> None:
-    """Packages for the guest's Python, whatever this one is."""
+def _fetch(wheels: Path) -> None:
+    """The packages that `make install` takes, for the guest's Python, whatever this one is."""
     platforms = ["manylinux2014_x86_64", *(f"manylinux_2_{minor}_x86_64" for minor in range(17, 37))]
     options = [f"--platform={platform}" for platform in platforms]
-    options += ["--only-binary=:all:", f"--python-version={PYTHON}", "--implementation=cp"]
-    _do(sys.executable, "-m", "pip", "download", "--quiet", *options, "--dest", str(wheels), *requirements)
+    options += ["--only-binary=:all:", f"--python-version={PYTHON}", "--implementation=cp", "--dest", str(wheels)]
+    download = (sys.executable, "-m", "pip", "download", "--quiet", *options)
+    _do(*download, "--require-hashes", "-r", str(PROJECT / LOCK))
+    _do(*download, *_builders())
 
 
 def _install_project(root: Path, wheels: Path) -> None:

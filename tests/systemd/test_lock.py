@@ -44,4 +44,4 @@ def test_each_has_its_hashes_and_comes_from_wherever_packages_come() -> None:
 def test_the_lock_is_what_is_installed() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
     assert "--require-hashes -r requirements.lock" in makefile
-    assert "--no-deps ." in makefile
+    assert '--no-deps "$(or $(wildcard $(WHEEL)),$(WHEEL),.)"' in makefile
