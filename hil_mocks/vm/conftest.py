@@ -39,7 +39,13 @@ def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
     """Booted once, with a webcam, an HDMI grabber behind an HDMI output, and an I2C bus with a chip at 0x28."""
     shutil.rmtree(RESULTS, ignore_errors=True)
     RESULTS.mkdir(parents=True)
-    with Machine(pytestconfig.stash[_IMAGE], RESULTS.resolve()) as booted:
+    try:
+        started = Machine(pytestconfig.stash[_IMAGE], RESULTS.resolve())
+    except MachineError as error:
+        if os.environ.get(WHERE_POSSIBLE):
+            pytest.exit(f"hil: the machine does not start here, so nothing is shown: {error}", 0)
+        raise
+    with started as booted:
         booted.run(f"modprobe vivid {CAMERAS} && modprobe i2c-stub chip_addr=0x28 && udevadm settle")
         pytestconfig.stash[_MACHINE] = booted
         yield booted

@@ -66,7 +66,7 @@ def test_no_corner_is_found_on_own_parts_and_all_the_others_are(
         assert np.array_equal(masked.pixel, every.pixel[seen[y, x] > 0])
 
 
-def test_own_parts_are_rebels_unless_they_are_masked() -> None:
+def test_own_parts_are_rebels_at_first_unless_they_are_masked() -> None:
     drive = scenes.make("own_bumper", 1, seconds=3.0)
     masked = config_of(drive)
     bare = msgspec.structs.replace(masked, camera=msgspec.structs.replace(masked.camera, mask=[]))
@@ -80,5 +80,5 @@ def test_own_parts_are_rebels_unless_they_are_masked() -> None:
             rebels = scene.circles[(scene.circles["kind"] == Kind.REBEL) & (scene.circles["trust"] >= 3)]
             hidden = seen[rebels["y"].astype(int), rebels["x"].astype(int)] == 0
             on_own_parts[name] += int(np.count_nonzero(hidden))
-    assert on_own_parts["bare"] > 50
+    assert on_own_parts["bare"] > 10  # what has not moved for a second is known for what it is
     assert on_own_parts["masked"] == 0
