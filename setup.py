@@ -9,6 +9,7 @@ import os
 import re
 import sys
 import sysconfig
+import tomllib
 import zlib
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
@@ -17,6 +18,7 @@ from pathlib import Path
 
 import Cython
 from Cython.Build import cythonize
+from Cython.Compiler import Options
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
 from setuptools.errors import CCompilerError, ExecError, PlatformError
@@ -34,7 +36,9 @@ DIRECTIVES = {
     "infer_types": True,
     "annotation_typing": False,
     "auto_pickle": False,
+    "binding": False,  # plain built-in functions take less room than those that can be looked into
 }
+Options.docstrings = False  # they are in the source
 MACROS = [
     ("Py_LIMITED_API", "0x030B0000"),  # Python 3.11 and later
     ("CYTHON_LIMITED_API", "1"),
@@ -42,7 +46,17 @@ MACROS = [
 ]
 FLAGS = ["-O2", "-fvect-cost-model=dynamic"]  # as fast as -O3, and a twelfth smaller
 FLAGS += ["-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
-FLAGS += ["-g0", "-fno-asynchronous-unwind-tables"]  # a tenth smaller
+FLAGS += ["-DCYTHON_INLINE=CYTHON_UNUSED"]  # the compiler itself knows what is worth inlining: a sixth smaller, as fast
+FLAGS += ["-fno-align-functions", "-fno-align-jumps", "-fno-align-loops"]  # as fast, 4 % smaller
+FLAGS += ["-fno-math-errno", "-fno-trapping-math"]  # nobody asks for either: square roots without a call
+FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a tenth smaller
+
+# What goes once over a few rows a frame is made small instead: a quarter smaller, and a tenth slower.
+SMALL = ["-Os"]
+FEW_ROWS = {"_memoryviews", "axis_bias", "columns", "ground_speed", "group_motion", "heading", "key_frames"}
+FEW_ROWS |= {"circles", "edge_rows", "feedback", "leaps", "normal_circles", "patch_circles", "path", "range_belief"}
+FEW_ROWS |= {"rebel_circles", "rest", "sample_ring"}
+FEW_ROWS |= {"scene_records", "settings", "situation", "square_expert"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))
@@ -80,7 +94,8 @@ class BuildOneExtension(build_ext):
     def _compiled(self, source: str, ext: Extension) -> str:
         made = OBJECTS / Path(source).with_suffix(".o")
         if not made.exists() or made.stat().st_mtime < Path(source).stat().st_mtime:
-            self.compiler.compile([source], str(OBJECTS), ext.define_macros, extra_postargs=ext.extra_compile_args)
+            flags = ext.extra_compile_args + (SMALL if Path(source).stem in FEW_ROWS else [])
+            self.compiler.compile([source], str(OBJECTS), ext.define_macros, extra_postargs=flags)
         return str(made)
 
 
@@ -124,7 +139,28 @@ def quoted(words: Iterable[str]) -> str:
     return f'"{" ".join(words)}"'
 
 
+def urls(place: dict[str, str]) -> dict[str, str]:
+    """What PyPI's page leads to."""
+    return {
+        "Homepage": place["home"],
+        "Documentation": place["files"] + "README.md#where-to-go-next",
+        "Changelog": place["files"] + "CHANGELOG.md",
+    }
+
+
+def readme(place: dict[str, str]) -> str:
+    """The README with links that lead somewhere from PyPI's page, where relative ones do not."""
+    text = re.sub(
+        r"(!\[[^\]]*\]\()(?!https:)", rf"\1{place['pictures']}", Path("README.md").read_text(encoding="utf-8")
+    )
+    return re.sub(r"((?<!!)\[[^\]]*\]\()(?!https:|#)", rf"\1{place['files']}", text)
+
+
+PLACE = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["tool"]["lcf-edge"]
 setup(
+    project_urls=urls(PLACE),
+    long_description=readme(PLACE),
+    long_description_content_type="text/markdown",
     ext_modules=extensions(),
     cmdclass={"build_ext": BuildOneExtension},
     options={"bdist_wheel": {"py_limited_api": "cp311"}},

@@ -3,6 +3,8 @@
 ``score``    compares results with the truth of rendered drives
 ``methods``  the filter and its peers behind one interface; ``peers`` holds the peers
 ``playing``  feeds drives and recordings to methods
+``closed_loop``  a planner drives by what a method finds (``python -m benchmarks.closed_loop``), with ``drivers`` and
+                 ``drive_video``; ``calibration``  whether the numbers of objects are right
 ``quality``, ``speed``, ``memory``  what is measured; ``report`` makes tables of it
 """
 

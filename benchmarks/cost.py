@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.report import Table, write
-from hil_mocks import scenes
 from lcf_edge.errors import LcfError
+from lcf_edge.rendered import scenes
 from release.debian import MACHINES, run, unpacked
 from release.trial import PACKAGES, SUITE, install
 

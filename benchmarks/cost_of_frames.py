@@ -9,14 +9,14 @@ from pathlib import Path
 
 import cv2
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Config
-from lcf_edge.corners import CornerDetector
+from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.errors import LcfError
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
-from lcf_edge.recordings import open_recording
+from lcf_edge.recording.read import open_recording
 
 
 def run(folder: Path, part: str, frames: int) -> None:

@@ -1,4 +1,4 @@
-"""Memory of a process that runs one method, and what its steps allocate for good.
+"""Memory of a process that runs one method, and what its steps allocate and keep.
 
 ``python -m benchmarks.memory MODE METHOD FOLDER`` replays a drive that was written to a folder, in a process of its
 own, and prints one number: the peak ("peak") or the growth ("kept"), bytes. It reads the configuration as JSON.

@@ -7,14 +7,14 @@ import numpy as np
 
 from benchmarks.peers import PEERS, LandmarkMap
 from benchmarks.peers.peer import Peer
-from drivers.records import Frame, ImuSample, SpeedSample
-from lcf_edge import own_parts
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
-from lcf_edge.ego_motion import EgoMotionEstimator
+from lcf_edge.corners import own_parts
+from lcf_edge.ego_motion.estimator import EgoMotionEstimator
 from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
-from lcf_edge.pipeline import LEAST_DT_S, Pipeline
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene, Sizes, Timing
+from lcf_edge.messages import CIRCLE, PSI_REGION, PipelineScene, Sizes, Timing
+from lcf_edge.pipeline import Pipeline
 
 FILTER = "filter"
 MAP = "landmark_map"
@@ -31,7 +31,7 @@ class Method(Protocol):
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take a sample, in stamp order."""
 
-    def process(self, frame: Frame) -> Scene:
+    def process(self, frame: Frame) -> PipelineScene:
         """Circles (and ψ) of one frame; ``timing`` tells how long it took."""
 
 
@@ -45,7 +45,7 @@ class FilterMethod:
         """Take a sample, in stamp order."""
         self.pipeline.add(sample)
 
-    def process(self, frame: Frame) -> Scene:
+    def process(self, frame: Frame) -> PipelineScene:
         """Circles and ψ of one frame."""
         return self.pipeline.process(frame)
 
@@ -66,13 +66,11 @@ class PeerMethod:
         else:
             self._motion.add_speed(sample)
 
-    def process(self, frame: Frame) -> Scene:
+    def process(self, frame: Frame) -> PipelineScene:
         """Circles of one frame."""
         started = time.perf_counter_ns()
         ego = self._motion.advance(frame.stamp_ns)
-        dt_s = max(ego.dt_s, LEAST_DT_S)
-        motion = Motion(dt_s, ego.rotation, ego.rotation_sigma_rad, ego.speed_mps, ego.path_yaw_rate_radps)
-        circles = self.peer.process(frame.image, motion)
+        circles = self.peer.process(frame.image, ego.to_motion())
         seen = own_parts.in_sight(self._camera, frame.image.shape[1], frame.image.shape[0])
         if seen is not None:  # nobody looks for anything in the vehicle's own parts
             x, y = (
@@ -82,7 +80,7 @@ class PeerMethod:
         total_us = (time.perf_counter_ns() - started) // 1000
         height, width = frame.image.shape
         landmarks = self.peer.landmarks if isinstance(self.peer, LandmarkMap) else 0
-        return Scene(
+        return PipelineScene(
             frame.stamp_ns,
             frame.seq,
             width,
@@ -90,8 +88,8 @@ class PeerMethod:
             ego.speed_mps,
             circles,
             np.zeros(0, PSI_REGION),
-            Sizes(edges_normal=landmarks),
-            Timing(total=total_us),
+            sizes=Sizes(edges_normal=landmarks),
+            timing=Timing(total=total_us),
         )
 
 

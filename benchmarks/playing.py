@@ -5,14 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from benchmarks.methods import Method, make
-from drivers.records import Frame, ImuSample, SpeedSample
-from hil_mocks import scenes
-from hil_mocks.drives import Drive
-from hil_mocks.truth import Truth
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Camera, Config, Filter, Imu, Memory, Vehicle
 from lcf_edge.lens import Lens
-from lcf_edge.recordings import open_recording
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
+from lcf_edge.recording.read import open_recording
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.drives import Drive
+from lcf_edge.rendered.truth import Truth
 
 Sample = ImuSample | SpeedSample
 

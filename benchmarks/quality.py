@@ -1,22 +1,18 @@
-"""Detection quality: every kind of drive with several seeds, and the real recordings, for every method."""
+"""Detection quality: every kind of drive with several seeds, for every method."""
 
 import math
-import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, fields
-from pathlib import Path
 
 import numpy as np
 
 from benchmarks.methods import FILTER, MAP, NAMES
-from benchmarks.peers.peer import Circles
-from benchmarks.playing import config_of, play_drive, play_recording
+from benchmarks.playing import config_of, play_drive
 from benchmarks.report import Table, number
 from benchmarks.score import Score, pool, score
-from hil_mocks import scenes
-from hil_mocks.truth import Truth
-from lcf_edge.config import PAPER, Camera, Config, Vehicle
-from lcf_edge.records import Kind, Scene
+from lcf_edge.messages import Scene
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.truth import Truth
 
 MIN_TRUST = 3.0
 _RATIOS = (
@@ -45,11 +41,10 @@ class Quality:
 
     scores: dict[str, dict[str, list[Score]]] = field(default_factory=dict)  # kind, method, one a seed
     sizes: dict[str, list[Size]] = field(default_factory=dict)  # kind, one a seed
-    recordings: list[dict[str, str | float]] = field(default_factory=list)
 
 
 def run_drives(kinds: Sequence[str], seeds: Sequence[int], into: Quality) -> Iterable[str]:
-    """Score all methods; answers with the name of each drive that is done."""
+    """Score all methods. Return the name of each drive that is done."""
     for kind in kinds:
         by_method: dict[str, list[Score]] = {name: [] for name in NAMES}
         sizes: list[Size] = []
@@ -72,71 +67,13 @@ def run_drives(kinds: Sequence[str], seeds: Sequence[int], into: Quality) -> Ite
         into.sizes[kind] = sizes
 
 
-def data_folder() -> Path:
-    """Where the real recordings are, if they are."""
-    beside = Path(__file__).parents[2] / "shared" / "data"
-    return Path(os.environ.get("LCF_EDGE_DATA", beside))
-
-
-def run_recordings(into: Quality) -> Iterable[str]:
-    """The real recordings that are at hand; answers with the name of each that is done."""
-    for name, config, measures in _RECORDINGS:
-        path = data_folder() / name
-        if not path.is_dir():
-            continue
-        moments = [moment.scenes for moment in play_recording(path, config, NAMES)]
-        for title, measure in measures.items():
-            means = {method: float(np.mean([measure(said[method]) for said in moments])) for method in NAMES}
-            into.recordings.append({"recording": name, "measure": title, **means})
-        yield name
-
-
-def _shown(scene: Scene) -> Circles:
-    circles = scene.circles
-    shown: Circles = circles[(circles["kind"] == Kind.REBEL) & (circles["trust"] >= MIN_TRUST)]
-    return shown
-
-
-def _circles(scene: Scene) -> float:
-    return float(len(_shown(scene)))
-
-
-def _on_middle_third(scene: Scene) -> float:
-    x = _shown(scene)["x"]
-    third = scene.image_width / 3
-    return float(bool(((x >= third) & (x <= 2 * third)).any()))
-
-
-_KITTI = Config(camera=Camera(height_m=1.65), vehicle=Vehicle(half_width_m=1.2, horizon_s=4.0))
-# A picture every 7 s, and contact minutes ahead: at 1 cm/s, ranges come out in metres.
-_RIG = Config(
-    camera=Camera(fps=1 / 7, height_m=0.15),
-    vehicle=Vehicle(half_width_m=0.2, horizon_s=400.0, speed_source="constant", speed_mps=0.01),
-    filter=PAPER,
-)
-_RECORDINGS: tuple[tuple[str, Config, dict[str, Callable[[Scene], float]]], ...] = (
-    ("kitti-straight", _KITTI, {"circles a frame, all false": _circles}),
-    (
-        "authors-rig-2020",
-        _RIG,
-        {"frames with a circle on the middle third": _on_middle_third, "circles a frame": _circles},
-    ),
-)
-
-
 def tables(quality: Quality) -> list[Table]:
-    """F1 by kind and method, then the details of each method, sizes and recordings."""
+    """F1 by kind and method, then the details of each method, and sizes."""
     pooled = {kind: {name: pool(each) for name, each in methods.items()} for kind, methods in quality.scores.items()}
     answer = [_f1_table(pooled)] if pooled else []
     answer += [_details(name, pooled) for name in NAMES if pooled]
     if quality.sizes:
         answer.append(_sizes(quality.sizes))
-    if quality.recordings:
-        rows = [
-            [str(row["recording"]), str(row["measure"]), *(number(row[n], 2) for n in NAMES)]
-            for row in quality.recordings
-        ]
-        answer.append(Table("Real recordings", ["recording", "measure", *NAMES], rows))
     return answer
 
 

@@ -80,7 +80,7 @@ def _commit() -> str:
 
 
 def write(name: str, title: str, tables: Sequence[Table], data: Mapping[str, Any]) -> str:
-    """Write ``results/name.md`` and ``.json``; answers with the Markdown. Raises OSError."""
+    """Write ``results/name.md`` and ``.json``. Return the Markdown. Raises OSError."""
     facts = conditions()
     head = [f"# {title}", "", *(f"- {key}: {value}" for key, value in facts.items())]
     text = "\n".join([*head, "", *(f"{table.markdown()}\n" for table in tables)])

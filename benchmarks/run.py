@@ -1,24 +1,28 @@
 """``python -m benchmarks.run``: detection quality and speed of the filter and its peers, in one run.
 
-Prints the tables and writes them to ``benchmarks/results/``.
+Prints the tables and writes them to ``benchmarks/results/``; of real recordings a sheet of pictures besides, to
+``bench-out/``.
 """
 
 import argparse
+import os
 import sys
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 
 import cv2
 from tqdm import tqdm
 
-from benchmarks import quality, report, speed
-from hil_mocks.scenes import KINDS
+from benchmarks import quality, recordings, report, speed
 from lcf_edge.errors import LcfError, UsageError
+from lcf_edge.rendered.scenes import KINDS
 
+SHEET = Path("bench-out/recordings.png")
 _QUICK_KINDS = ("passing", "ahead", "crossing", "turn")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what is asked for; answers with the exit status."""
+    """Run what is asked for. Return the exit status."""
     options = _parser().parse_args(arguments)
     cv2.setNumThreads(1)
     try:
@@ -26,6 +30,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         seeds = _numbers(options.seeds or ("0" if options.quick else "0-4"))
         if options.only in (None, "quality"):
             _say(_quality(kinds, seeds))
+        if options.only in (None, "recordings"):
+            _say(_recordings(options.recordings or os.environ.get(recordings.VARIABLE)))
         if options.only in (None, "speed"):
             _say(_speed(quick=options.quick))
     except (LcfError, OSError) as error:
@@ -38,7 +44,12 @@ def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.run", description=__doc__)
     parser.add_argument("--seeds", help="of the rendered drives: 0-4 or 0,2,7 (default 0-4)")
     parser.add_argument("--kinds", help=f"of the rendered drives, with commas (default all: {', '.join(KINDS)})")
-    parser.add_argument("--only", choices=("quality", "speed"), help="one of the two parts")
+    parser.add_argument("--only", choices=("quality", "recordings", "speed"), help="one of the parts")
+    parser.add_argument(
+        "--recordings",
+        metavar="FOLDER",
+        help=f"of real recordings, each a folder with a file `settings` (default: what {recordings.VARIABLE} names)",
+    )
     parser.add_argument("--quick", action="store_true", help="few drives, few frames: does it run?")
     return parser
 
@@ -46,7 +57,6 @@ def _parser() -> argparse.ArgumentParser:
 def _quality(kinds: Sequence[str], seeds: Sequence[int]) -> str:
     found = quality.Quality()
     _progress(quality.run_drives(kinds, seeds, found), len(kinds) * len(seeds))
-    _progress(quality.run_recordings(found), None)
     data = {
         "seeds": seeds,
         "summary": quality.summary(found),
@@ -55,11 +65,21 @@ def _quality(kinds: Sequence[str], seeds: Sequence[int]) -> str:
             for kind, methods in found.scores.items()
         },
         "sizes": found.sizes,
-        "recordings": found.recordings,
     }
     return report.write(
         "quality", f"Detection quality, seeds {', '.join(map(str, seeds))}", quality.tables(found), data
     )
+
+
+def _recordings(folder: str | None) -> str:
+    if folder is None:
+        return f"Real recordings: none; name a folder with --recordings or {recordings.VARIABLE}"
+    found: list[recordings.Result] = []
+    _progress(recordings.run(Path(folder), found), None)
+    sheet = recordings.write_sheet(found, SHEET)
+    data = {"recordings": {each.name: recordings.as_numbers(each) for each in found}}
+    text = report.write("recordings", "Real recordings", recordings.tables(found), data)
+    return f"{text}\nPictures to look at: {sheet}"
 
 
 def _speed(*, quick: bool) -> str:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
-from hil_mocks.truth import ObjectTruth, Truth
-from lcf_edge.records import Kind, Scene, Shape
+from lcf_edge.messages import Kind, Scene, Shape
+from lcf_edge.rendered.truth import ObjectTruth, Truth
 
 _GROWN_SHARE, _GROWN_PX = 0.25, 8.0
 _TTC_BELOW_S = 4.0

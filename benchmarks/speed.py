@@ -12,22 +12,23 @@ from pathlib import Path
 import cv2
 import numpy as np
 
-from benchmarks import memory, stages
+from benchmarks import memory, session, stages
 from benchmarks.methods import FILTER, NAMES, NOTHING
 from benchmarks.peers.peer import Floats, Grey
 from benchmarks.playing import config_of, play_drive
 from benchmarks.report import Table, number
-from hil_mocks import scenes
-from hil_mocks.drives import Drive, Paint
 from lcf_edge.config import Config, Filter, Memory
-from lcf_edge.corners import CornerDetector
+from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.lens import Lens
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.drives import Drive, Paint
 
 CORNERS = (300, 700, 1500, 4000)
 TYPICAL = 700
-ALONE = "calcOpticalFlowPyrLK alone"
+FOLLOWING = "calcOpticalFlowPyrLK alone"
+FINDING = "FastFeatureDetector alone"
 _WARM_UP = 20
-_LEAST_EDGES = 1500
+_MIN_EDGES = 1500
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,11 +56,13 @@ class Speed:
 
     rows: list[Row] = field(default_factory=list)
     filter_steps: list[stages.Stage] = field(default_factory=list)
+    frame_parts: list[stages.Stage] = field(default_factory=list)
+    daemon: session.Session | None = None
     processes: list[memory.Memory] = field(default_factory=list)
 
 
 def measure(into: Speed, *, quick: bool = False) -> Iterable[str]:
-    """All corner counts, then memory; answers with the name of each step that is done."""
+    """All corner counts, then memory. Return the name of each step that is done."""
     seconds = 2.0 if quick else 8.0
     for corners in CORNERS:
         drive = _busy(scenes.make("crossing", 0, seconds=seconds))
@@ -67,7 +70,10 @@ def measure(into: Speed, *, quick: bool = False) -> Iterable[str]:
         yield f"{corners} corners"
     config = config_for(scenes.make("crossing", 0), TYPICAL)
     into.filter_steps += stages.measure(_busy(scenes.make("crossing", 0, seconds=seconds)), config)
+    into.frame_parts += stages.measure_frame(scenes.make("two_crossing", 1, seconds=seconds), config)
     yield "stages"
+    into.daemon = session.measure(10.0 if quick else 60.0)
+    yield "session"
     frames = memory.WARM_UP + memory.STEPS
     with tempfile.TemporaryDirectory() as folder:
         path = scenes.write(scenes.make("crossing", 0, seconds=frames / 20), Path(folder))
@@ -78,7 +84,7 @@ def measure(into: Speed, *, quick: bool = False) -> Iterable[str]:
 
 def config_for(drive: Drive, corners: int) -> Config:
     """A configuration that finds about so many corners, and whose tables hold them."""
-    edges = max(corners, _LEAST_EDGES)
+    edges = max(corners, _MIN_EDGES)
     return config_of(drive, Filter(corners_target=corners), Memory(corners=corners, edges_normal=edges))
 
 
@@ -96,17 +102,21 @@ def _row(drive: Drive, corners: int) -> Row:
     config = config_for(drive, corners)
     lens = Lens.from_config(config.camera, drive.lens.width, drive.lens.height)
     detector = CornerDetector(config.filter, lens, config.memory.corners)
-    times: dict[str, list[float]] = {"detect": [], "filter": [], "total": [], ALONE: []}
+    fast = cv2.FastFeatureDetector.create()
+    times: dict[str, list[float]] = {"detect": [], "filter": [], "total": [], FINDING: [], FOLLOWING: []}
     times |= {name: [] for name in NAMES if name != FILTER}
     counts: list[int] = []
     before: tuple[Grey, Floats] | None = None
     for moment in play_drive(drive, config, NAMES):
         image = moment.frame.image
         if before is not None:
-            times[ALONE].append(_lucas_kanade_us(*before, image))
+            times[FOLLOWING].append(_lucas_kanade_us(*before, image))
+        fast.setThreshold(detector.threshold)
+        times[FINDING].append(_fast_us(fast, image))
         before = image, detector.detect(image)[0].pixel.astype(np.float32)
         if moment.frame.seq < _WARM_UP:
-            times[ALONE].clear()
+            times[FOLLOWING].clear()
+            times[FINDING].clear()
             continue
         for name, scene in moment.scenes.items():
             if name != FILTER:
@@ -127,6 +137,12 @@ def _lucas_kanade_us(before: Grey, points: Floats, image: Grey) -> float:
     return (time.perf_counter_ns() - started) / 1000
 
 
+def _fast_us(fast: cv2.FastFeatureDetector, image: Grey) -> float:
+    started = time.perf_counter_ns()
+    fast.detect(image)
+    return (time.perf_counter_ns() - started) / 1000
+
+
 def _times(each: "np.ndarray", total: "np.ndarray") -> Times:
     ratios = each / np.maximum(total, 1)
     return Times(float(np.median(each)), float(np.percentile(each, 99)), float(np.median(ratios)))
@@ -144,10 +160,13 @@ def tables(speed: Speed) -> list[Table]:
         [name, *(f"{_milliseconds(row.methods[name])}, {row.methods[name].over_filter:.1f}×" for row in speed.rows)]
         for name in names
     ]
-    steps = [
-        [each.name, number(each.median / 1000, 2), f"{each.share:.0%}"]
-        for each in sorted(speed.filter_steps, key=lambda each: -each.median)
-    ]
+    steps, parts_of_frame = (
+        [
+            [each.name, number(each.median / 1000, 3), f"{each.share:.0%}"]
+            for each in sorted(those, key=lambda each: -each.median)
+        ]
+        for those in (speed.filter_steps, speed.frame_parts)
+    )
     memories = [[each.method, number(each.peak_mib, 1), number(each.kept_bytes_a_step, 0)] for each in speed.processes]
     return [
         Table("The filter, ms: median (p99)", ["corners wanted", "found", *parts], own),
@@ -157,6 +176,8 @@ def tables(speed: Speed) -> list[Table]:
             others,
         ),
         Table(f"Where the filter's time goes at {TYPICAL} corners, ms: medians", ["step", "ms", "share"], steps),
+        Table("Where the time of a frame of the daemon goes, ms: medians", ["part", "ms", "share"], parts_of_frame),
+        *(session.tables(speed.daemon) if speed.daemon else ()),
         Table("Memory of a process", ["method", "peak MiB", "bytes a step that stay"], memories),
     ]
 

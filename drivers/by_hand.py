@@ -8,7 +8,7 @@ from typing import Any
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import DriverError
-from drivers.records import ImuSample
+from drivers.samples import Frame, ImuSample
 
 REPORT_NS = 1_000_000_000
 
@@ -43,6 +43,12 @@ def describe_imu(sample: ImuSample) -> str:
     gyro = " ".join(f"{value:+8.4f}" for value in sample.gyro)
     accel = " ".join(f"{value:+8.3f}" for value in sample.accel)
     return f"gyro {gyro} rad/s  accel {accel} m/s²{'  saturated' * sample.saturated}"
+
+
+def describe_picture(frame: Frame) -> str:
+    """Size and brightness of a picture."""
+    height, width = frame.image.shape
+    return f"{width}x{height}, mean {frame.image.mean():.0f}"
 
 
 def _report(device: Device[Any], seconds: float, describe: Callable[[Any], str], clock: Clock) -> None:

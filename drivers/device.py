@@ -11,8 +11,8 @@ Record = TypeVar("Record")
 Delivered_co = TypeVar("Delivered_co", covariant=True)
 
 FIRST_PAUSE_S = 0.1
-LONGEST_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
-LONGEST_HOPELESS_PAUSE_S = 10.0  # what only the user can mend
+MAX_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
+MAX_HOPELESS_PAUSE_S = 10.0  # what only the user can fix
 
 
 class Device(Protocol[Delivered_co]):
@@ -25,9 +25,9 @@ class Device(Protocol[Delivered_co]):
     counts: Counter[str]
 
     def read(self) -> Sequence[Delivered_co]:
-        """Wait for what comes next and answer with it, oldest first; the wait is bounded by the device's rate.
+        """Wait for what comes next and return it, oldest first; the wait is bounded by the device's rate.
 
-        An empty answer: what came was refused and counted. Raises ``DriverError`` when the device must be opened
+        Return nothing where what came was refused and counted. Raises ``DriverError`` when the device must be opened
         again.
         """
         ...
@@ -38,7 +38,7 @@ class Device(Protocol[Delivered_co]):
 
 
 class KeptOpen(Generic[Record]):
-    """A device that is opened again whenever it fails, with pauses that grow to ``LONGEST_PAUSE_S``.
+    """A device that is opened again whenever it fails, with pauses that grow to ``MAX_PAUSE_S``.
 
     ``error``: why it is not open, None while it is. ``counts``: the device's own of all its openings, and
     ``opened``, ``failed``.
@@ -78,7 +78,7 @@ class KeptOpen(Generic[Record]):
         self.close()
         self.error = error
         self._clock.sleep_s(self._pause_s)
-        longest_s = LONGEST_PAUSE_S if error.retry else LONGEST_HOPELESS_PAUSE_S
+        longest_s = MAX_PAUSE_S if error.retry else MAX_HOPELESS_PAUSE_S
         self._pause_s = min(2 * self._pause_s, longest_s)
 
     def close(self) -> None:

@@ -2,11 +2,9 @@
 
 from typing import ClassVar
 
-from lcf_edge.errors import LcfError
 
-
-class DriverError(LcfError):
-    """A device that cannot be used, or no longer."""
+class DriverError(Exception):
+    """A device that cannot be used, or no longer; its text is the whole message."""
 
     retry: ClassVar[bool] = True
 
@@ -25,8 +23,14 @@ class DeviceForbiddenError(DriverError):
     retry = False
 
 
+class MissingSoftwareError(DriverError):
+    """What runs the device is not installed on this computer."""
+
+    retry = False
+
+
 class DeviceLostError(DriverError):
-    """It was there, and went away: unplugged, hung up, or its bus fails for good."""
+    """It was there, and went away: unplugged, hung up, or its bus keeps failing."""
 
 
 class DeviceStalledError(DriverError):

@@ -21,6 +21,7 @@ ASTRAY_PERIODS = 1.5  # as far from the line: samples that nobody counted, or co
 ASTRAY_NS = 10e6  # … and at least so far
 LATE_NS = 100e6  # … and late for so long: a backlog is read faster
 LATE_CALLS = 5
+MAX_AHEAD_NS = 100_000_000  # of the arrival: while the rate is not known yet, stamps may be too early or too late
 SLEW = 0.005  # share by which stamps are stretched to follow the line once the rate is known
 FIRST_SLEW = 0.5  # … and shrunk at most before
 
@@ -32,7 +33,9 @@ class SampleClock:
 
     Stamps are strictly increasing, also across ``restart``. A rate that is off nominal is known after about 1 s; until
     then the nominal one helps out. A gap in which nobody counted the samples lost is noticed by what comes after being
-    late, for ``LATE_NS``; up to 1.5 samples lost pass for jitter. Memory is ``BLOCKS`` points.
+    late, for ``LATE_NS``; up to 1.5 samples lost pass for jitter. A device whose own time runs away
+    takes its stamps ``MAX_AHEAD_NS`` into the future at most, and 1 ns more for each sample. Memory is ``BLOCKS``
+    points.
     """
 
     def __init__(self, nominal_rate_hz: float) -> None:
@@ -86,7 +89,7 @@ class SampleClock:
         self._take((self._sample, float(arrival_ns - self._base_ns)))
         oldest = self._sample - sum(steps)
         return [
-            self._stamp_ns(self._base_ns, oldest + since, step)
+            self._stamp_ns(self._base_ns, oldest + since, step, arrival_ns)
             for since, step in zip(accumulate(steps), steps, strict=True)
         ]
 
@@ -127,7 +130,7 @@ class SampleClock:
     def _delay_ns(self, point: Point) -> float:
         return point[1] - self._offset_ns - point[0] * self._period_ns
 
-    def _stamp_ns(self, base_ns: int, sample: int, step: int) -> int:
+    def _stamp_ns(self, base_ns: int, sample: int, step: int, arrival_ns: int) -> int:
         stamp_ns = base_ns + round(self._offset_ns + sample * self._period_ns)
         if self._last_ns is not None:
             step_ns = step * self._period_ns
@@ -135,6 +138,7 @@ class SampleClock:
             stamp_ns = max(stamp_ns, self._last_ns + max(round((1 - slew) * step_ns), 1))
             if self._seen_ns > KNOWN_NS:
                 stamp_ns = min(stamp_ns, self._last_ns + max(round((1 + slew) * step_ns), 1))
+            stamp_ns = max(min(stamp_ns, arrival_ns + MAX_AHEAD_NS), self._last_ns + 1)
         self._last_ns = stamp_ns
         return stamp_ns
 

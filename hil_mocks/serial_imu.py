@@ -23,7 +23,7 @@ import numpy as np
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.imu import witmotion, xsens
 from drivers.imu.bno08x_rvc import MPS2_PER_UNIT, RAD_PER_UNIT
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 
 Rotation = np.ndarray[tuple[int, ...], np.dtype[np.float64]]
 Fault = Callable[[bytes], bytes | None]
@@ -53,6 +53,18 @@ class WitMotionEncoder:
         return b"".join(_with_sum(struct.pack("<2B4h", 0x55, kind, *values), 0) for kind, values in frames)
 
 
+class WitMotionBleEncoder:
+    """Acceleration, angular velocity and angle in one frame, as a WT9011DCL sends them."""
+
+    baud = 115200
+
+    def __call__(self, sample: ImuSample) -> bytes:
+        """See ``Encoder``."""
+        accel = [_int16(value / witmotion.MPS2_PER_UNIT) for value in sample.accel]
+        gyro = [_int16(value / witmotion.RADPS_PER_UNIT) for value in sample.gyro]
+        return struct.pack("<2B9h", 0x55, 0x61, *accel, *gyro, 0, 0, 0)
+
+
 class RvcEncoder:
     """Keeps the orientation that the gyro's rates add up to, and sends it with the acceleration."""
 
@@ -75,6 +87,33 @@ class RvcEncoder:
         body = struct.pack("<B6h3x", self._number, *angles, *accel)
         self._number = (self._number + 1) % 256
         return _with_sum(b"\xaa\xaa" + body, 2)
+
+
+class ShtpUartEncoder:
+    """A BNO08x in UART-SHTP mode that was asked for its sensors: time, accelerometer and gyro in one packet."""
+
+    baud = 3_000_000
+
+    def __init__(self) -> None:
+        self._number = 0
+
+    def __call__(self, sample: ImuSample) -> bytes:
+        """See ``Encoder``."""
+        accel = [_int16(value * 2**8) for value in sample.accel]
+        gyro = [_int16(value * 2**9) for value in sample.gyro]
+        cargo = b"\xfb" + bytes(4)
+        for sensor, values in ((1, accel), (2, gyro)):
+            cargo += struct.pack("<4B3h", sensor, self._number, 3, 0, *values)
+        packet = shtp_packet(3, self._number, cargo)
+        self._number = (self._number + 1) % 256
+        return packet
+
+
+def shtp_packet(channel: int, number: int, cargo: bytes) -> bytes:
+    """A packet of a BNO08x in its frame."""
+    packet = struct.pack("<HBB", len(cargo) + 4, channel, number) + cargo
+    escaped = packet.replace(b"\x7d", b"\x7d\x5d").replace(b"\x7e", b"\x7d\x5e")
+    return b"\x7e\x01" + escaped + b"\x7e"
 
 
 class XsensEncoder:
@@ -135,7 +174,9 @@ class CsvEncoder:
 
 ENCODERS: dict[str, Callable[[], Encoder]] = {
     "witmotion": WitMotionEncoder,
+    "witmotion_ble": WitMotionBleEncoder,
     "bno08x_rvc": RvcEncoder,
+    "bno08x_uart": ShtpUartEncoder,
     "xsens": XsensEncoder,
     "csv": CsvEncoder,
 }
@@ -188,7 +229,7 @@ class SerialImuStandIn:
                     os.close(end)
 
     def send(self, count: int = 1) -> int:
-        """Send the next samples; answers how many there were."""
+        """Send the next samples. Return how many there were."""
         for done in range(count):
             sample = next(self._samples, None)
             if sample is None:
@@ -205,6 +246,13 @@ class SerialImuStandIn:
             heard = heard_at(data, self._encoder.baud, _baud(master) or self._encoder.baud)
             while heard and select.select([], [master], [], 0.0)[1]:
                 heard = heard[os.write(master, heard) :]
+
+    def heard(self) -> bytes:
+        """What the host has sent since it was asked last."""
+        with self._hands, suppress(BlockingIOError):
+            if self._ends is not None:
+                return os.read(self._ends[0], 65536)
+        return b""
 
     def play(self, clock: Clock = SYSTEM_CLOCK) -> None:
         """Send all samples at the times between their stamps, from a thread of its own, until ``close``."""

@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.camera import v4l2_ioctl as v4l2
+from drivers.camera.luminance import least_stride
 from drivers.clock import Clock
 
 Grey = npt.NDArray[np.uint8]
@@ -64,12 +65,14 @@ class MockCamera:
     """A camera and its faults; a fault that counts pictures ends by itself."""
 
     card: str = "Mock Webcam"
+    driver: str = "uvcvideo"
     modes: Modes = field(default_factory=lambda: WEBCAM)
     controls: dict[int, MockControl] = field(default_factory=webcam_controls)
     caps: int = v4l2.CAP_VIDEO_CAPTURE | v4l2.CAP_STREAMING
     pictures: Callable[[int, int, int], Grey] = picture
     transfer: float = 0.5  # share of an interval from start of exposure to the filled buffer
     row_padding: int = 0  # bytes after each row
+    data_offset: int = 0  # bytes before the picture, of a multi-planar device
     field: int = v4l2.FIELD_NONE
     stamp_flags: int = v4l2.FLAG_TIMESTAMP_MONOTONIC | v4l2.FLAG_STAMPED_AT_EXPOSURE
     stamp_offset_s: float = 0.0
@@ -215,6 +218,7 @@ class MockKernel:
         if camera.flag_error:
             camera.flag_error -= 1
             flags |= v4l2.FLAG_ERROR
+        data = bytes(camera.data_offset) + data
         file.buffers[index][: len(data)] = data
         stamp_us = (self._exposure_ns(file, number) + round(camera.stamp_offset_s * 1e9)) // 1000
         return v4l2.Buffer(
@@ -232,6 +236,8 @@ class MockKernel:
     def _capabilities(self, file: _Open, answer: v4l2.Capability) -> None:
         card = file.camera.card.encode()[:31]
         answer.card[: len(card)] = card
+        driver = file.camera.driver.encode()[:15]
+        answer.driver[: len(driver)] = driver
         answer.capabilities = file.camera.caps | v4l2.CAP_VIDEO_CAPTURE | v4l2.CAP_DEVICE_CAPS  # of the whole device
         answer.device_caps = file.camera.caps
 
@@ -239,21 +245,21 @@ class MockKernel:
         answer.pixelformat = v4l2.fourcc(_item(list(file.camera.modes), answer.index))
 
     def _size_at(self, file: _Open, answer: v4l2.FrameSize) -> None:
-        sizes = file.camera.modes.get(v4l2.letters(answer.pixelformat), {})
+        sizes = file.camera.modes.get(v4l2.fourcc_text(answer.pixelformat), {})
         answer.type = v4l2.DISCRETE
         answer.numbers[:2] = _item(list(sizes), answer.index)
 
     def _rate_at(self, file: _Open, answer: v4l2.FrameInterval) -> None:
-        sizes = file.camera.modes.get(v4l2.letters(answer.pixelformat), {})
+        sizes = file.camera.modes.get(v4l2.fourcc_text(answer.pixelformat), {})
         rates = sizes.get((answer.width, answer.height), ()) if file.camera.tells_rate else ()
         answer.type = v4l2.DISCRETE
         answer.numbers[:2] = 1000, round(1000 * _item(list(rates), answer.index))
 
-    def _set_format(self, file: _Open, answer: v4l2.Format) -> None:
+    def _set_format(self, file: _Open, answer: v4l2.Format | v4l2.PlanesFormat) -> None:
         """What is not there becomes the nearest that is, as the kernel's drivers do."""
         _refuse(file.camera.format_error)
         modes = file.camera.modes
-        wanted = v4l2.letters(answer.pixelformat)
+        wanted = v4l2.fourcc_text(answer.pixelformat)
         file.pixel_format = wanted if wanted in modes else next(iter(modes))
         sizes = modes[file.pixel_format]
         asked = (answer.width, answer.height)
@@ -262,10 +268,10 @@ class MockKernel:
         answer.width, answer.height = file.width, file.height
         answer.pixelformat = v4l2.fourcc(file.pixel_format)
         answer.field = file.camera.field
-        row = len(encode(np.zeros((2, file.width), np.uint8), file.pixel_format, file.camera.row_padding)) // 2
-        is_raw = file.pixel_format in {"GREY", "YUYV", "UYVY"}
-        answer.bytesperline = row if is_raw else file.width * (file.pixel_format == "NV12")
-        answer.sizeimage = file.height * max(row, 2 * file.width)
+        plane = answer.planes[0] if isinstance(answer, v4l2.PlanesFormat) else answer
+        stride = least_stride(file.pixel_format, file.width)
+        plane.bytesperline = stride + file.camera.row_padding if stride else 0
+        plane.sizeimage = file.height * max(plane.bytesperline, 2 * file.width)
 
     def _set_rate(self, file: _Open, answer: v4l2.StreamParm) -> None:
         if not file.camera.tells_rate:
@@ -277,25 +283,30 @@ class MockKernel:
         answer.numerator, answer.denominator = 1000, round(1000 * file.fps)
 
     def _request_buffers(self, file: _Open, answer: v4l2.RequestBuffers) -> None:
-        size = file.height * (2 * file.width + file.camera.row_padding) + 65536
+        size = file.height * (4 * file.width + file.camera.row_padding) + 65536
         file.buffers = [mmap.mmap(-1, size) for _ in range(answer.count)]
 
-    def _buffer_at(self, file: _Open, answer: v4l2.Buffer) -> None:
-        answer.length = len(file.buffers[answer.index])
-        answer.offset = answer.index * mmap.PAGESIZE
+    def _buffer_at(self, file: _Open, answer: v4l2.Buffer | v4l2.PlanesBuffer) -> None:
+        memory = _first_plane(answer)
+        memory.length = len(file.buffers[answer.index])
+        memory.offset = answer.index * mmap.PAGESIZE
 
-    def _queue(self, file: _Open, buffer: v4l2.Buffer) -> None:
+    def _queue(self, file: _Open, buffer: v4l2.Buffer | v4l2.PlanesBuffer) -> None:
         self._expose(file)
         assert buffer.index not in file.empty
         file.empty.append(buffer.index)
 
-    def _dequeue(self, file: _Open, answer: v4l2.Buffer) -> None:
+    def _dequeue(self, file: _Open, answer: v4l2.Buffer | v4l2.PlanesBuffer) -> None:
         _refuse(file.camera.dequeue_error)
         self._expose(file)
         if not file.filled:
             raise _os_error(errno.EAGAIN)
         filled = file.filled.popleft()
-        for name in ("index", "bytesused", "flags", "seconds", "microseconds", "sequence"):
+        memory = _first_plane(answer)
+        memory.bytesused = filled.bytesused
+        if isinstance(memory, v4l2.Plane):
+            memory.data_offset = file.camera.data_offset
+        for name in ("index", "flags", "seconds", "microseconds", "sequence"):
             setattr(answer, name, getattr(filled, name))
 
     def _start(self, file: _Open, _argument: v4l2.BufferType) -> None:
@@ -325,18 +336,51 @@ class MockKernel:
 
 
 def encode(image: Grey, pixel_format: str, row_padding: int = 0) -> bytes:
-    """A grey picture as a camera would send it, rows of raw formats followed by padding."""
+    """A grey picture as a camera would send it, rows of raw formats followed by padding.
+
+    Bits that the format has beyond eight are set, so that a reader that takes the wrong ones sees it.
+    """
     height, width = image.shape
-    colour = np.full_like(image, 128)
     if pixel_format == "MJPG":
         return bytes(cv2.imencode(".jpg", image)[1])
-    if pixel_format == "YUYV":
-        image = np.stack([image, colour], axis=2).reshape(height, 2 * width)
-    elif pixel_format == "UYVY":
-        image = np.stack([colour, image], axis=2).reshape(height, 2 * width)
-    elif pixel_format == "NV12":
+    colour = np.full_like(image, 128)
+    if pixel_format in {"YUYV", "YVYU"}:
+        image = np.stack([image, colour], axis=2)
+    elif pixel_format in {"UYVY", "VYUY"}:
+        image = np.stack([colour, image], axis=2)
+    elif pixel_format in {"NV12", "NV21", "YU12", "YV12"}:
         image = np.vstack([image, colour[: height // 2]])
-    return np.pad(image, ((0, 0), (0, row_padding)), constant_values=255).tobytes()
+    elif pixel_format in {"NV16", "NV61", "422P"}:
+        image = np.vstack([image, colour])
+    elif pixel_format in {"BGR3", "RGB3"}:
+        image = np.stack([image] * 3, axis=2)
+    elif pixel_format in {"XR24", "XB24"}:
+        image = np.stack([image] * 3 + [colour], axis=2)
+    elif bits := WORDS.get(pixel_format):
+        image = (image.astype("<u2") << (bits - 8) | (1 << (bits - 8)) - 1).view(np.uint8)
+    elif pixels := PACKED.get(pixel_format):
+        lower = np.full((height, width // pixels, 1), 255, np.uint8)
+        image = np.concatenate([image.reshape(height, -1, pixels), lower], axis=2)
+    rows = image.reshape(len(image), -1)
+    return np.pad(rows, ((0, 0), (0, row_padding)), constant_values=255).tobytes()
+
+
+WORDS = {
+    **dict.fromkeys(("Y10", "BG10", "GB10", "BA10", "RG10"), 10),
+    **dict.fromkeys(("Y12", "BG12", "GB12", "BA12", "RG12"), 12),
+    **dict.fromkeys(("Y16", "BYR2", "GB16", "GR16", "RG16"), 16),
+}
+"""Bits that are used of the 16 of a pixel."""
+PACKED = {
+    **dict.fromkeys(("Y10P", "pBAA", "pGAA", "pgAA", "pRAA"), 4),
+    **dict.fromkeys(("Y12P", "pBCC", "pGCC", "pgCC", "pRCC"), 2),
+}
+"""Pixels whose lower bits share a byte."""
+
+
+def _first_plane(buffer: v4l2.Buffer | v4l2.PlanesBuffer) -> v4l2.Buffer | v4l2.Plane:
+    """Where length and place of the first memory are told."""
+    return v4l2.Plane.from_address(buffer.planes) if isinstance(buffer, v4l2.PlanesBuffer) else buffer
 
 
 def _os_error(number: int) -> OSError:

@@ -2,7 +2,7 @@
 
 import sys
 
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 
 if __name__ == "__main__":
     sys.exit(main())

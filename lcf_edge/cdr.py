@@ -8,6 +8,7 @@ Every length is compared with the bytes that are left before anything of that le
 import struct
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, Literal
 
 import numpy as np
@@ -15,13 +16,15 @@ import numpy.typing as npt
 
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import LcfError
-from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Cause, Kind, ObjectClass, ObjectState, Scene
 
 Vector = tuple[float, float, float]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
 _TWIST_BYTES = 7 + 48  # with what may align it
+
+_WITHOUT_GAPS = (CIRCLE, OBJECT)  # between their fields
 
 _BYTE_ORDERS: dict[int, Literal["<", ">"]] = {0x0000: ">", 0x0001: "<"}
 
@@ -196,18 +199,19 @@ def decode_velocity(payload: bytes | memoryview) -> tuple[str, Twist]:
 
 
 def encode_scene(scene: Scene, frame_id: str) -> bytes:
-    """``lcf_msgs/msg/Scene``; sizes, timing and notes stay behind. Raises ``CdrError``."""
-    writer = _Writer()
+    """``lcf_msgs/msg/Scene``. Raises ``CdrError``."""
+    writer = Writer()
     writer.header(scene.stamp_ns, frame_id)
     writer.scalars("QIIf", scene.seq, scene.image_width, scene.image_height, scene.vehicle_speed)
     writer.records(scene.circles, CIRCLE)
     writer.records(scene.psi, PSI_REGION)
+    writer.records(scene.objects, OBJECT)
     return writer.payload()
 
 
 def encode_compressed_image(stamp_ns: int, frame_id: str, image_format: str, data: bytes) -> bytes:
     """``sensor_msgs/msg/CompressedImage``; ``image_format``: ``jpeg`` or ``png``. Raises ``CdrError``."""
-    writer = _Writer()
+    writer = Writer()
     writer.header(stamp_ns, frame_id)
     writer.string(image_format)
     writer.octets(data)
@@ -216,7 +220,7 @@ def encode_compressed_image(stamp_ns: int, frame_id: str, image_format: str, dat
 
 def encode_diagnostics(stamp_ns: int, hardware_id: str, status: Sequence[DeviceStatus]) -> bytes:
     """``diagnostic_msgs/msg/DiagnosticArray``: one status a device. Raises ``CdrError``."""
-    writer = _Writer()
+    writer = Writer()
     writer.header(stamp_ns, "")
     writer.scalars("I", len(status))
     for device in status:
@@ -232,7 +236,7 @@ def encode_diagnostics(stamp_ns: int, hardware_id: str, status: Sequence[DeviceS
 
 def encode_imu(stamp_ns: int, frame_id: str, gyro: Vector, accel: Vector) -> bytes:
     """``sensor_msgs/msg/Imu`` without orientation, covariances unknown; rad/s, m/s². Raises ``CdrError``."""
-    writer = _Writer()
+    writer = Writer()
     writer.header(stamp_ns, frame_id)
     writer.scalars("13d", 0, 0, 0, 1, -1, *[0] * 8)  # -1: there is no orientation
     writer.scalars("24d", *gyro, *[0] * 9, *accel, *[0] * 9)
@@ -241,7 +245,7 @@ def encode_imu(stamp_ns: int, frame_id: str, gyro: Vector, accel: Vector) -> byt
 
 def encode_twist_stamped(stamp_ns: int, frame_id: str, speed_mps: float, yaw_rate_radps: float) -> bytes:
     """``geometry_msgs/msg/TwistStamped``: x forward, z up; NaN: unknown. Raises ``CdrError``."""
-    writer = _Writer()
+    writer = Writer()
     writer.header(stamp_ns, frame_id)
     writer.scalars("6d", speed_mps, 0, 0, 0, 0, yaw_rate_radps)
     return writer.payload()
@@ -249,7 +253,7 @@ def encode_twist_stamped(stamp_ns: int, frame_id: str, speed_mps: float, yaw_rat
 
 def encode_camera_info(info: CameraInfo) -> bytes:
     """``sensor_msgs/msg/CameraInfo`` of one camera, not rectified: R is the identity, P has K. Raises ``CdrError``."""
-    writer = _Writer()
+    writer = Writer()
     writer.header(info.header.stamp_ns, info.header.frame_id)
     writer.scalars("II", info.height, info.width)
     writer.string(info.distortion_model)
@@ -262,53 +266,70 @@ def encode_camera_info(info: CameraInfo) -> bytes:
 
 
 def restamped(payload: bytes, stamp_ns: int) -> bytes:
-    """A little-endian message, whose type begins with a header, with another stamp. Raises ``CdrError``."""
-    stamp = _Writer()
-    stamp.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
+    """A little-endian message, whose type begins with a stamp or a header, with another stamp. Raises ``CdrError``."""
+    stamp = Writer()
+    stamp.stamp(stamp_ns)
     start = stamp.payload()
     return b"".join((start, memoryview(payload)[len(start) :]))
 
 
 def decode_scene(payload: bytes | memoryview) -> Scene:
-    """``lcf_msgs/msg/Scene``; circles and ψ are read-only views of a little-endian payload.
+    """``lcf_msgs/msg/Scene``; objects, circles and ψ are read-only views of a little-endian payload.
 
-    Sizes, timing and notes, which are not sent, have their defaults. Raises ``CdrError``, also for a kind or a
-    cause that the message does not know, and for a signalling NaN, of which NumPy would complain.
+    A payload that ends after ψ comes from an older version and has
+    no objects. Raises ``CdrError``, also for a kind, cause, class or state that the message does not know, and for a
+    signalling NaN, of which NumPy would complain.
     """
     reader = _Reader(payload)
     header = reader.header()
     seq, width, height, speed = reader.scalars("QIIf")
     circles, psi = reader.sequence(CIRCLE, align=4), reader.sequence(PSI_REGION, align=4)
-    for name, known in (("kind", Kind), ("cause", Cause)):
-        if not np.isin(circles[name], [*known]).all():
-            raise CdrError(f"CDR: the {name} of a circle is none that is known")
-    if _signals(circles) or _signals(psi):
+    objects = reader.sequence(OBJECT, align=4) if reader.left else np.empty(0, OBJECT)
+    for name, ids, known in (
+        ("kind of a circle", circles["kind"], Kind),
+        ("cause of a circle", circles["cause"], Cause),
+        ("class of an object", objects["class_id"], ObjectClass),
+        ("state of an object", objects["state"], ObjectState),
+    ):
+        if (ids > max(known)).any():  # they count from 0
+            raise CdrError(f"CDR: the {name} is none that is known")
+    if _signals(circles) or _signals(psi) or _signals(objects):
         raise CdrError("CDR: a signalling NaN")
-    return Scene(header.stamp_ns, seq, width, height, speed, circles, psi)
+    return Scene(header.stamp_ns, seq, width, height, speed, circles, psi, objects=objects)
 
 
 def _signals(rows: npt.NDArray[np.void]) -> bool:
     """Whether a float32 field holds a signalling NaN: not a number, and its highest fraction bit is not set."""
-    for name in rows.dtype.names or ():
-        if rows.dtype[name] == np.float32:
-            bits = rows[name].view(np.uint32)
-            if ((bits & 0x7FC00000 == 0x7F800000) & (bits & 0x003FFFFF != 0)).any():
-                return True
-    return False
+    words = rows.view(np.uint32).reshape(len(rows), rows.dtype.itemsize // 4)
+    bits = words[:, _float_words(rows.dtype)]
+    return bool(((bits & 0x7FC00000 == 0x7F800000) & (bits & 0x003FFFFF != 0)).any())
 
 
-class _Writer:
+@cache
+def _float_words(dtype: np.dtype[np.void]) -> list[int]:
+    """Which words of four bytes of a record are float32 fields."""
+    fields = (dtype.fields or {}).values()
+    return [offset // 4 for kind, offset, *_ in fields if kind == np.float32]
+
+
+class Writer:
     """A payload that grows. Raises ``CdrError`` for a value that does not fit its field."""
 
     def __init__(self) -> None:
         self._body = bytearray()
 
     def payload(self) -> bytes:
+        """What was written, with its encapsulation."""
         return LITTLE_ENDIAN + self._body
 
     def header(self, stamp_ns: int, frame_id: str) -> None:
-        self.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
+        """``std_msgs/msg/Header``."""
+        self.stamp(stamp_ns)
         self.string(frame_id)
+
+    def stamp(self, stamp_ns: int) -> None:
+        """``builtin_interfaces/msg/Time``."""
+        self.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
 
     def scalars(self, fields: str, *values: float) -> None:
         """Fields in the notation of ``struct``, none of which is wider than the one before it."""
@@ -324,14 +345,17 @@ class _Writer:
         self.octets(text.replace("\0", "").encode(errors="replace") + b"\0")
 
     def octets(self, data: bytes) -> None:
+        """A sequence of bytes."""
         self.scalars("I", len(data))
         self._body.extend(data)
 
     def records(self, rows: npt.NDArray[np.void], dtype: np.dtype[np.void]) -> None:
         """A sequence of fixed-size records; what lies between their fields is zero, not what memory held."""
-        block = np.zeros(len(rows), dtype)
-        for name in dtype.names or ():
-            block[name] = rows[name]
+        block: npt.NDArray[np.void] = rows
+        if rows.dtype != dtype or dtype not in _WITHOUT_GAPS:
+            block = np.zeros(len(rows), dtype)
+            for name in dtype.names or ():
+                block[name] = rows[name]
         self.scalars("I", len(block))
         self._body.extend(block.tobytes())
 

@@ -2,7 +2,7 @@
 
 
 class LcfError(Exception):
-    """Something that the user can mend; its text is the whole message. Exit status 1."""
+    """Something that the user can fix; its text is the whole message. Exit status 1."""
 
     exit_status = 1
 

@@ -25,11 +25,11 @@ _Floats = npt.NDArray[np.float64]
 
 WIDEST, NARROWEST = 200, 1000  # sides of the picture in a focal length, focal lengths in a side
 FARTHEST_MIDDLE = 10  # in sides
-LARGEST_COEFFICIENT = 100.0
+MAX_COEFFICIENT = 100.0
 
-_SMALLEST_COEFFICIENT = 1e-12  # what is less bends nothing, and has no root
-_LARGEST_ANGLE_RAD = np.radians(85.0)  # off the optical axis: a plane picture holds no more
-_SMALLEST_SLOPE = 0.1  # beyond, 1 px of corner noise would become 10 px; the fold, where it is 0, is near
+_MIN_COEFFICIENT = 1e-12  # what is less bends nothing, and has no root
+_MAX_ANGLE_RAD = np.radians(85.0)  # off the optical axis: a plane picture holds no more
+_MIN_SLOPE = 0.1  # beyond, 1 px of corner noise would become 10 px; the fold, where it is 0, is near
 _NEWTON_STEPS = 3  # always as many: a point's answer must not depend on the others
 _TOLERANCE = 1e-4  # of x/z, y/z before the last step, which squares it: below 1e-3 px in the end
 _NODES = 2048  # of the radial inverse; its error is below 1e-4 px
@@ -68,8 +68,8 @@ class Lens:
             raise ConfigError(f"lens: focal lengths must be {side / WIDEST:g} to {side * NARROWEST} px")
         if max(abs(self.cx), abs(self.cy)) > side * FARTHEST_MIDDLE:
             raise ConfigError(f"lens: its middle must be within {side * FARTHEST_MIDDLE} px")
-        if any(abs(k) > LARGEST_COEFFICIENT for k in self.coefficients):
-            raise ConfigError(f"lens: distortion coefficients must be within {LARGEST_COEFFICIENT:g}")
+        if any(abs(k) > MAX_COEFFICIENT for k in self.coefficients):
+            raise ConfigError(f"lens: distortion coefficients must be within {MAX_COEFFICIENT:g}")
 
     @classmethod
     def from_config(cls, camera: Camera, width: int, height: int) -> "Lens":
@@ -184,11 +184,11 @@ class Lens:
     def reach(self) -> float:
         """Largest r (radial-tangential) or θ (equidistant) that the model maps usefully."""
         slope = [(2 * i + 1) * k for i, k in enumerate(self.radial)]  # of ρ, as a polynomial of r² or θ²
-        slope[0] -= _SMALLEST_SLOPE
-        slope = [k if abs(k) >= _SMALLEST_COEFFICIENT else 0.0 for k in slope]
+        slope[0] -= _MIN_SLOPE
+        slope = [k if abs(k) >= _MIN_COEFFICIENT else 0.0 for k in slope]
         roots = np.roots(slope[::-1])
         folds = np.sqrt(roots.real[(np.abs(roots.imag) < 1e-9) & (roots.real > 0)])
-        return float(min(self._ray(np.tan(_LARGEST_ANGLE_RAD)), *folds, np.inf))
+        return float(min(self._ray(np.tan(_MAX_ANGLE_RAD)), *folds, np.inf))
 
     @cached_property
     def _inverse(self) -> tuple[_Floats, _Floats]:

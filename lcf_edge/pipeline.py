@@ -3,45 +3,60 @@
 import math
 import time
 from collections import Counter, deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame, ImuSample, SpeedSample
-from lcf_edge import own_parts
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge import scene_records
 from lcf_edge.config import Config
-from lcf_edge.corners import CornerDetector
-from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
+from lcf_edge.corners import own_parts
+from lcf_edge.corners.detector import CornerDetector
+from lcf_edge.corners.picture_quality import PictureQuality
+from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
+from lcf_edge.ego_motion.gyro_bias import GyroBias
+from lcf_edge.ego_motion.image_rotation import ImageRotation
+from lcf_edge.ego_motion.stillness import Stillness
 from lcf_edge.errors import ConfigError
-from lcf_edge.filter import LineCircleFilter, Motion
-from lcf_edge.filter.inputs import NO_CORNERS
+from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.inputs import NO_CORNERS, Corners
 from lcf_edge.filter.line_circle_filter import Mounting
-from lcf_edge.filter.tables import CircleTable, Floats, Mask, PsiTable, Rows
-from lcf_edge.gyro_bias import GyroBias
-from lcf_edge.image_rotation import ImageRotation
+from lcf_edge.filter.tables import Floats
 from lcf_edge.lens import Lens
-from lcf_edge.picture_quality import PictureQuality
-from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Timing, View
-from lcf_edge.stillness import Stillness
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, Timing, View
+from lcf_edge.scene_records import Records
 
 if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
-    from lcf_edge.recordings import Recording
+    from lcf_edge.recording.read import Recording
 
-LEAST_RANGE_M = 0.1
-LEAST_DT_S = 5e-3  # of a first frame, or of two with one stamp
+MIN_RANGE_M = 0.1
 
-Records = np.ndarray[Any, np.dtype[np.void]]
+Rows = np.ndarray[Any, np.dtype[np.void]]
+
+
+@dataclass(frozen=True, slots=True)
+class Look:
+    """What pictures show without samples: the corners, what is wrong with the last one, whether they stand still."""
+
+    frame: Frame
+    corners: Corners
+    cut: int  # corners that were left out because the budget was full
+    notes: tuple[str, ...]
+    still: bool | None  # whether the picture has stood still for half a second; None: it does not tell
+    detect_ns: int  # that the corners took
+    took_ns: int  # that all of it took
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one frame gave, and what it was made of."""
+    """What one frame gave, and how to see what it was made of, which holds until the next frame."""
 
-    scene: Scene
-    view: View
+    scene: PipelineScene
+    view: Callable[[], View]
 
 
 class Pipeline:
@@ -63,6 +78,9 @@ class Pipeline:
         self._stillness = Stillness(lens.width, lens.height)
         self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
+        memory, self._plane = config.memory, ImagePlane(lens)
+        self._told_circles = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
+        self._told_objects, self._told_psi = Records(memory.objects, OBJECT), Records(memory.psi, PSI_REGION)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
 
@@ -104,36 +122,40 @@ class Pipeline:
         else:
             self._motion.add_speed(sample)
 
-    def process(self, frame: Frame) -> Scene:
+    def process(self, frame: Frame) -> PipelineScene:
         """Run the filter on one frame."""
+        return self.follow(self.look(frame))
+
+    def look(self, frame: Frame) -> Look:
+        """The part of ``process`` that needs no samples; ``follow`` is the rest, and comes next."""
         started = time.perf_counter_ns()
         corners, cut = self._detector.detect(frame.image, self._highest_row())
-        pictured = self._quality.notes(frame.image, len(corners))
-        detected = time.perf_counter_ns()
+        detect_ns = time.perf_counter_ns() - started
+        notes = self._quality.notes(frame.image, len(corners))
         still = self._stillness.look(frame.stamp_ns, corners.pixel)
-        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, still))
-        motion = Motion(
-            max(ego.dt_s, LEAST_DT_S),
-            ego.rotation,
-            ego.rotation_sigma_rad,
-            ego.speed_mps,
-            ego.path_yaw_rate_radps,
-        )
+        return Look(frame, corners, cut, notes, still, detect_ns, time.perf_counter_ns() - started)
+
+    def follow(self, look: Look) -> PipelineScene:
+        """The scene of the frame that was looked at, with the samples that have been added."""
+        started = time.perf_counter_ns()
+        frame, corners = look.frame, look.corners
+        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
-        step = self.filter.step(corners, motion)
+        step = self.filter.step(corners, ego.to_motion(), frame.image)
         self._lost = step.residual is None
+        self._motion.see_ground(self.filter.ground)
         if step.residual is not None:
             self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad, self._expansion_hz())
         filtered = time.perf_counter_ns()
-        circles, psi = self._circles(), self._psi()
-        notes = [*ego.notes, *pictured]
+        (circles, circle_objects), objects, psi = self._circles(), self._objects(), self._psi()
+        notes = [*ego.notes, *look.notes]
         if self.filter.stands:
             notes.append("stands still")
-        sizes = replace(step.sizes, evicted=step.sizes.evicted + cut)
+        sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
         self._seen = corners, step.omitted
         self._speed_mps = ego.speed_mps
-        return Scene(
+        return PipelineScene(
             stamp_ns=frame.stamp_ns,
             seq=frame.seq,
             image_width=self._lens.width,
@@ -143,17 +165,19 @@ class Pipeline:
             psi=psi,
             sizes=sizes,
             timing=Timing(
-                detect=(detected - started) // 1000,
+                detect=look.detect_ns // 1000,
                 filter=(filtered - before) // 1000,
-                total=(done - started) // 1000,
+                total=(look.took_ns + done - started) // 1000,
             ),
             notes=tuple(notes),
+            objects=objects,
+            circle_objects=circle_objects,
         )
 
     def _highest_row(self) -> float:
         """Row, px, above which all that could be met within the horizon is higher than the vehicle; NaN: unknown."""
         vehicle, camera = self._config.vehicle, self._config.camera
-        farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, LEAST_RANGE_M)
+        farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, MIN_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
     def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
@@ -170,50 +194,28 @@ class Pipeline:
         weight = normal.support * normal.active
         return float(np.abs(normal.expansion) @ weight / max(weight.sum(), 1))
 
-    def _circles(self) -> Records:
-        """The circles from Tr_s up, rebels first."""
+    def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
+        """The circles from Tr_s up, rebels first, and the object of each, 0: none."""
+        told, least = self._told_circles, self._config.filter.tr_s
+        told.count = 0
+        objects = self.filter.objects.columns
+        for kind, table in ((Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)):
+            scene_records.add_circles(told, table.columns, objects, kind, self._plane, least)
+        return told.told(), told.told_owners()
+
+    def _objects(self) -> Rows:
+        """The objects from Tr_s up."""
+        told = self._told_objects
+        told.count = 0
         least = self._config.filter.tr_s
-        tables = [(Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)]
-        shown = [self._placed(table, table.active & (table.trust >= least)) for _, table in tables]
-        circles = np.zeros(sum(len(rows) for rows, _, _ in shown), CIRCLE)
-        start = 0
-        for (kind, table), (rows, x, y) in zip(tables, shown, strict=True):
-            part = circles[start : start + len(rows)]
-            start += len(rows)
-            part["kind"], part["x"], part["y"] = kind, x, y
-            part["support"] = np.minimum(table.support[rows], 65535)
-            part["direction"] = table.beta[rows]
-            for field in ("id", "cause", "radius", "speed", "trust"):
-                part[field] = getattr(table, field)[rows]
-            part["bearing"], part["elevation"] = self._lens.bearing(table.x[rows], table.y[rows])
-            if kind is Kind.REBEL:
-                for field in ("ttc", "range", "lateral"):
-                    part[field] = getattr(table, field)[rows]
-            else:
-                part["ttc"], part["range"], part["lateral"] = np.inf, np.nan, np.nan
-        return circles
+        scene_records.add_objects(told, self.filter.objects.columns, self._plane, least)
+        return told.told()
 
-    def _psi(self) -> Records:
-        table = self.filter.psi
-        rows, x, y = self._placed(table, table.active)
-        part = np.zeros(len(rows), PSI_REGION)
-        part["x"], part["y"] = x, y
-        for field in ("id", "shape", "width", "height", "trust"):
-            part[field] = getattr(table, field)[rows]
-        return part
-
-    def _placed(self, table: CircleTable | PsiTable, wanted: Mask) -> tuple[Rows, Floats, Floats]:
-        """The wanted rows that the lens can place, and where in the input frame, px.
-
-        What is nearly met may have its middle beside the picture: it is shown at the border.
-        """
-        rows = wanted.nonzero()[0]
-        x, y = self._lens.distort_xy(table.x[rows], table.y[rows])
-        if self._lens.is_distorted:
-            seen = np.isfinite(x)
-            rows, x, y = rows[seen], x[seen], y[seen]
-        across, down = self._lens.width - 1, self._lens.height - 1
-        return rows, np.minimum(np.maximum(x, 0), across), np.minimum(np.maximum(y, 0), down)
+    def _psi(self) -> Rows:
+        told = self._told_psi
+        told.count = 0
+        scene_records.add_psi(told, self.filter.psi.columns, self._plane)
+        return told.told()
 
     def view(self) -> View:
         """What the last scene was made of, for those who draw it."""
@@ -242,7 +244,7 @@ def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:
 
 
 def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome]]:
-    """Feed a recording through the pipeline; answers each frame with its outcome.
+    """Feed a recording through the pipeline. Yield each frame with its outcome.
 
     At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises
     ``RecordingError``, ``ConfigError``.
@@ -261,7 +263,7 @@ def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome
                 for sample in waiting:
                     pipeline.add(sample)
                 waiting.clear()
-            yield event, Outcome(pipeline.process(event), pipeline.view())
+            yield event, Outcome(pipeline.process(event), pipeline.view)
         elif pipeline is None:
             waiting.append(event)
         else:

@@ -4,6 +4,7 @@ Needs root for ``mmdebstrap``, as everything else of a release does. Unpacked ro
 ``LCF_EDGE_RELEASE_CACHE`` names, or ``~/.cache/lcf-edge/release``.
 """
 
+import argparse
 import hashlib
 import os
 import platform
@@ -47,40 +48,57 @@ MACHINES = {
     "aarch64": Machine("aarch64", "arm64", {"aarch64-linux-gnu-gcc": "gcc-aarch64-linux-gnu"}),
 }
 _TOOLS = {"mmdebstrap": "mmdebstrap", "arch-test": "arch-test"}
-_EMULATION = {"qemu-aarch64-static": "qemu-user-static", "update-binfmts": "binfmt-support"}
+EMULATION = {"qemu-aarch64-static": "qemu-user-static", "update-binfmts": "binfmt-support"}
 
 
-def get_tools(machines: Sequence[Machine]) -> None:
-    """Install what is missing. Raises ``ReleaseError`` where that cannot be done."""
+def chosen(program: str, about: str | None, made: str, arguments: Sequence[str] | None) -> list[Machine]:
+    """The machines that the command line of ``release.PROGRAM`` names, all if none. Raises ``ReleaseError``.
+
+    ``made``: what is made for each.
+    """
+    parser = argparse.ArgumentParser(prog=f"python -m release.{program}", description=about)
+    parser.add_argument("machines", nargs="*", metavar="MACHINE", help=f"of {', '.join(MACHINES)} (all)")
+    names = parser.parse_args(arguments).machines or list(MACHINES)
+    if unknown := [name for name in names if name not in MACHINES]:
+        raise ReleaseError(f"{unknown[0]}: no {made} is made for it; one of {', '.join(MACHINES)}")
+    return [MACHINES[name] for name in names]
+
+
+def get_tools(machines: Sequence[Machine], target: str = "wheels") -> None:
+    """Install what a target of the Makefile misses. Raises ``ReleaseError`` where that cannot be done."""
     tools = dict(_TOOLS)
     for machine in machines:
         tools |= machine.tools
     if not all(machine.is_this for machine in machines):
-        tools |= _EMULATION
+        tools |= EMULATION
     missing = sorted({package for tool, package in tools.items() if shutil.which(tool) is None})
     if os.geteuid() != 0:
         wants = f"and {' '.join(missing)} " if missing else ""
-        raise ReleaseError(f"wheels need root {wants}(sudo make wheels)")
+        raise ReleaseError(f"make {target} needs root {wants}(sudo make {target})")
     if missing:
         run("apt-get", "update", "--quiet")
         run("apt-get", "install", "--yes", "--quiet", "--no-install-recommends", *missing)
     for machine in machines:
         if not machine.is_this:
-            _let_run(machine)
+            let_run(machine)
 
 
-def _let_run(machine: Machine) -> None:
+def let_run(machine: Machine) -> None:
     """Let the kernel start programs of another processor."""
     if not Path("/proc/sys/fs/binfmt_misc/register").exists():
         run("mount", "-t", "binfmt_misc", "binfmt_misc", "/proc/sys/fs/binfmt_misc")
     run("update-binfmts", "--enable", f"qemu-{machine.name}")
 
 
+def cache() -> Path:
+    """Where unpacked roots are kept."""
+    return Path(os.environ.get("LCF_EDGE_RELEASE_CACHE") or Path.home() / ".cache/lcf-edge/release")
+
+
 def unpacked(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
     """A folder with these packages and all that they need, as ``suite`` has them."""
     named = hashlib.sha256(" ".join(packages).encode()).hexdigest()[:8]
-    cache = Path(os.environ.get("LCF_EDGE_RELEASE_CACHE") or Path.home() / ".cache/lcf-edge/release")
-    root = cache / f"{suite}-{machine.debian}-{named}"
+    root = cache() / f"{suite}-{machine.debian}-{named}"
     if not root.exists():
         unfinished = root.with_name("unfinished")
         shutil.rmtree(unfinished, ignore_errors=True)

@@ -14,14 +14,15 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from hil_mocks import scenes
+from lcf_edge.rendered import scenes
 from release.debian import Machine, ReleaseError, run, unpacked
+from release.foreign_pip import options_for
 
 SUITE, PYTHON = "trixie", "3.13"
 PACKAGES = ("python3", "libstdc++6", "libc-bin", "tzdata")
 SECONDS = 2.0  # of the drive
 _SHORT_S = 0.5  # uncompiled and emulated is slow
-MOST_EXTENSION_KB = 1500
+MAX_EXTENSION_KB = 1500
 _COMPILED = "import sys; from lcf_edge.compilation import extension; sys.exit(extension().reason or 0)"
 
 
@@ -36,8 +37,8 @@ class Trial:
     def run(self, machine: Machine, wheel: Path) -> str:
         """What was tried, in one line. Raises ``ReleaseError`` where the wheel does not do what the sources do."""
         size_kb = extension_kb(wheel)
-        if size_kb > MOST_EXTENSION_KB:
-            raise ReleaseError(f"{wheel.name}: the extension has {size_kb:.0f} kB, more than {MOST_EXTENSION_KB}")
+        if size_kb > MAX_EXTENSION_KB:
+            raise ReleaseError(f"{wheel.name}: the extension has {size_kb:.0f} kB, more than {MAX_EXTENSION_KB}")
         root = Path(self._place.name, machine.name)
         run("cp", "-a", str(unpacked(machine, SUITE, PACKAGES)), str(root))
         install(machine, wheel, root / "wheel")
@@ -71,9 +72,7 @@ def _short() -> scenes.Drive:
 
 def install(machine: Machine, wheel: Path, folder: Path) -> None:
     """As pip would there, from what fits that system."""
-    fits = ["manylinux2014", *(f"manylinux_2_{minor}" for minor in range(17, 42))]
-    options = [f"--platform={name}_{machine.name}" for name in fits]
-    options += ["--only-binary=:all:", "--implementation=cp", f"--python-version={PYTHON}", "--target", str(folder)]
+    options = [*options_for(machine.name, PYTHON), "--target", str(folder)]
     run(sys.executable, "-m", "pip", "install", "--quiet", *options, str(wheel))
 
 

@@ -5,7 +5,6 @@ The source package is made first and the wheels of it, so that both are whole. A
 name says the oldest C library that it runs with, as ``auditwheel`` reads it from the symbols.
 """
 
-import argparse
 import os
 import shutil
 import sys
@@ -15,7 +14,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from lcf_edge.errors import LcfError
-from release.debian import MACHINES, Machine, ReleaseError, get_tools, run, unpacked
+from release.debian import Machine, chosen, get_tools, run, unpacked
 from release.trial import Trial
 
 PROJECT = Path(__file__).parents[1]
@@ -25,13 +24,8 @@ HEADERS = ("libpython3-dev", "libc6-dev", "libgcc-12-dev")
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Build and try; return the exit status."""
-    parser = argparse.ArgumentParser(prog="python -m release.wheels", description=__doc__)
-    parser.add_argument("machines", nargs="*", metavar="MACHINE", help=f"of {', '.join(MACHINES)} (all)")
-    names = parser.parse_args(arguments).machines or list(MACHINES)
     try:
-        if unknown := [name for name in names if name not in MACHINES]:
-            raise ReleaseError(f"{unknown[0]}: no wheel is made for it; one of {', '.join(MACHINES)}")
-        machines = [MACHINES[name] for name in names]
+        machines = chosen("wheels", __doc__, "wheel", arguments)
         get_tools(machines)
         source = source_package(PROJECT / "dist")
         trial = Trial()

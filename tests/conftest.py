@@ -12,13 +12,15 @@ import numpy.typing as npt
 import pytest
 from hypothesis import settings
 
-from drivers.records import Frame, ImuSample, SpeedSample
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.compilation import extension
 from lcf_edge.lens import Lens
 
 # A shared machine may be slow at any moment; what failed once is printed, not kept in the tree.
 settings.register_profile("lcf-edge", deadline=None, database=None, print_blob=True, derandomize=True)
 settings.load_profile("lcf-edge")
+
+pytest_plugins = ("tests.lcf_edge.chromium",)
 
 Grey = npt.NDArray[np.uint8]
 Item = Frame | ImuSample | SpeedSample

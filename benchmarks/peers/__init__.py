@@ -1,9 +1,9 @@
 """Other ways to find what the filter finds, each tuned as if it were to win.
 
-Each peer is a class with ``process(image, motion)`` that answers with rebel circles. They differ in how they
+Each peer is a class with ``process(image, motion)`` that returns rebel circles. They differ in how they
 find out what moves where in the picture, and share all that follows:
 
-``peer``             what a peer is given and what it answers with
+``peer``             what a peer is given and what it returns
 ``ego``              how the camera turned and drove since each of the last pictures; where it is heading
 ``residual``         which points break the flow of what stands still, and which will be met
 ``clustering``       points that go together become circles with trust

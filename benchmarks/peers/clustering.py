@@ -8,15 +8,15 @@ import numpy.typing as npt
 from benchmarks.peers.ego import Ego, carry
 from benchmarks.peers.peer import Circles, Floats, Mask, Rows
 from benchmarks.peers.residual import Residual
-from lcf_edge.records import CIRCLE, Cause, Kind
+from lcf_edge.messages import CIRCLE, Cause, Kind
 
-_MOST_POINTS = 500  # that are linked; all pairs are compared
+_MAX_POINTS = 500  # that are linked; all pairs are compared
 _LOOMS_PER_S = 1.0  # parts of an object this far apart may differ so much in velocity
 _VELOCITY_NOISE_PXPS = 20.0
 _VELOCITY_SIGMA_PXPS = 5.0
-_RADIUS_LEAST_PX = 6.0
-_RADIUS_MOST_PX = 64.0
-_NEWBORN, _SHOWN_FROM, _SHOWN_TO, _MOST_TRUST = 2.5, 3.0, 2.0, 5.0
+_MIN_RADIUS_PX = 6.0
+_MAX_RADIUS_PX = 64.0
+_NEWBORN, _SHOWN_FROM, _SHOWN_TO, _MAX_TRUST = 2.5, 3.0, 2.0, 5.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -45,8 +45,8 @@ def cluster(points: Residual, *, least: int, link_px: float, share: float) -> Cl
     that break the flow with it.
     """
     flagged = np.flatnonzero(points.mover | points.threat)
-    if len(flagged) > _MOST_POINTS:
-        flagged = flagged[np.linspace(0, len(flagged) - 1, _MOST_POINTS).astype(np.intp)]
+    if len(flagged) > _MAX_POINTS:
+        flagged = flagged[np.linspace(0, len(flagged) - 1, _MAX_POINTS).astype(np.intp)]
     x, y, vx, vy = (column[flagged] for column in (points.x, points.y, points.vx, points.vy))
     label = _linked(x, y, vx, vy, points.threat[flagged], link_px)
     _, label, size = np.unique(label, return_inverse=True, return_counts=True)
@@ -61,7 +61,7 @@ def cluster(points: Residual, *, least: int, link_px: float, share: float) -> Cl
     down = points.down_then[flagged]
     lever = np.maximum(mean(down * down), 1)
     growth = mean(down * vy) / lever  # what drives on the ground moves along it, so its rise and fall tell Z'/Z
-    radius = np.clip(1.5 * np.sqrt(spread), _RADIUS_LEAST_PX, _RADIUS_MOST_PX).astype(np.float32)
+    radius = np.clip(1.5 * np.sqrt(spread), _MIN_RADIUS_PX, _MAX_RADIUS_PX).astype(np.float32)
     threat = mean(points.threat[flagged]) >= 0.5
     sigma = _VELOCITY_SIGMA_PXPS / np.sqrt(lever * count)
     grown_ttc = np.where(growth > 2 * sigma, 1 / np.maximum(growth, 1e-3), np.inf)
@@ -127,7 +127,7 @@ class TrustedCircles:
         return self._table[:0]
 
     def update(self, found: Clusters, ego: Ego) -> Circles:
-        """Account for one picture's clusters; answers with the circles that are shown."""
+        """Account for one picture's clusters. Return the circles that are shown."""
         table, dt = self._table, np.float32(ego.last.dt_s)
         h = ego.last_homography().astype(np.float32).ravel()
         table["x"], table["y"] = carry(h, table["x"], table["y"])
@@ -138,7 +138,7 @@ class TrustedCircles:
         left = np.arange(len(found))
         row, what = self._pairs(found)
         if len(row):
-            self._trust[row] = np.minimum(self._trust[row] + np.float32(1), np.float32(_MOST_TRUST))
+            self._trust[row] = np.minimum(self._trust[row] + np.float32(1), np.float32(_MAX_TRUST))
             self._fill(row, found, what)
             updated[row] = True
             left = np.setdiff1d(left, what)
@@ -153,6 +153,9 @@ class TrustedCircles:
         self._trust[missed] -= np.float32(1)
         outside = (table["x"] < 0) | (table["y"] < 0) | (table["x"] >= ego.lens.width) | (table["y"] >= ego.lens.height)
         self._alive &= (self._trust >= _SHOWN_TO) & ~outside
+        for name in ("x", "y"):
+            table[name][~self._alive] = 0  # an empty row that is moved on for minutes would overflow
+        self._velocity[~self._alive] = 0
         self._shown = (self._shown | (self._trust >= _SHOWN_FROM)) & self._alive
         table["trust"] = np.maximum(self._trust, _SHOWN_FROM)
         answer = table[self._shown]

@@ -54,7 +54,7 @@ class Ego:
         self.last = motion
         before = motion.rotation @ (self._forward / np.linalg.norm(self._forward))
         shaken = before / before[2]
-        shaken[0] -= motion.yaw_rate_radps * motion.dt_s  # a left turn moves the picture to the right
+        shaken[0] -= motion.path_yaw_rate_radps * motion.dt_s  # a left turn moves the picture to the right
         keep = [math.exp(-motion.dt_s / memory) for memory in (_YAW_MEMORY_S, _PITCH_MEMORY_S)]
         self._forward[:2] = self._mounted[:2] + keep * (shaken[:2] - self._mounted[:2])
         after = self._forward / np.linalg.norm(self._forward)
@@ -69,7 +69,7 @@ class Ego:
         return self.number == 0 or float(self.elapsed_s[(self.number - 1) % SLOTS]) >= SPACING_S
 
     def remember(self) -> int:
-        """Remember this picture; answers its slot."""
+        """Remember this picture. Return its slot."""
         slot = self.number % SLOTS
         self.rotation[slot], self.way_m[slot], self.elapsed_s[slot], self.sigma_rad[slot] = np.eye(3), 0, 0, 0
         self.number += 1

@@ -18,7 +18,7 @@ from lcf_edge.lens import Lens
 
 _SHRINK = 2
 _BACK = 8  # pictures
-_LEAST_DIFFERENCE = 16  # grey levels
+_MIN_DIFFERENCE = 16  # grey levels
 _SLACK = np.ones((3, 3), np.uint8)  # so far may ground and distance be misplaced
 _OPEN = np.ones((3, 3), np.uint8)
 _CLOSE = np.ones((21, 13), np.uint8)
@@ -60,7 +60,7 @@ class FrameDifference:
         before = np.asarray(cv2.convertScaleAbs(before, alpha=gain), np.uint8)
         over = cv2.subtract(small, cv2.dilate(before, _SLACK))
         under = cv2.subtract(cv2.erode(before, _SLACK), small)
-        mask = (covered & (cv2.max(over, under) > _LEAST_DIFFERENCE)).astype(np.uint8)
+        mask = (covered & (cv2.max(over, under) > _MIN_DIFFERENCE)).astype(np.uint8)
         mask = np.asarray(cv2.morphologyEx(mask, cv2.MORPH_OPEN, _OPEN), np.uint8)
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSE), np.uint8)
 

@@ -9,20 +9,20 @@ import numpy as np
 
 from benchmarks.peers.peer import Circles, Floats, Grey, Mask
 from lcf_edge.config import PAPER, Config
-from lcf_edge.corners import CornerDetector
+from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
-from lcf_edge.records import CIRCLE
+from lcf_edge.messages import CIRCLE
 
 _KNOWN_PX = 5  # a corner this near to a landmark is that landmark
-_MOST_CORNERS = 65535
+_MAX_CORNERS = 65535
 
 
 class LandmarkMap:
     """``landmarks``: how many there are."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
-        self._detector = CornerDetector(PAPER, lens, _MOST_CORNERS)
+        self._detector = CornerDetector(PAPER, lens, _MAX_CORNERS)
         self._forgotten = 0  # out of sight, or lost
         self._in_sight = np.empty((0, 2), np.float32)  # px
         self._before: Grey | None = None

@@ -9,7 +9,7 @@ from benchmarks.peers.ego import SLOTS, Ego, carry
 from benchmarks.peers.peer import Circles, Floats, Grey, Mask
 from benchmarks.peers.residual import Tracks, residual
 from lcf_edge.config import Config
-from lcf_edge.corners import CornerDetector
+from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
 
@@ -21,7 +21,7 @@ _CELL_PX = 8  # one track in each such square
 _BORDER_PX = 4
 _LOOKS_PX = 4  # half a patch
 _LOOKS_LIKE = 0.7  # least correlation of a track's patch with that of its oldest picture
-_LEAST_S = 0.12  # a younger track says nothing
+_MIN_DURATION_S = 0.12  # a younger track says nothing
 _NOISE_PX = 0.3
 _MOVER_PX = 2.5
 
@@ -85,7 +85,7 @@ class LucasKanade:
         ego = self._ego
         oldest = np.maximum(self._born, ego.number - SLOTS)
         slot = oldest % SLOTS
-        rows = np.flatnonzero((oldest < ego.number) & (ego.elapsed_s[slot] >= _LEAST_S))
+        rows = np.flatnonzero((oldest < ego.number) & (ego.elapsed_s[slot] >= _MIN_DURATION_S))
         now = ego.lens.undistort(self._points[rows])
         then = self._history[slot[rows], rows]
         x, y = ego.derotate(slot[rows], then[:, 0], then[:, 1])

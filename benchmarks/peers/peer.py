@@ -1,4 +1,4 @@
-"""What a peer is given, and what it answers with."""
+"""What a peer is given, and what it returns."""
 
 from typing import Protocol
 

@@ -22,7 +22,7 @@ _ASKEW = 0.25  # share of its way that a corner between two things drifts
 _CERTAIN = 1.0  # standard deviations that a threat's flow must exceed
 _BIAS_SIGMA_RADPS = 0.006
 _LEFT_SHARE, _LEFT_PX = 0.4, 1.0  # of the gyro's uncertainty, once the flow has told its bias
-_BIAS_LEAST = 40  # points that tell the gyro's bias
+_MIN_BIAS = 40  # points that tell the gyro's bias
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,7 +103,7 @@ def residual(tracks: Tracks, ego: Ego, config: Config, noise_px: float, mover_px
 
 def beside_path(right_m: Floats, ahead_m: Floats, ego: Ego) -> Floats:
     """Distance of points from the vehicle's path, right positive, m; the path is an arc."""
-    speed, yaw_rate = ego.speed_mps, ego.last.yaw_rate_radps
+    speed, yaw_rate = ego.speed_mps, ego.last.path_yaw_rate_radps
     if abs(yaw_rate) < 1e-3 * max(abs(speed), 0.05):
         return right_m
     radius = np.float32(speed / yaw_rate)  # its centre is to the left when positive
@@ -119,7 +119,7 @@ def _gyro_bias(
     Robust least squares over the drift, which the way does not touch; 0 where too few tracks tell it. (ax, ay):
     unit vector from the focus, (mx, my): motion, px. Answers the flow, px, and whether it is known.
     """
-    if len(tracks) < _BIAS_LEAST:
+    if len(tracks) < _MIN_BIAS:
         return np.zeros_like(mx), np.zeros_like(my), False
     lens, focal = ego.lens, np.float32(ego.focal_px)
     u, v = (tracks.x - np.float32(lens.cx)) / focal, (tracks.y - np.float32(lens.cy)) / focal

@@ -5,7 +5,7 @@ import errno
 from collections.abc import Iterator
 
 from drivers.camera.v4l2_errors import NEEDS_LIBCAMERA, driver_error
-from drivers.camera.v4l2_ioctl import CAP_VIDEO_CAPTURE_MPLANE, LINUX, Kernel, Node
+from drivers.camera.v4l2_ioctl import LINUX, Kernel, Node
 from drivers.errors import DeviceMissingError, WrongDeviceError
 
 
@@ -17,6 +17,20 @@ def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
     pictures, or only through libcamera, and for a name that two cameras have.
     """
     return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)
+
+
+def is_libcameras(device: str, kernel: Kernel = LINUX) -> bool:
+    """Whether ``device`` means a camera that only libcamera can run.
+
+    So is a node of a pipeline, and, where a sensor has such a node, a name that no V4L2 camera has.
+    """
+    is_path = device.startswith("/dev/")
+    cards, through_libcamera = [], False
+    for path in [device] if is_path else kernel.nodes():
+        with contextlib.suppress(OSError), contextlib.closing(Node(path, path, kernel)) as node:
+            through_libcamera |= node.needs_libcamera and (is_path or not node.is_signal_processor)
+            cards += [node.card.casefold()] * node.is_camera
+    return through_libcamera and not any(device.casefold() in card for card in cards)
 
 
 def cameras(kernel: Kernel = LINUX) -> Iterator[Node]:
@@ -39,10 +53,6 @@ def _by_path(path: str, kernel: Kernel) -> Node:
     node.close()
     if node.needs_libcamera:
         raise WrongDeviceError(f"{path}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
-    if node.caps & CAP_VIDEO_CAPTURE_MPLANE:
-        raise WrongDeviceError(
-            f"{path}: speaks only the multi-planar interface, which is not supported; {_found(kernel)}"
-        )
     raise WrongDeviceError(f"{path}: gives no pictures (metadata, output or radio); {_found(kernel)}")
 
 

@@ -1,11 +1,14 @@
-"""From the bytes of a buffer to grey, without a way through colours.
+"""From the bytes of a buffer to grey, without a way through colours where the format allows.
 
-GREY is grey already; NV12 begins with a plane of it (Y); YUYV and UYVY carry it in every second byte; MJPG is decoded
-to its Y component.
+GREY is grey already; NV12, YU12 and their like begin with a plane of it (Y); YUYV and UYVY carry it in every second
+byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw pictures of a sensor with
+colours (Bayer) and RGB are weighted sums of their colours (ITU-R BT.601).
 Source: Linux "Video for Linux API", Image Formats; ITU-T T.81 (JPEG), annex B, for the markers.
 """
 
 import re
+from collections.abc import Callable
+from dataclasses import dataclass
 
 import cv2
 import numpy as np
@@ -17,11 +20,102 @@ from drivers.errors import DriverError
 Grey = npt.NDArray[np.uint8]
 """(height, width) luminance."""
 
-PIXEL_FORMATS = ("GREY", "NV12", "YUYV", "UYVY", "MJPG")
-"""What can be read, the cheapest first."""
+REDUCTIONS = {
+    1: cv2.IMREAD_GRAYSCALE,
+    2: cv2.IMREAD_REDUCED_GRAYSCALE_2,
+    4: cv2.IMREAD_REDUCED_GRAYSCALE_4,
+    8: cv2.IMREAD_REDUCED_GRAYSCALE_8,
+}
+"""By how much a JPEG can be made smaller while it is decoded (cheaper than afterwards), and the decoder's flag."""
 
-_RAW = {"GREY": (1, 0), "NV12": (1, 0), "YUYV": (2, 0), "UYVY": (2, 1)}  # bytes a pixel of the rows with Y, offset of Y
 _MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # one that cannot be within entropy-coded data
+
+
+@dataclass(frozen=True, slots=True)
+class _Layout:
+    """``octets`` carry ``pixels`` of a row; ``grey`` makes luminance of its own memory from rows without padding."""
+
+    octets: int
+    pixels: int
+    grey: Callable[[Grey], Grey]
+
+    def row(self, width: int) -> int:
+        """Bytes of ``width`` pixels."""
+        return -(-width // self.pixels) * self.octets
+
+
+def _packed(octets: int, pixels: int) -> Callable[[Grey], Grey]:
+    """MIPI: the upper 8 bits of some pixels, then the lower ones of all of them."""
+
+    def grey(rows: Grey) -> Grey:
+        uppers = rows.reshape(len(rows), -1, octets)[:, :, :pixels].view(f"u{pixels}")  # each group as one number
+        return uppers[:, :, 0].copy().view(np.uint8)
+
+    return grey
+
+
+def _words(bits: int) -> Callable[[Grey], Grey]:
+    """16 bits a pixel, little-endian, the lower ``bits`` used."""
+    if bits == 8:
+        return lambda rows: rows.view("<u2").astype(np.uint8)  # the upper ones fall away
+    return lambda rows: (rows.view("<u2") >> (bits - 8)).astype(np.uint8)
+
+
+def _colours(code: int, channels: int) -> Callable[[Grey], Grey]:
+    return lambda rows: np.asarray(cv2.cvtColor(rows.reshape(len(rows), -1, channels), code), np.uint8)
+
+
+def _bayer(code: int, raw: Callable[[Grey], Grey]) -> Callable[[Grey], Grey]:
+    return lambda rows: np.asarray(cv2.cvtColor(raw(rows), code), np.uint8)
+
+
+def _as_it_is(rows: Grey) -> Grey:
+    return rows
+
+
+_Y = _Layout(1, 1, np.copy)
+_LAYOUTS = {
+    "GREY": _Y,
+    **dict.fromkeys(("NV12", "NV21", "NV16", "NV61", "YU12", "YV12", "422P"), _Y),
+    **dict.fromkeys(("NM12", "NM21", "NM16", "NM61", "YM12", "YM21"), _Y),  # a buffer of its own for each plane
+    "Y10P": _Layout(5, 4, _packed(5, 4)),
+    "Y12P": _Layout(3, 2, _packed(3, 2)),
+    "Y10": _Layout(2, 1, _words(10)),
+    "Y12": _Layout(2, 1, _words(12)),
+    "Y16": _Layout(2, 1, _words(16)),
+    **dict.fromkeys(("YUYV", "YVYU"), _Layout(2, 1, _words(8))),  # words at once: a seventh of the time of each byte
+    **dict.fromkeys(("UYVY", "VYUY"), _Layout(2, 1, _words(16))),
+    "XR24": _Layout(4, 1, _colours(cv2.COLOR_BGRA2GRAY, 4)),
+    "XB24": _Layout(4, 1, _colours(cv2.COLOR_RGBA2GRAY, 4)),
+    "BGR3": _Layout(3, 1, _colours(cv2.COLOR_BGR2GRAY, 3)),
+    "RGB3": _Layout(3, 1, _colours(cv2.COLOR_RGB2GRAY, 3)),
+}
+_BAYER = (  # OpenCV's code, and the formats of 8, 10 and 12 bits, 10 and 12 bits packed, 16 bits
+    (cv2.COLOR_BayerBGGR2GRAY, ("BA81", "BG10", "BG12", "pBAA", "pBCC", "BYR2")),
+    (cv2.COLOR_BayerGBRG2GRAY, ("GBRG", "GB10", "GB12", "pGAA", "pGCC", "GB16")),
+    (cv2.COLOR_BayerGRBG2GRAY, ("GRBG", "BA10", "BA12", "pgAA", "pgCC", "GR16")),
+    (cv2.COLOR_BayerRGGB2GRAY, ("RGGB", "RG10", "RG12", "pRAA", "pRCC", "RG16")),
+)
+_RAW = (
+    _Layout(1, 1, _as_it_is),
+    _LAYOUTS["Y10"],
+    _LAYOUTS["Y12"],
+    _LAYOUTS["Y10P"],
+    _LAYOUTS["Y12P"],
+    _LAYOUTS["Y16"],
+)
+_LAYOUTS |= {
+    name: _Layout(raw.octets, raw.pixels, _bayer(code, raw.grey))
+    for code, names in _BAYER
+    for name, raw in zip(names, _RAW, strict=True)
+}
+
+PIXEL_FORMATS = (
+    *(name for name in _LAYOUTS if not any(name in names for _, names in _BAYER)),
+    "MJPG",
+    *(name for _, names in _BAYER for name in names),
+)
+"""What can be read, by the four letters of V4L2: the cheapest first, raw pictures last, which nobody has exposed."""
 
 
 class FrameError(DriverError):
@@ -30,37 +124,39 @@ class FrameError(DriverError):
 
 def least_stride(pixel_format: str, width: int) -> int:
     """Bytes from one row to the next where the device does not tell; 0 for MJPG."""
-    return _RAW[pixel_format][0] * width if pixel_format in _RAW else 0
+    return _LAYOUTS[pixel_format].row(width) if pixel_format in _LAYOUTS else 0
 
 
-def luminance(pixel_format: str, data: memoryview, width: int, height: int, stride: int) -> Grey:
+def luminance(pixel_format: str, data: memoryview, width: int, height: int, stride: int, reduction: int = 1) -> Grey:
     """Grey of its own memory from ``data``, the filled part of a buffer; ``stride``: bytes from one row to the next.
 
+    ``reduction``: by how much larger the picture in a JPEG is, one of ``REDUCTIONS``.
     Raises ``FrameError``: "short", "corrupt", "wrong size".
     """
     if pixel_format == "MJPG":
-        return _decode(bytes(data), width, height)
+        return _decode(bytes(data), width, height, reduction)
     if len(data) < stride * height:
         raise FrameError("short")
+    layout = _LAYOUTS[pixel_format]
     rows = np.frombuffer(data, np.uint8, stride * height).reshape(height, stride)
-    bytes_a_pixel, offset = _RAW[pixel_format]
-    return rows[:, offset : bytes_a_pixel * width : bytes_a_pixel].copy()
+    grey = layout.grey(rows[:, : layout.row(width)])
+    return grey if grey.shape[1] == width else grey[:, :width].copy()
 
 
-def _decode(jpeg: bytes, width: int, height: int) -> Grey:
+def _decode(jpeg: bytes, width: int, height: int, reduction: int) -> Grey:
     """The size comes from the header first: a few bytes can decode to gigabytes."""
     if not jpeg:
         raise FrameError("short")
     header = jpeg_header(jpeg)
     if header is None or not header.one_pass:
         raise FrameError("corrupt")
-    if (header.width, header.height) != (width, height):
+    if (header.width, header.height) != (width * reduction, height * reduction):
         raise FrameError("wrong size")
     end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill up what is missing and call it a picture
     if end is None or end.group() != b"\xff\xd9":
         raise FrameError("corrupt")
     try:
-        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_GRAYSCALE | cv2.IMREAD_IGNORE_ORIENTATION)
+        image = cv2.imdecode(np.frombuffer(jpeg, np.uint8), REDUCTIONS[reduction] | cv2.IMREAD_IGNORE_ORIENTATION)
     except cv2.error as error:
         raise FrameError("corrupt") from error
     if image is None or image.shape != (height, width):

@@ -10,19 +10,18 @@ from drivers.camera.v4l2_ioctl import (
     ENUM_FMT,
     ENUM_FRAMEINTERVALS,
     ENUM_FRAMESIZES,
-    VIDEO_CAPTURE,
     Argument,
     FormatDescription,
     FrameInterval,
     FrameSize,
     Node,
     fourcc,
-    letters,
+    fourcc_text,
 )
 
 RATE_TOLERANCE = 0.01  # 29.97 is 30
-_LONGEST_LIST = 256  # a list that does not end is the device's mistake
-_TOLD_SIZES = 12
+_MAX_LIST = 256  # a list that does not end is the device's mistake
+_MAX_SIZES = 12
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,12 +65,12 @@ class RateOffer:
 
 def formats(node: Node) -> list[str]:
     """Pixel formats by their four letters. Raises ``OSError``."""
-    listed = _enumerate(node, ENUM_FMT, lambda index: FormatDescription(index=index, type=VIDEO_CAPTURE))
-    return [letters(description.pixelformat) for description in listed]
+    listed = _enumerate(node, ENUM_FMT, lambda index: FormatDescription(index=index, type=node.buffer_type))
+    return [fourcc_text(description.pixelformat) for description in listed]
 
 
 def sizes(node: Node, pixel_format: str) -> list[SizeOffer]:
-    """Sizes of a pixel format; empty: the device does not tell. Raises ``OSError``."""
+    """Sizes of a pixel format; empty: the device does not say. Raises ``OSError``."""
     listed = _enumerate(node, ENUM_FRAMESIZES, lambda index: FrameSize(index=index, pixelformat=fourcc(pixel_format)))
     offers = []
     for size in listed:
@@ -81,7 +80,7 @@ def sizes(node: Node, pixel_format: str) -> list[SizeOffer]:
 
 
 def rates(node: Node, pixel_format: str, width: int, height: int) -> list[RateOffer]:
-    """Rates at a size; empty: the device does not tell. Raises ``OSError``."""
+    """Rates at a size; empty: the device does not say. Raises ``OSError``."""
 
     def question(index: int) -> FrameInterval:
         return FrameInterval(index=index, pixelformat=fourcc(pixel_format), width=width, height=height)
@@ -97,12 +96,12 @@ def rates(node: Node, pixel_format: str, width: int, height: int) -> list[RateOf
 
 
 def grants(node: Node, pixel_format: str, width: int, height: int, fps: float) -> bool:
-    """Whether the device offers all that together, as far as it tells. Raises ``OSError``."""
-    told_sizes = sizes(node, pixel_format)
-    if told_sizes and not any(offer.grants(width, height) for offer in told_sizes):
+    """Whether the device offers all that together, as far as it says. Raises ``OSError``."""
+    offered_sizes = sizes(node, pixel_format)
+    if offered_sizes and not any(offer.grants(width, height) for offer in offered_sizes):
         return False
-    told_rates = rates(node, pixel_format, width, height)
-    return not told_rates or any(offer.grants(fps) for offer in told_rates)
+    offered_rates = rates(node, pixel_format, width, height)
+    return not offered_rates or any(offer.grants(fps) for offer in offered_rates)
 
 
 def describe(node: Node, pixel_formats: Sequence[str]) -> list[str]:
@@ -113,20 +112,20 @@ def describe(node: Node, pixel_formats: Sequence[str]) -> list[str]:
     lines: dict[str, list[str]] = {}
     for pixel_format in pixel_formats:
         lines.setdefault(_describe_sizes(node, pixel_format), []).append(pixel_format)
-    return [f"{', '.join(names)}: {told}" for told, names in lines.items()]
+    return [f"{', '.join(names)}: {described}" for described, names in lines.items()]
 
 
 def _describe_sizes(node: Node, pixel_format: str) -> str:
     offered = sizes(node, pixel_format)
-    told = []
-    for offer in offered[:_TOLD_SIZES]:
+    described = []
+    for offer in offered[:_MAX_SIZES]:
         per_second = ", ".join(map(str, rates(node, pixel_format, offer.width, offer.height)))
-        told.append(f"{offer} ({per_second}/s)" if per_second else str(offer))
-    return ", ".join(told + ["…"] * (len(offered) > _TOLD_SIZES)) or "any size"
+        described.append(f"{offer} ({per_second}/s)" if per_second else str(offer))
+    return ", ".join(described + ["…"] * (len(offered) > _MAX_SIZES)) or "any size"
 
 
 def _enumerate(node: Node, request: int, question: Callable[[int], Argument]) -> Iterator[Argument]:
-    """The answers for index 0, 1, … up to the end of the device's list."""
+    """What it answers for index 0, 1, … up to the end of the device's list."""
 
     def answers() -> Iterator[Argument]:
         index = 0
@@ -139,4 +138,4 @@ def _enumerate(node: Node, request: int, question: Callable[[int], Argument]) ->
                 raise
             index += 1
 
-    return islice(answers(), _LONGEST_LIST)
+    return islice(answers(), _MAX_LIST)

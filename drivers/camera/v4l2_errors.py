@@ -15,8 +15,8 @@ from drivers.errors import (
 )
 
 NEEDS_LIBCAMERA = (
-    "gives pictures only through libcamera, as ribbon-cable cameras do, which is not supported;"
-    " use a USB camera (docs/raspberry-pi.md)"
+    'gives pictures only through libcamera, as ribbon-cable cameras do; set camera.driver = "libcamera"'
+    " (docs/raspberry-pi.md)"
 )
 NOT_SET_UP = (errno.EINVAL, errno.EPIPE, errno.ENOLINK)  # of STREAMON: the pipeline does not fit, or leads nowhere
 NOT_IMPLEMENTED = (errno.EINVAL, errno.ENOTTY)  # what a driver answers to a request that it does not know
@@ -60,7 +60,7 @@ def started(name: str) -> Iterator[None]:
 
 
 @contextmanager
-def told(name: str) -> Iterator[None]:
+def as_driver_errors(name: str) -> Iterator[None]:
     """Turns ``OSError`` into ``DriverError``."""
     try:
         yield

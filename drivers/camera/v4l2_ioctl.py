@@ -1,7 +1,8 @@
 """The kernel's V4L2 interface as far as the driver needs it: structures, request numbers, system calls.
 
 Source: Linux UAPI ``include/uapi/linux/videodev2.h`` (names there: ``VIDIOC_QUERYCAP``, ``struct v4l2_buffer``, …).
-Single-planar capture with memory-mapped buffers. The layout is that of 64-bit Linux, the same on x86-64 and arm64.
+Single- and multi-planar capture with memory-mapped buffers. The layout is that of 64-bit Linux, the same on x86-64 and
+arm64.
 """
 
 import ctypes
@@ -12,10 +13,13 @@ import select
 from pathlib import Path
 from typing import Protocol, TypeVar
 
-u8, u32, i32, i64 = ctypes.c_uint8, ctypes.c_uint32, ctypes.c_int32, ctypes.c_int64
+u8, u16, u32, u64 = ctypes.c_uint8, ctypes.c_uint16, ctypes.c_uint32, ctypes.c_uint64
+i32, i64 = ctypes.c_int32, ctypes.c_int64
 
 VIDEO_CAPTURE = 1  # V4L2_BUF_TYPE_VIDEO_CAPTURE
+VIDEO_CAPTURE_MPLANE = 9  # V4L2_BUF_TYPE_VIDEO_CAPTURE_MPLANE
 MEMORY_MMAP = 1
+MAX_PLANES = 8  # VIDEO_MAX_PLANES
 
 CAP_VIDEO_CAPTURE = 0x0000_0001
 CAP_VIDEO_CAPTURE_MPLANE = 0x0000_1000
@@ -23,6 +27,8 @@ CAP_STREAMING = 0x0400_0000
 CAP_IO_MC = 0x2000_0000  # a part of a pipeline that somebody must set up through the media controller
 CAP_DEVICE_CAPS = 0x8000_0000  # the node's own capabilities are told apart from those of the whole device
 CAP_TIMEPERFRAME = 0x1000  # of StreamParm: the rate can be set
+
+_SIGNAL_PROCESSORS = frozenset({"bcm2835-isp", "pispbe"})  # of a Raspberry Pi 4 and 5
 
 FIELD_ANY, FIELD_NONE = 0, 1  # FIELD_NONE: progressive
 
@@ -87,6 +93,29 @@ class Format(ctypes.Structure):
         ("sizeimage", u32),
         ("colorspace", u32),
         ("rest", u8 * 172),
+    )
+
+
+class PlaneFormat(ctypes.Structure):
+    """``v4l2_plane_pix_format``."""
+
+    _fields_ = (("sizeimage", u32), ("bytesperline", u32), ("reserved", u16 * 6))
+
+
+class PlanesFormat(ctypes.Structure):
+    """``v4l2_format`` with its ``v4l2_pix_format_mplane``."""
+
+    _fields_ = (
+        ("type", u32),
+        ("padding", u32),
+        ("width", u32),
+        ("height", u32),
+        ("pixelformat", u32),
+        ("field", u32),
+        ("colorspace", u32),
+        ("planes", PlaneFormat * MAX_PLANES),
+        ("num_planes", u8),
+        ("rest", u8 * 19),
     )
 
 
@@ -169,6 +198,30 @@ class Buffer(ctypes.Structure):
     )
 
 
+class Plane(ctypes.Structure):
+    """``v4l2_plane``."""
+
+    _fields_ = (
+        ("bytesused", u32),
+        ("length", u32),
+        ("offset", u32),  # for mmap
+        ("padding_of_union", u32),
+        ("data_offset", u32),  # bytes before the picture
+        ("reserved", u32 * 11),
+    )
+
+
+class PlanesBuffer(ctypes.Structure):
+    """``v4l2_buffer`` of a multi-planar device."""
+
+    _fields_ = (
+        *Buffer._fields_[:11],
+        ("planes", u64),  # address of an array of ``Plane``
+        ("length", u32),  # of that array
+        *Buffer._fields_[14:],
+    )
+
+
 class BufferType(ctypes.Structure):
     """The ``int`` of ``VIDIOC_STREAMON`` and ``VIDIOC_STREAMOFF``."""
 
@@ -229,13 +282,13 @@ ENUM_FRAMEINTERVALS = _request(_READ | _WRITE, 75, FrameInterval)
 
 
 def fourcc(text: str) -> int:
-    """The number of a pixel format's four letters."""
-    return int.from_bytes(text.encode("ascii"), "little")
+    """The number of a pixel format's four letters; blanks at the end may be left out."""
+    return int.from_bytes(text.ljust(4).encode("ascii"), "little")
 
 
-def letters(number: int) -> str:
-    """The four letters of a pixel format's number; what cannot be printed becomes a question mark."""
-    return "".join(chr(byte) if 32 <= byte < 127 else "?" for byte in number.to_bytes(4, "little"))
+def fourcc_text(number: int) -> str:
+    """The four letters of a pixel format's number without blanks at the end; a question mark: cannot be printed."""
+    return "".join(chr(byte) if 32 <= byte < 127 else "?" for byte in number.to_bytes(4, "little")).rstrip()
 
 
 def text(field: ctypes.Array[ctypes.c_uint8]) -> str:
@@ -267,7 +320,7 @@ class Kernel(Protocol):
         ...
 
     def poll(self, fd: int, timeout_s: float) -> int:
-        """Wait for a filled buffer; answers with the poll(2) events, 0 after the timeout."""
+        """Wait for a filled buffer; return the poll(2) events, 0 after the timeout."""
         ...
 
     def close(self, fd: int) -> None:
@@ -301,7 +354,7 @@ class LinuxKernel:
         return mmap.mmap(fd, length, mmap.MAP_SHARED, mmap.PROT_READ, offset=offset)
 
     def poll(self, fd: int, timeout_s: float) -> int:
-        """Wait for a filled buffer; answers with the poll(2) events, 0 after the timeout."""
+        """Wait for a filled buffer; return the poll(2) events, 0 after the timeout."""
         poller = select.poll()
         poller.register(fd, select.POLLIN)
         return sum(events for _, events in poller.poll(timeout_s * 1e3))
@@ -328,13 +381,14 @@ class Node:
             self.close()
             raise
         self.card = text(capability.card)
+        self._driver = text(capability.driver)
         told_apart = capability.capabilities & CAP_DEVICE_CAPS
         self.caps = int(capability.device_caps if told_apart else capability.capabilities)
 
     @property
     def is_camera(self) -> bool:
         """Whether it delivers pictures by itself; nodes of metadata, sound and radio do not."""
-        return self.caps & CAP_VIDEO_CAPTURE != 0 and self.caps & CAP_STREAMING != 0 and not self.needs_libcamera
+        return self._captures and self.caps & CAP_STREAMING != 0 and not self.needs_libcamera
 
     @property
     def needs_libcamera(self) -> bool:
@@ -342,18 +396,32 @@ class Node:
 
         So are cameras at the ribbon cable: the node takes sizes and formats, and then does not start.
         """
-        return self.caps & CAP_IO_MC != 0 and self.caps & (CAP_VIDEO_CAPTURE | CAP_VIDEO_CAPTURE_MPLANE) != 0
+        return self._captures and (self.caps & CAP_IO_MC != 0 or self.is_signal_processor)
+
+    @property
+    def is_signal_processor(self) -> bool:
+        """Whether it works on the pictures of others; it need not tell so, and is there without a camera as well."""
+        return self._driver in _SIGNAL_PROCESSORS
+
+    @property
+    def buffer_type(self) -> int:
+        """``VIDEO_CAPTURE``, or ``VIDEO_CAPTURE_MPLANE`` where the device knows only that."""
+        return VIDEO_CAPTURE if self.caps & CAP_VIDEO_CAPTURE else VIDEO_CAPTURE_MPLANE
+
+    @property
+    def _captures(self) -> bool:
+        return self.caps & (CAP_VIDEO_CAPTURE | CAP_VIDEO_CAPTURE_MPLANE) != 0
 
     def ask(self, request: int, argument: Argument) -> Argument:
         """The argument as the kernel left it. Raises ``OSError``."""
         return self._kernel.ioctl(self._fd, request, argument)
 
-    def map(self, buffer: Buffer) -> mmap.mmap:
+    def map(self, length: int, offset: int) -> mmap.mmap:
         """The memory of a buffer. Raises ``OSError``."""
-        return self._kernel.map(self._fd, buffer.length, buffer.offset)
+        return self._kernel.map(self._fd, length, offset)
 
     def poll(self, timeout_s: float) -> int:
-        """Wait for a filled buffer; answers with the poll(2) events, 0 after the timeout. Raises ``OSError``."""
+        """Wait for a filled buffer; return the poll(2) events, 0 after the timeout. Raises ``OSError``."""
         return self._kernel.poll(self._fd, timeout_s)
 
     def close(self) -> None:

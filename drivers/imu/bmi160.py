@@ -49,7 +49,7 @@ class Bmi160(FifoImu):
     """BMI160; see ``I2cImu``."""
 
     chip = "BMI160"
-    usual_address = 0x68
+    addresses = (0x68, 0x69)
     identity_register = CHIP_ID
     identities = IDENTITIES
     gyro_ranges = GYRO_RANGES

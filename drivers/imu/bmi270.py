@@ -7,7 +7,6 @@ bmi2_defs.h). The gyro's x leans towards z by a factor that each chip knows (GYR
 
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from pathlib import Path
 
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import DeviceLostError, DriverError
@@ -21,9 +20,9 @@ from drivers.imu.bmi160 import (
     Bmi160,
 )
 from drivers.imu.i2c_bus import BLOCK_BYTES, I2cBus
-from drivers.imu.i2c_chips import FIRMWARE, run_by_hand
+from drivers.imu.i2c_chips import run_by_hand
 from drivers.imu.i2c_imu import Counts, Range, Thermometer
-from drivers.imu.settings import USUAL, ImuSettings
+from drivers.imu.settings import DEFAULT_SETTINGS, ImuSettings
 
 INTERNAL_STATUS = 0x21  # 3:0 message
 TEMPERATURE = 0x22
@@ -68,7 +67,7 @@ class FirmwareError(DriverError):
 
 
 class Bmi270(Bmi160):
-    """BMI270; see ``I2cImu``. ``firmware``: the vendor's file. Raises ``FirmwareError``.
+    """BMI270; see ``I2cImu``. Takes the vendor's file from ``ImuSettings.firmware``. Raises ``FirmwareError``.
 
     ``counts["no_data"]``: frames in which a sensor had none.
     """
@@ -81,14 +80,9 @@ class Bmi270(Bmi160):
     fifo_bytes = 2048
 
     def __init__(
-        self,
-        bus: I2cBus,
-        address: int = 0,
-        settings: ImuSettings = USUAL,
-        clock: Clock = SYSTEM_CLOCK,
-        firmware: Path = FIRMWARE,
+        self, bus: I2cBus, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
     ) -> None:
-        self._firmware = firmware
+        self._firmware = settings.firmware
         super().__init__(bus, address, settings, clock)
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
@@ -128,7 +122,7 @@ class Bmi270(Bmi160):
         self._lean = (factor - 0x80 if factor & 0x40 else factor) / 512
 
     def _read_firmware(self) -> bytes:
-        remedy = f"put Bosch's {FIRMWARE.name} there (docs/imus.md tells how to make it) or set imu.firmware"
+        remedy = f"put Bosch's {DEFAULT_SETTINGS.firmware.name} there (see docs/imus.md) or set imu.firmware"
         try:
             with self._firmware.open("rb") as file:
                 data = file.read(FIRMWARE_BYTES + 1)

@@ -21,7 +21,7 @@ from drivers.errors import DeviceLostError
 from drivers.imu.i2c_bus import TransferError
 from drivers.imu.i2c_chips import run_by_hand
 from drivers.imu.i2c_imu import Counts, I2cImu, Range, Thermometer
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 
 CHIP_ID = 0x00
 PAGE_ID = 0x07
@@ -42,7 +42,7 @@ IMU_MODE = 0x08
 CHIP_AXES = 0x24  # AXIS_MAP_CONFIG: x, y, z as they are
 SYSTEM_ERROR = 1  # SYS_STATUS
 BOOT_S = 0.65  # from a reset until it is in CONFIG
-LONGEST_BOOT_S = 1.0
+MAX_BOOT_S = 1.0
 BOOT_LOOK_S = 0.05
 TO_CONFIG_S = 0.02  # 19 ms from any mode
 SWITCH_S = 0.03  # to a mode with fusion
@@ -57,7 +57,7 @@ JUMP = 100  # counts from one sample to the next, 6 °/s or 1 m/s²; the flips a
 PERIOD_NS = round(1e9 / RATE_HZ)
 CLOSELY_S = 0.125 / RATE_HZ  # between looks for the first sample after a gap
 POLL_S = 0.618 / RATE_HZ  # sees every sample, at ever other moments after it was made
-LONGEST_REPEAT_NS = 30_000_000  # at perfect rest a value that stays is a sample too
+MAX_REPEAT_NS = 30_000_000  # at perfect rest a value that stays is a sample too
 
 IDENTITIES = {0xA0: "BNO055"}
 GYRO_RANGES = dict.fromkeys((250, 500, 1000, 2000), GYRO_RANGE)
@@ -68,7 +68,7 @@ class Bno055(I2cImu):
     """BNO055; see ``I2cImu``. ``counts["implausible"]``: reads that were refused."""
 
     chip = "BNO055"
-    usual_address = 0x28
+    addresses = (0x28, 0x29)
     identity_register = CHIP_ID
     identities = IDENTITIES
     gyro_ranges = GYRO_RANGES
@@ -98,7 +98,7 @@ class Bno055(I2cImu):
         """Reset the chip and wait until it says who it is. Raises ``DeviceLostError``."""
         with suppress(TransferError):  # it is gone before it would acknowledge
             self._bus.write(self.address, SYS_TRIGGER, bytes([RESET]), tries=1)
-        end_ns = self._clock.monotonic_ns() + round(LONGEST_BOOT_S * 1e9)
+        end_ns = self._clock.monotonic_ns() + round(MAX_BOOT_S * 1e9)
         self._clock.sleep_s(BOOT_S)
         while self._clock.monotonic_ns() < end_ns:
             with suppress(TransferError):
@@ -134,7 +134,7 @@ class Bno055(I2cImu):
             self._believed, self._changed_ns = counts, now_ns
             return []
         if counts == self._believed:
-            if now_ns - self._changed_ns < LONGEST_REPEAT_NS:
+            if now_ns - self._changed_ns < MAX_REPEAT_NS:
                 return []
             self._unsure = True
         made = round((now_ns - self._newest_ns) / 1e9 * self._sample_clock.rate_hz) if self._unsure else 1

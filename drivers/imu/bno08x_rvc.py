@@ -22,14 +22,14 @@ from typing import NamedTuple
 
 from drivers.imu.serial_frames import Framer, Reading, Vector
 from drivers.imu.serial_imu import SerialProtocol, run_by_hand
-from drivers.records import STANDARD_GRAVITY_MPS2
+from drivers.samples import STANDARD_GRAVITY_MPS2
 
 HEADER = b"\xaa\xaa"
 FRAME_BYTES = 19
 RATE_HZ = 100.0
 RAD_PER_UNIT = math.radians(0.01)
 MPS2_PER_UNIT = STANDARD_GRAVITY_MPS2 / 1000
-LONGEST_SPAN = 10  # frames; a turn over more says little about the rate
+MAX_SPAN = 10  # frames; a turn over more says little about the rate
 GYRO_RANGE_RADPS = math.radians(2000)
 ACCEL_RANGE_UNITS = 7900  # ±8 g, less the offset that the chip takes off
 
@@ -74,7 +74,7 @@ class RvcParser:
         if span > 1:
             self.counts["lost"] += span - 1
             self._lost += span - 1
-        if span > LONGEST_SPAN:
+        if span > MAX_SPAN:
             self._lost += 1
             return None
         gyro = _scaled(_turn(before.turn, frame.turn), RATE_HZ / span)

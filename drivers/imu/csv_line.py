@@ -16,10 +16,10 @@ from operator import xor
 from drivers.imu.serial_frames import Reading
 from drivers.imu.serial_imu import SerialProtocol, run_by_hand
 
-LONGEST_LINE_BYTES = 200
+MAX_LINE_BYTES = 200
 TICK_HZ = 1e6
-LARGEST_GYRO_RADPS = 70.0  # 4000 °/s; more is no IMU's
-LARGEST_ACCEL_MPS2 = 320.0  # 32 g
+MAX_GYRO_RADPS = 70.0  # 4000 °/s; more is no IMU's
+MAX_ACCEL_MPS2 = 320.0  # 32 g
 NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d{1,3})?"
 LINE = re.compile(
     rf"(?:(?P<time>\d{{1,20}}),)?(?P<values>{NUMBER}(?:,{NUMBER}){{5}})(?(time)(?:,(?P<clipped>[01]))?)", re.ASCII
@@ -46,7 +46,7 @@ class CsvParser:
         """See ``Parser``."""
         *lines, rest = (self._rest + data).split(b"\n")
         readings = [reading for line in lines if (reading := self._line(line))]
-        if len(rest) > LONGEST_LINE_BYTES and not self._passing_over:
+        if len(rest) > MAX_LINE_BYTES and not self._passing_over:
             self._refuse()
             self._passing_over = True
         self._rest = b"" if self._passing_over else rest
@@ -56,9 +56,9 @@ class CsvParser:
         if self._passing_over:
             self._passing_over = False
             return None
-        if len(line) <= LONGEST_LINE_BYTES and (not line.strip() or line.lstrip().startswith(b"#")):
+        if len(line) <= MAX_LINE_BYTES and (not line.strip() or line.lstrip().startswith(b"#")):
             return None
-        reading = self._parsed(line.strip()) if len(line) <= LONGEST_LINE_BYTES else None
+        reading = self._parsed(line.strip()) if len(line) <= MAX_LINE_BYTES else None
         if reading is None:
             self._refuse()
         return reading
@@ -89,7 +89,7 @@ class CsvParser:
 
 
 def _is_plausible(gyro: tuple[float, ...], accel: tuple[float, ...]) -> bool:
-    return max(map(math.fabs, gyro)) <= LARGEST_GYRO_RADPS and max(map(math.fabs, accel)) <= LARGEST_ACCEL_MPS2
+    return max(map(math.fabs, gyro)) <= MAX_GYRO_RADPS and max(map(math.fabs, accel)) <= MAX_ACCEL_MPS2
 
 
 PROTOCOL = SerialProtocol(

@@ -10,7 +10,7 @@ from typing import ClassVar
 
 from drivers.imu.i2c_bus import BLOCK_BYTES, TransferError
 from drivers.imu.i2c_imu import Counts, I2cImu
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 
 BATCH_S = 0.015  # between reads, or one sample where that is longer
 START_UP_S = 0.1  # gyros need up to 80 ms

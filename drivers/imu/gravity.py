@@ -3,7 +3,7 @@
 import math
 from collections.abc import Iterable, Sequence
 
-from drivers.records import STANDARD_GRAVITY_MPS2, ImuSample
+from drivers.samples import STANDARD_GRAVITY_MPS2, ImuSample
 
 WINDOW_S = 0.5
 STILL_RADPS = 0.05  # from the least to the largest rate of an axis; the gyro's bias does not matter

@@ -1,6 +1,7 @@
 """An I2C bus of Linux (``/dev/i2c-N``): register transfers that are tried again, counted, and end in typed errors.
 
-Only byte and block transfers of SMBus are used, so that every adapter and ``i2c-stub`` will do. What the kernel
+Registers are reached by byte and block transfers of SMBus, so that every adapter and ``i2c-stub`` will do; a chip
+without registers is sent plain bytes. What the kernel
 answers: ENXIO, EREMOTEIO and often EIO mean that nobody acknowledged, EAGAIN a lost arbitration, ETIMEDOUT a line held
 low or a clock stretched too long (Linux, ``Documentation/i2c/fault-codes.rst``).
 """
@@ -60,6 +61,10 @@ class Smbus(Protocol):
         """1 to 32 bytes from a register on."""
         ...
 
+    def i2c_rdwr(self, *messages: smbus2.i2c_msg) -> None:
+        """Bytes without a register, 1 to 8192 a message; those read are in it then."""
+        ...
+
     def close(self) -> None:
         """Let the bus go."""
         ...
@@ -101,6 +106,17 @@ class I2cBus:
             self._try(address, tries, lambda: self._smbus.write_byte_data(address, register, data[0]))
         else:
             self._try(address, tries, lambda: self._smbus.write_i2c_block_data(address, register, list(data)))
+
+    def receive(self, address: int, length: int, tries: int = TRIES) -> bytes:
+        """``length`` bytes (1 to 8192) of a chip that has no registers. Raises ``TransferError``."""
+        message = smbus2.i2c_msg.read(address, length)
+        self._try(address, tries, lambda: self._smbus.i2c_rdwr(message))
+        return bytes(message)
+
+    def send(self, address: int, data: bytes, tries: int = TRIES) -> None:
+        """Write bytes (1 to 8192) to a chip that has no registers. Raises ``TransferError``."""
+        message = smbus2.i2c_msg.write(address, data)
+        self._try(address, tries, lambda: self._smbus.i2c_rdwr(message))
 
     def scan(self, addresses: Iterable[int] = ADDRESSES) -> list[int]:
         """Addresses at which somebody acknowledges, or that a kernel driver owns; ends early when the bus hangs."""

@@ -1,80 +1,93 @@
 """Opening an I2C chip by the name that the configuration gives it."""
 
 import argparse
-from collections.abc import Callable, Sequence
-from importlib import import_module
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import ClassVar, Protocol
 
 from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import UnsupportedSettingError
+from drivers.imu import registry
 from drivers.imu.i2c_bus import I2cBus
-from drivers.imu.i2c_imu import I2cImu
-from drivers.imu.settings import USUAL, ImuSettings
-from drivers.records import ImuSample
+from drivers.imu.i2c_imu import Range
+from drivers.imu.settings import DEFAULT_SETTINGS, ImuSettings
+from drivers.samples import ImuSample
 
-CHIPS = {
-    "mpu6050": "Mpu6050",
-    "mpu6500": "Mpu6500",
-    "mpu9250": "Mpu9250",
-    "icm20948": "Icm20948",
-    "lsm6ds3": "Lsm6ds3",
-    "lsm6dso": "Lsm6dso",
-    "lsm6dso32": "Lsm6dso32",
-    "bmi160": "Bmi160",
-    "bmi270": "Bmi270",
-    "bno055": "Bno055",
-}
-"""Module → class."""
 
-FIRMWARE = Path("/lib/firmware/bmi270-init-data.fw")
+class I2cChip(Protocol):
+    """An open chip, and what its class tells without one."""
+
+    chip: ClassVar[str]
+    addresses: ClassVar[tuple[int, ...]]  # the usual one first
+    gyro_ranges: ClassVar[Mapping[int, Range]]  # by °/s
+    accel_ranges: ClassVar[Mapping[int, Range]]  # by g
+    name: str
+    counts: Counter[str]
+
+    def __init__(
+        self, bus: I2cBus, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
+    ) -> None: ...
+
+    @classmethod
+    def recognised(cls, bus: I2cBus, address: int) -> str | None:
+        """The model that is there, None: no such chip. Writes nothing."""
+        ...
+
+    @property
+    def rate_hz(self) -> float:
+        """What was granted."""
+        ...
+
+    def read(self) -> Sequence[ImuSample]:
+        """See ``Device``."""
+        ...
+
+    def close(self) -> None:
+        """See ``Device``."""
+        ...
 
 
 def open_chip(
-    driver: str,
-    bus: int,
-    address: int = 0,
-    settings: ImuSettings = USUAL,
-    firmware: Path = FIRMWARE,
-    clock: Clock = SYSTEM_CLOCK,
+    driver: str, bus: int, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
 ) -> Device[ImuSample]:
-    """The chip at an address (0: its usual one) of ``/dev/i2c-<bus>``; ``firmware`` is for a BMI270.
+    """The chip at an address (0: its usual one) of ``/dev/i2c-<bus>``.
 
     Raises ``DriverError``, as ``I2cBus`` and ``I2cImu`` do.
     """
-    return chip_on(I2cBus(bus, clock=clock), driver, address, settings, firmware, clock)
+    return chip_on(I2cBus(bus, clock=clock), driver, address, settings, clock)
 
 
 def chip_on(
-    bus: I2cBus,
-    driver: str,
-    address: int = 0,
-    settings: ImuSettings = USUAL,
-    firmware: Path = FIRMWARE,
-    clock: Clock = SYSTEM_CLOCK,
-) -> I2cImu:
+    bus: I2cBus, driver: str, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
+) -> I2cChip:
     """The same on a bus that is open already; the chip owns it from now on."""
-    if driver not in CHIPS:
+    if not registry.has_interface(driver, "i2c"):
         bus.close()
-        raise UnsupportedSettingError(f"{driver}: no such chip; set imu.driver to one of {', '.join(CHIPS)}")
-    chip: Callable[..., I2cImu] = getattr(import_module(f"drivers.imu.{driver}"), CHIPS[driver])
-    options = {"firmware": firmware} if driver == "bmi270" else {}
-    return chip(bus, address, settings, clock, **options)
+        known = ", ".join(registry.names("i2c"))
+        raise UnsupportedSettingError(f"{driver}: no such chip; set imu.driver to one of {known}")
+    chip: type[I2cChip] = registry.DRIVERS[driver].load()
+    return chip(bus, address, settings, clock)
 
 
 def run_by_hand(driver: str, argv: Sequence[str] | None) -> int:
     """The command line of one chip's driver."""
     parser = argparse.ArgumentParser(prog=f"python -m drivers.imu.{driver}")
     parser.add_argument("--bus", type=int, default=1, help="N of /dev/i2c-N (%(default)s)")
-    parser.add_argument("--address", type=lambda text: int(text, 0), default=0, help="0: the chip's usual one")
-    parser.add_argument("--rate", type=float, default=USUAL.rate_hz, help="Hz (%(default)s)")
-    parser.add_argument("--gyro-range", type=int, default=USUAL.gyro_range_dps, help="°/s (%(default)s)")
-    parser.add_argument("--accel-range", type=int, default=USUAL.accel_range_g, help="g (%(default)s)")
-    parser.add_argument("--firmware", type=Path, default=FIRMWARE, help="of a BMI270 (%(default)s)")
+    parser.add_argument("--address", type=_number, default=0, help="0: the chip's usual one")
+    parser.add_argument("--rate", type=float, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
+    parser.add_argument("--gyro-range", type=int, default=DEFAULT_SETTINGS.gyro_range_dps, help="°/s (%(default)s)")
+    parser.add_argument("--accel-range", type=int, default=DEFAULT_SETTINGS.accel_range_g, help="g (%(default)s)")
+    parser.add_argument("--identity", type=_number, help="of a copy, taken for the chip all the same")
+    parser.add_argument("--firmware", type=Path, default=DEFAULT_SETTINGS.firmware, help="of a BMI270 (%(default)s)")
     parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
     asked = parser.parse_args(argv)
-    settings = ImuSettings(asked.rate, asked.gyro_range, asked.accel_range)
-    return watch(
-        lambda: open_chip(driver, asked.bus, asked.address, settings, asked.firmware), asked.seconds, describe_imu
-    )
+    settings = ImuSettings(asked.rate, asked.gyro_range, asked.accel_range, asked.identity, asked.firmware)
+    return watch(lambda: open_chip(driver, asked.bus, asked.address, settings), asked.seconds, describe_imu)
+
+
+def _number(text: str) -> int:
+    """Decimal, or hexadecimal with 0x."""
+    return int(text, 0)

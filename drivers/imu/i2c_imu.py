@@ -18,12 +18,13 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
+from drivers.imu import registry
 from drivers.imu.i2c_bus import NO_ANSWER, TRIES, I2cBus, TransferError
-from drivers.imu.settings import USUAL, ImuSettings
-from drivers.records import STANDARD_GRAVITY_MPS2, ImuSample
+from drivers.imu.settings import DEFAULT_SETTINGS, ImuSettings
 from drivers.sample_clock import SampleClock
+from drivers.samples import STANDARD_GRAVITY_MPS2, ImuSample
 
-LARGEST_COUNT = 32767
+MAX_COUNT = 32767
 
 CHECK_S = 0.5  # between looks at the settings and the temperature
 PATIENCE = 8  # samples that may stay away before a look at the settings
@@ -42,7 +43,7 @@ class Range:
 
     def end_of(self, full_scale: int) -> int:
         """The count from which on an axis is saturated."""
-        return self.end or min(int(full_scale * self.lsb), LARGEST_COUNT)
+        return self.end or min(int(full_scale * self.lsb), MAX_COUNT)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,24 +86,23 @@ class Scale:
 class I2cImu(ABC):
     """An open IMU on an I2C bus. ``temperature_c``: of the die, NaN while unknown. ``rate_hz``: what was granted.
 
-    Owns the bus. ``address`` 0 is the chip's usual one. Raises ``DeviceMissingError`` when nobody answers there,
+    Owns the bus. ``address`` 0 is the chip's usual one. Raises ``DeviceMissingError`` when no device answers there,
     ``WrongDeviceError`` when another chip does, ``UnsupportedSettingError`` for a range that it does not have or a
     setting that it does not keep, ``DeviceLostError`` when the bus fails.
     """
 
     chip: ClassVar[str]
-    usual_address: ClassVar[int]
+    addresses: ClassVar[tuple[int, ...]]  # the usual one first
     identity_register: ClassVar[int]
     identities: ClassVar[Mapping[int, str]]  # value → model
-    relatives: ClassVar[Mapping[int, str]] = {}  # value → driver, of chips at the same address and register
     gyro_ranges: ClassVar[Mapping[int, Range]]  # by °/s
     accel_ranges: ClassVar[Mapping[int, Range]]  # by g
     thermometer: Thermometer
 
     def __init__(
-        self, bus: I2cBus, address: int = 0, settings: ImuSettings = USUAL, clock: Clock = SYSTEM_CLOCK
+        self, bus: I2cBus, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
     ) -> None:
-        self.address = address or self.usual_address
+        self.address = address or self.addresses[0]
         self.name = f"{self.chip} at 0x{self.address:02x} on {bus.path}"
         self.counts = bus.counts
         self.temperature_c = math.nan
@@ -117,11 +117,16 @@ class I2cImu(ABC):
             self._scale = Scale(gyro, settings.gyro_range_dps, accel, settings.accel_range_g)
             self._settings = self._registers(gyro.code, accel.code)
             self._sample_clock = SampleClock(self.rate_hz)
-            self.model = self._identify()
+            self.model = self._identify(settings.identity)
             self._start()
         except DriverError:
             self.close()
             raise
+
+    @classmethod
+    def recognised(cls, bus: I2cBus, address: int) -> str | None:
+        """The model that is there, told by its identity alone; None: no such chip. Writes nothing."""
+        return cls.identities.get(bus.read(address, cls.identity_register, 1, tries=2)[0])
 
     def read(self) -> Sequence[ImuSample]:
         """Samples since the last call, after waiting for some; none when they were lost and counted.
@@ -180,7 +185,8 @@ class I2cImu(ABC):
     def _write(self, register: int, *values: int) -> None:
         self._bus.write(self.address, register, bytes(values))
 
-    def _identify(self) -> str:
+    def _identify(self, copy: int | None) -> str:
+        """The model that the chip says it is. ``copy``: what else may be said, by a copy of the chip."""
         try:
             found = self._read(self.identity_register, 1)[0]
         except TransferError as error:
@@ -190,19 +196,34 @@ class I2cImu(ABC):
             if self.address in there:
                 raise
             others = ", ".join(f"0x{address:02x}" for address in there)
-            remedy = f"there is {others}; set imu.address" if there else "nobody answers on this bus; check wiring"
+            remedy = f"there is {others}; set imu.address" if there else "no device answers on this bus; check wiring"
             raise DeviceMissingError(
                 f"{self._bus.path}: no such chip at 0x{self.address:02x} ({self.chip}); {remedy}"
             ) from error
+        if found == copy and found not in self.identities:
+            return f"{self.chip} (a copy)"
         if found not in self.identities:
             known = ", ".join(f"0x{value:02x}" for value in self.identities)
-            driver = self.relatives.get(found)
-            remedy = f"set imu.driver to {driver}" if driver else "set imu.driver or imu.address"
+            driver = self._driver_of(found)
+            remedy = (
+                f"set imu.driver to {driver}"
+                if driver
+                else f"set imu.driver or imu.address, or imu.identity to 0x{found:02x} if it is a copy"
+            )
             raise WrongDeviceError(
                 f"{self._bus.path}: the chip at 0x{self.address:02x} says 0x{found:02x}, a {self.chip} says {known};"
                 f" {remedy}"
             )
         return self.identities[found]
+
+    def _driver_of(self, identity: int) -> str | None:
+        """The driver of the chip that says this of itself at the same address and register."""
+        for driver, kind in registry.chips().items():
+            if not issubclass(kind, I2cImu) or self.address not in kind.addresses:
+                continue
+            if kind.identity_register == self.identity_register and identity in kind.identities:
+                return driver
+        return None
 
     def _start(self) -> None:
         self._reset()

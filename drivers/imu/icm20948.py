@@ -48,7 +48,7 @@ class Icm20948(FifoImu):
     """ICM-20948; see ``I2cImu``."""
 
     chip = "ICM-20948"
-    usual_address = 0x68
+    addresses = (0x68, 0x69)
     identity_register = WHO_AM_I
     identities = IDENTITIES
     gyro_ranges = GYRO_RANGES

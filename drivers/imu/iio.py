@@ -32,6 +32,7 @@ from drivers.imu.iio_sysfs import (
     STAMP,
     Channel,
     channel,
+    driver_error,
     find,
     has,
     has_buffer,
@@ -40,12 +41,11 @@ from drivers.imu.iio_sysfs import (
     set_ranges,
     set_rate,
     text_of,
-    told,
     write_to,
 )
-from drivers.imu.settings import USUAL, ImuSettings
-from drivers.records import ImuSample
+from drivers.imu.settings import DEFAULT_SETTINGS, ImuSettings
 from drivers.sample_clock import SampleClock
+from drivers.samples import ImuSample
 
 SYSFS = Path("/sys/bus/iio/devices")
 DEV = Path("/dev")
@@ -69,7 +69,7 @@ class Iio:
     def __init__(
         self,
         device: str = "",
-        settings: ImuSettings = USUAL,
+        settings: ImuSettings = DEFAULT_SETTINGS,
         root: Path = SYSFS,
         dev: Path = DEV,
         clock: Clock = SYSTEM_CLOCK,
@@ -121,7 +121,7 @@ def _take(node: Path, folder: Path) -> int:
     try:
         file = os.open(node, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
-        raise told(error, node) from error
+        raise driver_error(error, node) from error
     try:
         write_to(folder / "buffer/enable", "0")
     except DriverError:
@@ -175,7 +175,7 @@ class _Polled:
                 self._files.append(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
         except OSError as error:
             self.close()
-            raise told(error, path) from error
+            raise driver_error(error, path) from error
 
     def read(self) -> list[ImuSample]:
         now_ns = self._clock.monotonic_ns()
@@ -256,9 +256,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the device by hand."""
     parser = argparse.ArgumentParser(prog="python -m drivers.imu.iio")
     parser.add_argument("device", nargs="?", default="", help="the chip's name or iio:deviceN (the first with a gyro)")
-    parser.add_argument("--rate", type=float, default=USUAL.rate_hz, help="Hz (%(default)s)")
-    parser.add_argument("--gyro-range", type=int, default=USUAL.gyro_range_dps, help="°/s (%(default)s)")
-    parser.add_argument("--accel-range", type=int, default=USUAL.accel_range_g, help="g (%(default)s)")
+    parser.add_argument("--rate", type=float, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
+    parser.add_argument("--gyro-range", type=int, default=DEFAULT_SETTINGS.gyro_range_dps, help="°/s (%(default)s)")
+    parser.add_argument("--accel-range", type=int, default=DEFAULT_SETTINGS.accel_range_g, help="g (%(default)s)")
     parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
     asked = parser.parse_args(argv)
     settings = ImuSettings(asked.rate, asked.gyro_range, asked.accel_range)

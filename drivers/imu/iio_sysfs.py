@@ -19,7 +19,7 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
-from drivers.records import STANDARD_GRAVITY_MPS2
+from drivers.samples import STANDARD_GRAVITY_MPS2
 
 GYRO = tuple(f"in_anglvel_{axis}" for axis in "xyz")
 ACCEL = tuple(f"in_accel_{axis}" for axis in "xyz")
@@ -57,7 +57,7 @@ def find(device: str, root: Path) -> tuple[Path, Path]:
 
 
 def set_rate(gyro: Path, accel: Path, rate_hz: float) -> float:
-    """Set the closest rate on offer and answer with what holds; sensors may share one."""
+    """Set the closest rate on offer and return the one that holds; sensors may share one."""
     held = []
     for folder, own in ((gyro, "in_anglvel_sampling_frequency"), (accel, "in_accel_sampling_frequency")):
         name = own if (folder / own).exists() else "sampling_frequency"
@@ -193,7 +193,7 @@ def number_of(attribute: Path) -> float:
     try:
         return float(attribute.read_text(errors="replace"))
     except OSError as error:
-        raise told(error, attribute) from error
+        raise driver_error(error, attribute) from error
     except ValueError as error:
         raise WrongDeviceError(f"{attribute}: not a number; is this an IMU?") from error
 
@@ -205,10 +205,10 @@ def write_to(attribute: Path, text: str) -> None:
     except OSError as error:
         if error.errno == errno.EINVAL:
             raise UnsupportedSettingError(f"{attribute}: {text} is refused; set another") from error
-        raise told(error, attribute) from error
+        raise driver_error(error, attribute) from error
 
 
-def told(error: OSError, path: Path) -> DriverError:
+def driver_error(error: OSError, path: Path) -> DriverError:
     """The typed error for what the kernel said."""
     if error.errno in (errno.EACCES, errno.EPERM):
         return DeviceForbiddenError(

@@ -50,7 +50,7 @@ class Lsm6ds3(FifoImu):
     """LSM6DS3; see ``I2cImu``."""
 
     chip = "LSM6DS3"
-    usual_address = 0x6A
+    addresses = (0x6A, 0x6B)
     identity_register = WHO_AM_I
     identities = IDENTITIES
     gyro_ranges = GYRO_RANGES  # its 250 is called 245

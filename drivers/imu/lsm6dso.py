@@ -8,6 +8,7 @@ its counts of acceleration are worth twice as much: only gravity at rest tells t
 import struct
 import sys
 from collections.abc import Iterator, Mapping, Sequence
+from typing import ClassVar
 
 from drivers.errors import WrongDeviceError
 from drivers.imu.gravity import Gravity
@@ -24,7 +25,7 @@ from drivers.imu.lsm6ds3 import (
     STEADY_WORDS,
     Lsm6ds3,
 )
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 
 FIFO_CTRL3 = 0x09  # 7:4 BDR_GY, 3:0 BDR_XL
 FIFO_CTRL4 = 0x0A  # 2:0 FIFO_MODE
@@ -35,7 +36,7 @@ NO_I3C = 0xE2  # CTRL9_XL: I3C_disable, else as at power-on: what passes on the 
 GYRO, ACCEL = 1, 2  # TAG_SENSOR
 OVER_RUN_OR_FULL = 0x6800  # FIFO_OVR_IA, FIFO_FULL_IA, FIFO_OVR_LATCHED; of FIFO_STATUS1 and 2
 
-LEAST_GRAVITY, MOST_GRAVITY = 0.75, 1.35  # g; one chip taken for the other measures a half or two
+MIN_GRAVITY, MAX_GRAVITY = 0.75, 1.35  # g; one chip taken for the other measures a half or two
 
 IDENTITIES = {0x6C: "LSM6DSO or LSM6DSOX"}
 
@@ -53,7 +54,8 @@ class Lsm6dso(Lsm6ds3):
     fifo_bytes = 512 * 7
     word_bytes = 7
     frame = struct.Struct("<B3h")
-    twin = ("lsm6dso32", 0.5)  # the driver of the chip that says the same of itself, and what that would measure, g
+    twin: ClassVar[tuple[str, float] | None] = ("lsm6dso32", 0.5)
+    """The driver of a chip that says the same of itself, and what that would measure at rest, g."""
     _gravity: Gravity | None = None
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
@@ -78,15 +80,18 @@ class Lsm6dso(Lsm6ds3):
 
     def _samples(self) -> list[ImuSample]:
         samples = super()._samples()
+        if self.twin is not None:
+            self._compare_gravity(samples, *self.twin)
+        return samples
+
+    def _compare_gravity(self, samples: Sequence[ImuSample], driver: str, expected_g: float) -> None:
         if self._gravity is None:
             self._gravity = Gravity(self.rate_hz)
         gravity = self._gravity.measured_g(samples)
-        if gravity is not None and not LEAST_GRAVITY <= gravity <= MOST_GRAVITY:
-            driver, expected = self.twin
-            is_twin = LEAST_GRAVITY <= gravity / expected <= MOST_GRAVITY
+        if gravity is not None and not MIN_GRAVITY <= gravity <= MAX_GRAVITY:
+            is_twin = MIN_GRAVITY <= gravity / expected_g <= MAX_GRAVITY
             remedy = f"set imu.driver to {driver}" if is_twin else "its accelerometer is broken; take another board"
             raise WrongDeviceError(f"{self.name}: measures {gravity:.2f} g at rest instead of 1 g; {remedy}")
-        return samples
 
     def _frames(self, data: bytes) -> Iterator[tuple[Counts, Counts]]:
         for tag, x, y, z in self.frame.iter_unpack(data):

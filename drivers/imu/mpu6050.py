@@ -7,6 +7,7 @@ PS-MPU-6000A-00 revision 3.4.
 import struct
 import sys
 from collections.abc import Mapping, Sequence
+from typing import ClassVar
 
 from drivers.imu.fifo_imu import FifoImu
 from drivers.imu.i2c_chips import run_by_hand
@@ -25,7 +26,7 @@ FIFO_COUNT = 0x72
 FIFO_R_W = 0x74
 WHO_AM_I = 0x75
 
-GYRO_AND_ACCEL = 0x78  # FIFO_EN
+GYRO_AND_ACCEL = 0x78  # FIFO_EN: three axes of the gyro, accelerometer
 USE_FIFO = 0x40  # USER_CTRL
 RESET_FIFO = 0x04
 DEVICE_RESET = 0x80  # PWR_MGMT_1
@@ -36,12 +37,6 @@ FILTERS_HZ = {1: 184, 2: 92, 3: 41, 4: 20, 5: 10, 6: 5}  # DLPF_CFG: the narrowe
 RESET_S = 0.1
 
 IDENTITIES = {0x68: "MPU-6050"}
-FAMILY = {
-    0x68: "mpu6050",
-    **dict.fromkeys((0x70, 0x72, 0x74, 0x78, 0x98), "mpu6500"),
-    **dict.fromkeys((0x71, 0x73), "mpu9250"),
-}
-"""What they say of themselves → driver; boards sold as one carry another."""
 GYRO_RANGES = {250: Range(0, 131.0), 500: Range(1, 65.5), 1000: Range(2, 32.8), 2000: Range(3, 16.4)}
 ACCEL_RANGES = {2: Range(0, 16384), 4: Range(1, 8192), 8: Range(2, 4096), 16: Range(3, 2048)}
 
@@ -50,15 +45,15 @@ class Mpu6050(FifoImu):
     """MPU-6050; see ``I2cImu``."""
 
     chip = "MPU-6050"
-    usual_address = 0x68
+    addresses = (0x68, 0x69)
     identity_register = WHO_AM_I
     identities = IDENTITIES
-    relatives = FAMILY
     gyro_ranges = GYRO_RANGES
     accel_ranges = ACCEL_RANGES
     thermometer = Thermometer(TEMP_OUT, "big", lsb_per_c=340, zero_c=36.53)
     fifo_register = FIFO_R_W
     fifo_bytes = 1024
+    fifo_content: ClassVar[int] = GYRO_AND_ACCEL
     frame = struct.Struct(">6h")
     gyro_first = False
 
@@ -91,7 +86,7 @@ class Mpu6050(FifoImu):
         self._write(FIFO_EN, 0)
         self._write(USER_CTRL, RESET_FIFO)
         self._write(USER_CTRL, USE_FIFO)
-        self._write(FIFO_EN, GYRO_AND_ACCEL)
+        self._write(FIFO_EN, self.fifo_content)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -3,7 +3,8 @@
 MPU-6500 Register Map and Descriptions, RM-MPU-6500A-00 revision 2.1; Product Specification, PS-MPU-6500A-01
 revision 1.3. The MPU-6515 and MPU-6880 differ in what they say of themselves alone, as Linux has it (inv_mpu_iio.h);
 0x72 is said by copies. 0x98 is the ICM-20689, found on many boards that are sold with an MPU-6050: its thermometer is
-another (ICM-20689 data sheet, DS-000143, and Linux), and no more than 512 bytes of its FIFO are used.
+another (ICM-20689 data sheet, DS-000143, and Linux), and no more than 512 bytes of its FIFO are used. The ICM-20608-G
+(DS-000081), ICM-20609 (DS-000103) and IAM-20680 are like it, as Linux has it and PX4's ICM20608G driver.
 """
 
 import sys
@@ -21,8 +22,12 @@ IDENTITIES = {
     0x74: "MPU-6515",
     0x78: "MPU-6880",
     0x98: "ICM-20689",
+    0xA6: "ICM-20609",
+    0xA9: "IAM-20680",
+    0xAE: "ICM-20608-D",
+    0xAF: "ICM-20608-G",
 }
-ICM20689_THERMOMETER = Thermometer(TEMP_OUT, "big", lsb_per_c=326.8, zero_c=25.0)
+ICM_THERMOMETER = Thermometer(TEMP_OUT, "big", lsb_per_c=326.8, zero_c=25.0)
 
 
 class Mpu6500(Mpu6050):
@@ -34,8 +39,8 @@ class Mpu6500(Mpu6050):
     fifo_bytes = 512
 
     def _reset(self) -> None:
-        if self.model == "ICM-20689":
-            self.thermometer = ICM20689_THERMOMETER
+        if self.model.startswith(("ICM", "IAM")):
+            self.thermometer = ICM_THERMOMETER
         super()._reset()
 
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 Vector = tuple[float, float, float]
 
@@ -35,7 +35,16 @@ class Parser(Protocol):
         ...
 
     def feed(self, data: bytes) -> list[Reading]:
-        """Take the next bytes of the stream; answer with the readings that they complete, oldest first."""
+        """Take the next bytes of the stream; return the readings that they complete, oldest first."""
+        ...
+
+
+@runtime_checkable
+class Talker(Parser, Protocol):
+    """A parser whose IMU must be configured to send."""
+
+    def to_say(self, rate_hz: float, now_ns: int) -> list[bytes]:
+        """What to send to the IMU now, asking for samples at this rate."""
         ...
 
 

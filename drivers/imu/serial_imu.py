@@ -7,19 +7,21 @@ from dataclasses import dataclass
 
 from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
-from drivers.errors import DeviceStalledError, WrongDeviceError
-from drivers.imu.serial_frames import Parser, Reading
+from drivers.device import Device
+from drivers.errors import DeviceLostError, DeviceStalledError, WrongDeviceError
+from drivers.imu import registry
+from drivers.imu.serial_frames import Parser, Reading, Talker
 from drivers.imu.serial_port import SerialPort
 from drivers.imu.settings import ImuSettings
-from drivers.records import ImuSample
 from drivers.sample_clock import SampleClock
+from drivers.samples import ImuSample
 
 FIRST_BYTE_S = 4.0  # many boards start anew when their port is opened
 STALLED_S = 1.0
-LONGEST_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
+MAX_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
 FRAMES_BY_CHANCE = 3  # that noise can look like
 TICKS = 2**32  # counters of most devices begin anew after so many
-LONGEST_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
+MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,10 +35,11 @@ class SerialProtocol:
     rate_hz: float | None = None  # where it is always the same
     tick_hz: float | None = None  # of the device's own clock, where readings can have its time
     wraps: tuple[int, ...] = (TICKS,)  # after how many ticks it goes on from 0, by series
+    byte_pause_s: float = 0.0  # that the IMU wants between the bytes that it is sent
 
 
 class SerialImu:
-    """A ``Device[ImuSample]``. Rate and ranges are those set in the IMU itself; nothing is written to it.
+    """A ``Device[ImuSample]``. Rate and ranges are those set in the IMU itself; nothing is written but to a ``Talker``.
 
     Raises what ``SerialPort`` raises; ``read`` also ``DeviceStalledError``, and ``WrongDeviceError`` when there are
     bytes but no readings. Counts what the parser refuses, and ``restarted`` when the device's clock began anew.
@@ -59,9 +62,15 @@ class SerialImu:
         self._port = SerialPort(port, baud or protocol.bauds[0])
         self._heard_ns = clock.monotonic_ns()
         self._patience_s = FIRST_BYTE_S
+        try:
+            self._say()
+        except DeviceLostError:
+            self.close()
+            raise
 
     def read(self) -> list[ImuSample]:
         """See ``Device``."""
+        self._say()
         data = self._port.read()
         now_ns = self._clock.monotonic_ns()
         if not data:
@@ -82,6 +91,11 @@ class SerialImu:
         """See ``Device``."""
         self._port.close()
 
+    def _say(self) -> None:
+        if isinstance(self._parser, Talker):
+            for data in self._parser.to_say(self._rate_hz, self._clock.monotonic_ns()):
+                self._port.write(data, self._protocol.byte_pause_s, self._clock)
+
     def _complain_of_silence(self, now_ns: int) -> None:
         silent_s = (now_ns - self._heard_ns) / 1e9
         if silent_s > self._patience_s:
@@ -91,7 +105,7 @@ class SerialImu:
 
     def _complain_of_noise(self, count: int) -> None:
         self._noise_bytes += count
-        if self._noise_bytes <= LONGEST_NOISE_BYTES:
+        if self._noise_bytes <= MAX_NOISE_BYTES:
             return
         if self._parser.frames - self._frames > FRAMES_BY_CHANCE:
             raise WrongDeviceError(f"{self.name}: frames, but no sample in them; make it send {self._protocol.needs}")
@@ -120,7 +134,7 @@ class SerialImu:
         if before is None:
             return 1
         step = min((reading.ticks - before) % wrap for wrap in self._protocol.wraps)  # short with the right one
-        return step if step <= LONGEST_PAUSE_S * self._unit_hz else 0
+        return step if step <= MAX_PAUSE_S * self._unit_hz else 0
 
     def _sample(self, reading: Reading, stamp_ns: int) -> ImuSample:
         gyro = reading.gyro
@@ -129,6 +143,17 @@ class SerialImu:
             gyro = gyro[0] * scale, gyro[1] * scale, gyro[2] * scale
             stamp_ns -= round(reading.spans / self._stamps.rate_hz / 2 * 1e9)
         return ImuSample(stamp_ns, gyro, reading.accel, reading.saturated)
+
+
+def open_port(
+    driver: str, port: str, baud: int, settings: ImuSettings, clock: Clock = SYSTEM_CLOCK
+) -> Device[ImuSample]:
+    """Open the IMU at a serial port.
+
+    ``driver``: a serial one of the registry. ``baud``: 0 for the protocol's usual one. ``settings``: only the rate
+    counts, as the one to start from; serial IMUs send as they were set up. Raises what ``SerialImu`` raises.
+    """
+    return SerialImu(registry.DRIVERS[driver].load(), port, baud, settings.rate_hz, clock)
 
 
 def run_by_hand(protocol: SerialProtocol, argv: Sequence[str] | None) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import serial
 
+from drivers.clock import Clock
 from drivers.errors import (
     DeviceBusyError,
     DeviceForbiddenError,
@@ -20,7 +21,7 @@ from drivers.errors import (
 )
 
 READ_S = 0.1
-LARGEST_READ_BYTES = 4096
+MAX_READ_BYTES = 4096
 USUAL_PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "serial[0-9]*")
 
 
@@ -44,12 +45,21 @@ class SerialPort:
         """What has come, or what comes first; nothing after ``READ_S``. Raises ``DeviceLostError``."""
         try:  # one look and one read, where the library's own read takes several
             come, _, _ = select.select([self._serial], [], [], READ_S)
-            data = os.read(self._serial.fileno(), LARGEST_READ_BYTES) if come else b""
+            data = os.read(self._serial.fileno(), MAX_READ_BYTES) if come else b""
         except OSError as error:
             raise self._lost() from error
         if come and not data:
             raise self._lost()
         return data
+
+    def write(self, data: bytes, byte_pause_s: float, clock: Clock) -> None:
+        """Send bytes, each on its own. Raises ``DeviceLostError``."""
+        try:
+            for byte in data:
+                self._serial.write(bytes([byte]))
+                clock.sleep_s(byte_pause_s)
+        except OSError as error:
+            raise self._lost() from error
 
     def _lost(self) -> DeviceLostError:
         return DeviceLostError(f"{self.path}: the serial port went away; plug the IMU in again")

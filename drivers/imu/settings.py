@@ -1,15 +1,20 @@
 """What is asked of an IMU; the driver takes the closest rate that its chip has."""
 
 from dataclasses import dataclass
+from pathlib import Path
+
+FIRMWARE = Path("/lib/firmware/bmi270-init-data.fw")
 
 
 @dataclass(frozen=True, slots=True)
 class ImuSettings:
-    """Rate and ranges."""
+    """Rate and ranges, and what single chips need besides."""
 
     rate_hz: float = 200.0
     gyro_range_dps: int = 500
     accel_range_g: int = 4
+    identity: int | None = None  # of a copy that is taken for the chip all the same
+    firmware: Path = FIRMWARE  # the vendor's file, for a chip that needs one
 
 
-USUAL = ImuSettings()
+DEFAULT_SETTINGS = ImuSettings()

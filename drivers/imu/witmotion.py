@@ -15,7 +15,7 @@ from collections.abc import Sequence
 
 from drivers.imu.serial_frames import Framer, Reading, Vector
 from drivers.imu.serial_imu import SerialProtocol, run_by_hand
-from drivers.records import STANDARD_GRAVITY_MPS2
+from drivers.samples import STANDARD_GRAVITY_MPS2
 
 HEADER = 0x55
 ACCELERATION = 0x51
@@ -64,13 +64,14 @@ class WitMotionParser:
 
     def _pair(self, accel: tuple[int, int, int], gyro: tuple[int, int, int]) -> Reading:
         clipped = max(map(abs, accel + gyro)) >= CLIPPED_UNITS
-        reading = Reading(_scaled(gyro, RADPS_PER_UNIT), _scaled(accel, MPS2_PER_UNIT), clipped, self._lost)
+        reading = Reading(scaled(gyro, RADPS_PER_UNIT), scaled(accel, MPS2_PER_UNIT), clipped, self._lost)
         self._accel = None
         self._lost = 0
         return reading
 
 
-def _scaled(raw: tuple[int, int, int], unit: float) -> Vector:
+def scaled(raw: tuple[int, int, int], unit: float) -> Vector:
+    """Units of a frame to SI units."""
     return raw[0] * unit, raw[1] * unit, raw[2] * unit
 
 

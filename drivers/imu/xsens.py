@@ -18,7 +18,7 @@ from drivers.imu.serial_imu import SerialProtocol, run_by_hand
 
 HEADER = b"\xfa\xff\x36"
 EXTENDED = 0xFF
-LONGEST_DATA_BYTES = 2048
+MAX_DATA_BYTES = 2048
 
 PACKET_COUNTER = 0x1020
 SAMPLE_TIME_FINE = 0x1060
@@ -31,7 +31,7 @@ FORMAT_MASK = 0x0003  # 0 float32, 1 fixed 12.20, 2 fixed 16.32, 3 float64
 SAMPLE_TIME_HZ = 10_000.0
 SAMPLE_TIME_WRAPS = (2**32, 864_000_000)  # MTi-1 and 600 series; MTi-10 and 100 series: after a day
 CLIPPED = 0x3F00  # StatusWord: an axis of the accelerometer (bits 8 to 10) or gyro (11 to 13) is out of range
-LONGEST_GAP = 1000  # packets; more means that the counter began anew
+MAX_GAP = 1000  # packets; more means that the counter began anew
 
 
 class XsensParser:
@@ -69,7 +69,7 @@ class XsensParser:
         packet = _unsigned(item, 2)
         if packet is not None and self._packet is not None:
             missing = (packet - self._packet - 1) % 65536
-            if 0 < missing <= LONGEST_GAP:
+            if 0 < missing <= MAX_GAP:
                 self.counts["lost"] += missing
                 self._lost += missing
         self._packet = packet
@@ -81,7 +81,7 @@ def _length(start: bytes) -> int:
     if start[3] != EXTENDED:
         return 4 + start[3] + 1
     data_bytes = int.from_bytes(start[4:6], "big")
-    return 6 + data_bytes + 1 if EXTENDED <= data_bytes <= LONGEST_DATA_BYTES else -1
+    return 6 + data_bytes + 1 if EXTENDED <= data_bytes <= MAX_DATA_BYTES else -1
 
 
 def _is_whole(message: bytes) -> bool:

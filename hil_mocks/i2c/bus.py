@@ -6,9 +6,12 @@ from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
+import smbus2
+
 from drivers.clock import Clock
 from hil_mocks.i2c.chip import SimulatedChip
 
+READ = 0x0001  # of a message's flags
 HANG_S = 1.0  # after which Linux gives a transfer up
 BLOCK_BYTES = 32
 OVERHEAD_BYTES = 3  # address, register, address again
@@ -23,6 +26,9 @@ class Fault:
     number: int = 0  # errno; 0: the transfer succeeds with ``changed`` data
     register: int | None = None
     changed: Callable[[bytes], bytes] = bytes
+
+
+Transfer = Callable[[SimulatedChip], bytes]
 
 
 class SimulatedBus:
@@ -76,11 +82,18 @@ class SimulatedBus:
             raise OSError(errno.EINVAL, os.strerror(errno.EINVAL))
         self._transfer(i2c_addr, register, lambda chip: chip.write(register, bytes(data)))
 
+    def i2c_rdwr(self, *messages: smbus2.i2c_msg) -> None:
+        """Bytes without a register."""
+        for message in messages:
+            transfer = _receiving(message.len) if message.flags & READ else _sending(bytes(message))
+            for at, value in enumerate(self._transfer(message.addr, 0, transfer)):
+                message.buf[at] = bytes([value])
+
     def close(self) -> None:
         """Let the bus go."""
         self.closed = True
 
-    def _transfer(self, address: int, register: int, transfer: Callable[[SimulatedChip], bytes]) -> bytes:
+    def _transfer(self, address: int, register: int, transfer: Transfer) -> bytes:
         self.transfers += 1
         if self.hanging:
             self._clock.sleep_s(HANG_S)
@@ -110,3 +123,11 @@ class SimulatedBus:
 
     def _refuse(self, number: int) -> None:
         raise OSError(number, os.strerror(number))
+
+
+def _receiving(length: int) -> Transfer:
+    return lambda chip: chip.receive(length)
+
+
+def _sending(data: bytes) -> Transfer:
+    return lambda chip: chip.send(data)

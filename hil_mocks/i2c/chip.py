@@ -10,7 +10,7 @@ from drivers.clock import Clock
 from hil_mocks.i2c.motion import Motion, Vector
 
 G_MPS2 = 9.80665
-LONGEST_BACKLOG = 4096  # samples; more than any FIFO holds
+MAX_BACKLOG = 4096  # samples; more than any FIFO holds
 
 Counts = tuple[int, int, int]
 
@@ -33,6 +33,11 @@ class SimulatedChip(ABC):
         self._begin_ns = clock.monotonic_ns()
         self.power_up()
 
+    @property
+    def places(self) -> "Mapping[int, SimulatedChip]":
+        """What is to be put on a bus, by address; some chips are two."""
+        return {self.address: self}
+
     def power_up(self) -> None:
         """All registers at their power-on values."""
         self.registers = bytearray(0x10000)  # of all pages
@@ -47,8 +52,16 @@ class SimulatedChip(ABC):
         self._catch_up()
         return self._burst(register, length)
 
+    def receive(self, length: int) -> bytes:
+        """Bytes without a register; only chips that have none know more than zeros."""
+        return bytes(length)
+
+    def send(self, data: bytes) -> bytes:  # noqa: ARG002
+        """Bytes without a register. Return nothing."""
+        return b""
+
     def write(self, register: int, data: bytes) -> bytes:
-        """A burst of bytes to a register on; answers with nothing."""
+        """Write a burst of bytes from a register on."""
         self._catch_up()
         for at, value in enumerate(data):
             self._set(register + at, value)
@@ -93,7 +106,7 @@ class SimulatedChip(ABC):
         period_ns = 1e9 / rate_hz
         if self._next_ns is None or period_ns != self._period_ns:
             self._next_ns, self._period_ns = now_ns + period_ns, period_ns
-        self._next_ns = max(self._next_ns, now_ns - LONGEST_BACKLOG * period_ns)
+        self._next_ns = max(self._next_ns, now_ns - MAX_BACKLOG * period_ns)
         while self._next_ns <= now_ns:
             self.made_ns.append(round(self._next_ns))
             packed = self.pack(*self._motion((self._next_ns - self._begin_ns) / 1e9))

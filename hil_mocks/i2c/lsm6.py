@@ -139,6 +139,12 @@ class Lsm6dso(Lsm6):
         return b"".join(words).ljust(length, b"\x00")[:length]
 
 
+class Ism330dhcx(Lsm6dso):
+    """ISM330DHCX: an LSM6DSO with another identity. I3C_disable is called DEVICE_CONF there."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6B, 0x12: 0x04, 0x18: 0xE0}
+
+
 class Lsm6dso32(Lsm6dso):
     """LSM6DSO32: an LSM6DSO whose codes mean 4, 32, 8, 16 g, with the same identity."""
 

@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 
 Vector = tuple[float, float, float]
 Motion = Callable[[float], tuple[Vector, Vector]]

@@ -84,6 +84,24 @@ class Mpu9250(Mpu6500):
     power_on: ClassVar[Mapping[int, int]] = {0x6B: 0x01, 0x75: 0x71}
 
 
+class Icm20602(Mpu6500):
+    """ICM-20602: what FIFO_EN asks for comes with the temperature, in frames of 14 bytes."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x1A: 0x80, 0x6B: 0x41, 0x75: 0x12}
+    fifo_bytes = 1008
+    lsb_per_c, zero_c = 326.8, 25.0
+
+    def push(self, packed: Mapping[int, bytes]) -> None:
+        """4 GYRO_FIFO_EN, 3 ACCEL_FIFO_EN; nothing else is known to it."""
+        if not self.registers[0x6A] & 0x40:
+            return
+        wanted = self.registers[0x23]
+        for bits, register in ((0x08, 0x3B), (0x18, 0x41), (0x10, 0x43)):
+            if wanted & bits:
+                self._fifo += packed[register]
+        del self._fifo[: max(len(self._fifo) - self.fifo_bytes, 0)]
+
+
 class Icm20689(Mpu6500):
     """ICM-20689, as boards have it that are sold with an MPU-6050. ACCEL_CONFIG_2 has the size of its FIFO."""
 

@@ -19,8 +19,14 @@ from lcf_edge.zenoh_link import opened_session
 
 HELD = 150  # sockets of one attack
 CONNECT_S = 1.0
+DECLARED = 1000  # keys of a kind at a time
+FLOOD = 500  # messages and questions at a time
 HTTP = b"GET / HTTP/1.0\r\n\r\n"
 HALF_A_REQUEST = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
+UPGRADE = (
+    b"GET /updates HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
+    b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
+)
 CLIENT_HELLO = b"\x16\x03\x01\x02\x00\x01"  # as far as it goes
 
 
@@ -86,6 +92,32 @@ def liar(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
     return wave
 
 
+def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
+    """A local process that declares what nobody needs, and goes; Zenoh keeps part of it."""
+    turn = iter(range(2**30))
+
+    def wave() -> None:
+        key = f"{prefix}/of-the-declarer/{next(turn)}"
+        with opened_session(Zenoh(mode="client", connect=[endpoint], listen=[])) as session:
+            tokens = [session.liveliness().declare_token(f"{key}/{n}") for n in range(DECLARED)]
+            publishers = [session.declare_publisher(f"{key}/offered/{n}") for n in range(DECLARED)]
+            del tokens, publishers
+
+    return wave
+
+
+def flood(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
+    """A local process that asks and tells as fast as it can."""
+
+    def wave() -> None:
+        with opened_session(Zenoh(mode="client", connect=[endpoint], listen=[])) as session:
+            for _ in range(FLOOD):
+                session.put(f"{prefix}/speed", os.urandom(300))
+                session.get(f"{prefix}/query/config", zenoh.handlers.RingChannel(1), timeout=1.0)
+
+    return wave
+
+
 def reloads(file: Path, good: str) -> Callable[[], None]:
     """In turn a configuration that is broken, wrong, unreadably large, and good."""
     texts = ("nonsense = 1\n", "[filter]\ntr_s = -1.0\n", "a" * 3_000_000, good)
@@ -95,6 +127,25 @@ def reloads(file: Path, good: str) -> Callable[[], None]:
         new = file.with_suffix(".new")
         new.write_text(texts[next(turn) % len(texts)], encoding="utf-8")
         new.replace(file)
+
+    return wave
+
+
+def frames(port: int) -> Callable[[], None]:
+    """A browser that sends what is no frame of a WebSocket, another one each time."""
+    wrong = (
+        b"\x81\xff" + b"\xff" * 8 + bytes(4),
+        b"\x01\x81\0\0\0\0a" * 1000,
+        b"\x89\x80\0\0\0\0" * 20_000,
+        os.urandom(100),
+    )
+    turn = iter(range(2**30))
+
+    def wave() -> None:
+        with closing(socket.create_connection(("127.0.0.1", port), CONNECT_S)) as browser:
+            browser.settimeout(CONNECT_S)
+            browser.sendall(UPGRADE + wrong[next(turn) % len(wrong)])
+            browser.recv(4096)
 
     return wave
 

@@ -15,13 +15,13 @@ from tempfile import TemporaryDirectory
 
 import zenoh
 
-from hil_mocks import scenes
 from hil_mocks.soak.figures import Life, Parts, complaints, lines
 from hil_mocks.soak.stand_ins import save
 from lcf_edge.cdr import decode_diagnostics
 from lcf_edge.config import Camera, Config, Imu, Memory, Vehicle, to_toml
 from lcf_edge.config import Zenoh as ZenohKeys
 from lcf_edge.errors import LcfError
+from lcf_edge.rendered import scenes
 from lcf_edge.zenoh_link import opened_session
 
 KINDS = ("crossing", "passing", "two_crossing", "oncoming")  # of drives, in turn

@@ -9,10 +9,10 @@ import time
 from collections.abc import Sequence
 from pathlib import Path
 
-from hil_mocks import playback
 from hil_mocks.soak.stand_ins import FastCamera, FastImu, FastSpeed, Feed
-from lcf_edge import command_line
-from lcf_edge.records import Scene
+from lcf_edge.cli import command_line
+from lcf_edge.messages import Scene
+from lcf_edge.recording import playback
 from lcf_edge.zenoh_link import link
 
 

@@ -16,14 +16,14 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.errors import DeviceLostError, DeviceMissingError
-from drivers.records import Frame, ImuSample, SpeedSample
-from hil_mocks import scenes
-from hil_mocks.drives import stamp_ns
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.drives import stamp_ns
 
 WAIT_S = 0.25  # of one read
 CAMERA_FAULT_EACH = 1500  # pictures, in the mean
 SAMPLES_FAULT_EACH = 3000  # reads of IMU or odometry, in the mean
-LONGEST_FAULT = 40  # pictures
+MAX_FAULT = 40  # pictures
 
 Table = npt.NDArray[np.float64]
 CameraFault = Literal["unplugged", "dropped", "burst", "dark", "noise", "leap"]
@@ -83,7 +83,7 @@ class Feed:
         return False
 
     def advance(self, pictures: int = 1) -> int:
-        """Let time pass, with all samples up to the next picture and one more; answers its stamp."""
+        """Let time pass, with all samples up to the next picture and one more. Return its stamp."""
         with self._passed:
             self.seq += pictures
             stamp_ns = self.start_ns + (self.seq - 1) * self.interval_ns
@@ -92,7 +92,7 @@ class Feed:
         return stamp_ns
 
     def await_after(self, stamp_ns: int) -> int:
-        """Wait until time has passed ``stamp_ns``, a little at most; answers the time."""
+        """Wait until time has passed ``stamp_ns``, a little at most. Return the time."""
         with self._passed:
             self._passed.wait_for(lambda: self._horizon_ns > stamp_ns, WAIT_S)
             return self._horizon_ns
@@ -145,14 +145,14 @@ class FastCamera:
         if not self._fault:
             return
         self.counts[f"fault {self._fault}"] += 1
-        self._left = self._feed.random.randint(2, LONGEST_FAULT) if self._fault in {"burst", "dark", "noise"} else 1
+        self._left = self._feed.random.randint(2, MAX_FAULT) if self._fault in {"burst", "dark", "noise"} else 1
         if self._fault == "unplugged":
             self._feed.taken()  # the picture that would have come
             raise DeviceLostError(f"{self.name}: unplugged; plug it in again")
 
     def _skipped(self) -> int:
         """Pictures that the camera counts and nobody gets."""
-        most = {"dropped": LONGEST_FAULT, "leap": 200}.get(self._fault, 0)
+        most = {"dropped": MAX_FAULT, "leap": 200}.get(self._fault, 0)
         skipped = self._feed.random.randint(1, most) if most else 0
         self.counts["dropped"] += skipped
         return skipped

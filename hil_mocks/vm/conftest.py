@@ -1,54 +1,74 @@
-"""One machine for all scenarios; what fails shows the journal."""
+"""One machine for all scenarios, but for those whose module has a ``SYSTEM`` of its own; failures show the journal."""
 
 import os
 import shutil
 from collections.abc import Generator, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
 
 from hil_mocks.vm.daemon import Daemon, Subscriber
-from hil_mocks.vm.image import Image, ImageError, image, missing
+from hil_mocks.vm.image import DEBIAN_12, DEBIAN_13_ON_ARM, HERE, Image, ImageError, System, image, missing
 from hil_mocks.vm.machine import Machine, MachineError
 
 RESULTS = Path(os.environ.get("LCF_EDGE_HIL_RESULTS") or "hil-out")
 WHERE_POSSIBLE = "LCF_EDGE_HIL_WHERE_POSSIBLE"
-CAMERAS = "n_devs=2 node_types=0x1,0x101 num_inputs=1,1 input_types=0,3 num_outputs=1,1 output_types=0,1"
+CAMERAS = (
+    "n_devs=3 node_types=0x1,0x101,0x1 num_inputs=1,1,1 input_types=0,3,0 num_outputs=1,1,1 output_types=0,1,0"
+    " multiplanar=1,1,2"
+)
 
-_IMAGE = pytest.StashKey[Image]()
+PROCESSORS = {"amd64": HERE, "arm64": DEBIAN_13_ON_ARM.processor}
+
+_IMAGES = pytest.StashKey[dict[System, Image]]()
 _MACHINE = pytest.StashKey[Machine]()
+
+
+def pytest_addoption(parser: pytest.Parser) -> None:
+    """For which processor."""
+    parser.addoption("--arch", choices=sorted(PROCESSORS), default="amd64", help="the machine's processor")
 
 
 def pytest_configure(config: pytest.Config) -> None:
     """Say in one line why there can be no machine."""
-    if not config.option.collectonly and (reason := missing()):
+    if not config.option.collectonly and (reason := missing(PROCESSORS[config.option.arch])):
         pytest.exit(f"hil: {reason}", 0 if os.environ.get(WHERE_POSSIBLE) else 1)
 
 
 def pytest_collection_finish(session: pytest.Session) -> None:
-    """Make the image, which no scenario's time limit counts."""
-    if session.items and not session.config.option.collectonly:
-        try:
-            session.config.stash[_IMAGE] = image()
-        except ImageError as error:
-            pytest.exit(f"hil: {error}", 1)
+    """Make the images, which no scenario's time limit counts."""
+    if session.config.option.collectonly:
+        return
+    modules = {item.getparent(pytest.Module) for item in session.items}
+    wanted = (getattr(module.obj, "SYSTEM", DEBIAN_12) for module in modules if module is not None)
+    systems = {_for_arch(session.config, system) for system in wanted}
+    try:
+        session.config.stash[_IMAGES] = {system: image(system) for system in systems}
+    except ImageError as error:
+        pytest.exit(f"hil: {error}", 1)
+
+
+def _for_arch(config: pytest.Config, system: System) -> System:
+    """The system of a scenario; on 64-bit Arm there is one for all of them."""
+    return system if PROCESSORS[config.option.arch] == system.processor else DEBIAN_13_ON_ARM
+
+
+@contextmanager
+def booted(config: pytest.Config, system: System, folder: Path) -> Iterator[Machine]:
+    """A machine with that system, which leaves its console and journal in ``folder``."""
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    with Machine(config.stash[_IMAGES][_for_arch(config, system)], folder.resolve()) as machine:
+        yield machine
 
 
 @pytest.fixture(scope="session")
 def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
-    """Booted once, with a webcam, an HDMI grabber behind an HDMI output, and an I2C bus with a chip at 0x28."""
-    shutil.rmtree(RESULTS, ignore_errors=True)
-    RESULTS.mkdir(parents=True)
-    try:
-        started = Machine(pytestconfig.stash[_IMAGE], RESULTS.resolve())
-    except MachineError as error:
-        if os.environ.get(WHERE_POSSIBLE):
-            pytest.exit(f"hil: the machine does not start here, so nothing is shown: {error}", 0)
-        raise
-    with started as booted:
-        booted.run(f"modprobe vivid {CAMERAS} && modprobe i2c-stub chip_addr=0x28 && udevadm settle")
-        pytestconfig.stash[_MACHINE] = booted
-        yield booted
+    """Booted once: a webcam, an HDMI grabber behind an output, a multi-planar camera, an I2C bus, a chip at 0x28."""
+    with booted(pytestconfig, DEBIAN_12, RESULTS) as running:
+        running.run(f"modprobe vivid {CAMERAS} && modprobe i2c-stub chip_addr=0x28 && udevadm settle")
+        yield running
 
 
 @pytest.fixture(scope="session")
@@ -66,8 +86,9 @@ def daemon(machine: Machine, subscriber: Subscriber) -> Daemon:
 
 
 @pytest.fixture(autouse=True)
-def begun_s(machine: Machine) -> float:
+def begun_s(machine: Machine, pytestconfig: pytest.Config) -> float:
     """The machine's uptime when a scenario begins."""
+    pytestconfig.stash[_MACHINE] = machine
     return machine.uptime_s()
 
 

@@ -10,7 +10,7 @@ from hil_mocks.vm.machine import Machine, MachineError
 from lcf_edge.cdr import decode_diagnostics, decode_scene
 from lcf_edge.config import Zenoh
 from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import close_session, open_session
 
 CONFIGURATION = "/etc/lcf-edge/config.toml"
@@ -24,7 +24,7 @@ fps = 5.0
 corners_target = 150
 """  # light enough for a processor that is emulated
 LISTENS = '\n[zenoh]\nlisten = ["tcp/0.0.0.0:7447"]\n'
-USUAL = WEBCAM + LISTENS
+DEFAULT_SETTINGS = WEBCAM + LISTENS
 UNIT = "lcf-edge"
 STATE = "/var/lib/private/lcf-edge"
 PATIENCE_S = 150.0
@@ -99,7 +99,7 @@ class Daemon:
         self.machine.run(f"cp /mnt/config.toml {CONFIGURATION}.new && mv {CONFIGURATION}.new {CONFIGURATION}")
 
     def start(self, config: str) -> None:
-        """Start it anew; answers when it is ready. Raises ``MachineError``."""
+        """Start it anew. Return when it is ready. Raises ``MachineError``."""
         self.configure(config)
         self.subscriber.statuses = {}
         self.machine.run(f"systemctl reset-failed {UNIT}; systemctl restart {UNIT}", PATIENCE_S)

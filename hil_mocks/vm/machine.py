@@ -5,22 +5,43 @@ import socket
 import subprocess
 import time
 from contextlib import ExitStack
+from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 
 import msgspec
 
 from hil_mocks.vm.guest.agent import Command, Outcome
-from hil_mocks.vm.image import Image
+from hil_mocks.vm.image import HERE, Image
 from lcf_edge.errors import LcfError
 
-QEMU = "qemu-system-x86_64"
-BOOTS_S = 240.0
+BOOTS_S = 600.0
 PROBE_S = 10.0
 ENDS_S = 30.0
 REPLY_S = 20.0  # beyond a command's own time
 ZENOH_PORT = 7447  # in the guest
 MEMORY_MIB, PROCESSORS = 1024, 2
+KERNEL = "root=/dev/vda ro quiet panic=-1 net.ifnames=0 systemd.show_status=0"  # its command line
+EMULATED = "tcg,thread=multi"
+
+
+@dataclass(frozen=True, slots=True)
+class Board:
+    """What qemu makes of a processor: its program, its options with a USB controller, and the console's name there."""
+
+    qemu: str
+    options: tuple[str, ...]
+    console: str
+
+
+BOARDS = {
+    "x86_64": Board("qemu-system-x86_64", ("-cpu", "max", "-usb"), "ttyS0"),
+    "aarch64": Board(
+        "qemu-system-aarch64",
+        ("-machine", "virt,gic-version=3", "-cpu", "cortex-a72", "-device", "qemu-xhci"),  # a Raspberry Pi 4's cores
+        "ttyAMA0",
+    ),
+}
 
 
 class MachineError(LcfError):
@@ -55,13 +76,13 @@ class Machine:
             self._resources = resources.pop_all()
 
     def _command(self, image: Image) -> list[str]:
+        board = BOARDS[image.processor]
         return [
-            QEMU,
-            *("-accel", _accelerator(), "-cpu", "max"),
+            *(board.qemu, "-accel", _accelerator(image), *board.options),
             *("-m", str(MEMORY_MIB), "-smp", str(PROCESSORS)),
             *("-display", "none", "-monitor", "none", "-no-reboot", "-serial", f"file:{self.folder / 'console.txt'}"),
             *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
-            *("-append", "root=/dev/vda ro console=ttyS0 quiet panic=-1 net.ifnames=0 systemd.show_status=0"),
+            *("-append", f"console={board.console} {KERNEL}"),
             *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
             *("-nic", f"user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
             *("-virtfs", f"local,path={self.share},mount_tag=share,security_model=none"),
@@ -72,7 +93,7 @@ class Machine:
                 f"socket,id=agent,path={self._agent_path},server=on,wait=off",
             ),
             *("-device", "virtserialport,chardev=agent,name=hil"),
-            *("-usb", "-chardev", f"socket,id=imu,path={self._imu_path},server=on,wait=off"),
+            *("-chardev", f"socket,id=imu,path={self._imu_path},server=on,wait=off"),
             *("-device", "usb-serial,chardev=imu,always-plugged=on"),
         ]
 
@@ -160,16 +181,26 @@ class Machine:
         return " | ".join(" ".join(text.split()) for text in said)
 
 
-def _accelerator() -> str:
-    """KVM where a processor can be set up with it, else emulation."""
-    probe = (QEMU, "-accel", "kvm", "-cpu", "max", "-display", "none", "-nodefaults", "-S", "-monitor", "stdio")
+def _accelerator(image: Image) -> str:
+    """KVM where the kernel runs to its end with it (here: no disk, so it stops and the machine goes), else emulation.
+
+    A nested KVM may set up a processor and then never run it.
+    """
+    if image.processor != HERE:
+        return EMULATED
+    bare = ("-display", "none", "-nodefaults", "-monitor", "none", "-no-reboot", "-m", "256")
+    boots = ("-kernel", str(image.kernel), "-append", "panic=-1")
+    probe = (BOARDS[HERE].qemu, "-accel", "kvm", "-cpu", "max", *bare, *boots)
     try:
         works = (
-            subprocess.run(probe, check=False, input=b"quit\n", capture_output=True, timeout=PROBE_S).returncode == 0
+            subprocess.run(
+                probe, check=False, stdin=subprocess.DEVNULL, capture_output=True, timeout=PROBE_S
+            ).returncode
+            == 0
         )
     except subprocess.TimeoutExpired:
         works = False
-    return "kvm" if works else "tcg,thread=multi"
+    return "kvm" if works else EMULATED
 
 
 def _logged_s(line: str) -> float:

@@ -12,7 +12,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from lcf_edge.calibrate.image_rotation import Turn
 from lcf_edge.calibrate.result import CalibrationError
 from lcf_edge.calibrate.rotations import best_rotation
@@ -21,18 +21,18 @@ Floats = npt.NDArray[np.float64]
 
 SEARCH_S = 0.5  # to both sides
 
-_LEAST_TURNS = 40
+_MIN_TURNS = 40
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _FINE_REACH_S = 0.02
 _RIVAL_FROM_S = 0.1  # of the best offset: nearer, the correlation has not come down yet
 _ITERATIONS = 3
-_LARGEST_SIGMA_RADPS = 0.5  # of an interval; its corners told nothing
-_LEAST_CORRELATION = 0.8
-_LEAST_RATE_RADPS = 0.1  # root mean square
+_MAX_SIGMA_RADPS = 0.5  # of an interval; its corners told nothing
+_MIN_CORRELATION = 0.8
+_MIN_RATE_RADPS = 0.1  # root mean square
 _OUTLIER = 3.0  # times the median error
 _RIVAL = 0.97  # of the best correlation, somewhere else
-_MOST_SATURATED = 0.01  # of the samples
+_MAX_SATURATED = 0.01  # of the samples
 
 
 @dataclass(frozen=True)
@@ -160,10 +160,10 @@ class _Comparison:
 
 def align(turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float = 0.0) -> Alignment:
     """The alignment, searched within ``SEARCH_S`` of ``around_s``. Raises ``CalibrationError``."""
-    turns = [turn for turn in turns if turn.sigma_radps < _LARGEST_SIGMA_RADPS]
+    turns = [turn for turn in turns if turn.sigma_radps < _MAX_SIGMA_RADPS]
     _refuse_few(turns, samples)
     both = _Comparison(turns, samples, around_s)
-    if len(both.camera) < _LEAST_TURNS:
+    if len(both.camera) < _MIN_TURNS:
         raise CalibrationError(
             "camera and imu: their stamps hardly overlap; take more seconds, or set imu.time_offset_s nearer"
         )
@@ -195,13 +195,13 @@ def align(turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float =
 
 
 def _refuse_few(turns: Sequence[Turn], samples: Sequence[ImuSample]) -> None:
-    if len(turns) < _LEAST_TURNS or len(samples) < _LEAST_TURNS:
+    if len(turns) < _MIN_TURNS or len(samples) < _MIN_TURNS:
         raise CalibrationError(
             f"camera and imu: rotation seen in {len(turns)} intervals between pictures, {len(samples)} inertial "
-            f"samples; {_LEAST_TURNS} of each are needed: take more seconds, and look at something with corners"
+            f"samples; {_MIN_TURNS} of each are needed: take more seconds, and look at something with corners"
         )
     saturated = sum(sample.saturated for sample in samples)
-    if saturated > _MOST_SATURATED * len(samples):
+    if saturated > _MAX_SATURATED * len(samples):
         raise CalibrationError(
             f"imu: {saturated} of {len(samples)} samples were at the end of the range; turn more slowly, or raise "
             "imu.gyro_range_dps"
@@ -210,18 +210,18 @@ def _refuse_few(turns: Sequence[Turn], samples: Sequence[ImuSample]) -> None:
 
 def _refuse_still(rates: Floats) -> None:
     moving_radps = float(np.sqrt(((rates - rates.mean(axis=0)) ** 2).sum(axis=1).mean()))
-    if moving_radps < _LEAST_RATE_RADPS:
+    if moving_radps < _MIN_RATE_RADPS:
         raise CalibrationError(
-            f"imu: it turned too little, {moving_radps:.3f} rad/s (root mean square), {_LEAST_RATE_RADPS:g} are "
+            f"imu: it turned too little, {moving_radps:.3f} rad/s (root mean square), {_MIN_RATE_RADPS:g} are "
             "needed; turn to and fro, briskly and unevenly"
         )
 
 
 def _refuse_doubtful(offsets_s: Floats, correlations: Floats, best: int, around_s: float) -> None:
-    if correlations[best] < _LEAST_CORRELATION:
+    if correlations[best] < _MIN_CORRELATION:
         raise CalibrationError(
             f"camera and imu: their rotations do not agree (correlation {correlations[best]:.2f}, "
-            f"{_LEAST_CORRELATION:g} is needed); turn in place before something far away and still, with good light"
+            f"{_MIN_CORRELATION:g} is needed); turn in place before something far away and still, with good light"
         )
     if best in {0, len(offsets_s) - 1}:
         raise CalibrationError(

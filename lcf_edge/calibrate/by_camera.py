@@ -11,8 +11,8 @@ from lcf_edge.calibrate.sources import Source
 from lcf_edge.calibrate.time_offset import guessed, painter
 from lcf_edge.config import Config
 
-_LARGEST_SIGMA_RAD = np.radians(1.0)
-_LARGEST_LAG_S = 0.01  # that the configuration does not know of
+_MAX_SIGMA_RAD = np.radians(1.0)
+_MAX_LAG_S = 0.01  # that the configuration does not know of
 
 
 def calibrate_by_camera(source: Source, config: Config, seconds: float | None, snap_rad: float, guide: Guide) -> Result:
@@ -24,7 +24,7 @@ def axes_of(seen: Watched, config: Config, snap_rad: float) -> Result:
     """``imu.axes`` from what was watched. Raises ``CalibrationError``."""
     alignment = align(seen.turns, seen.samples, config.imu.time_offset_s)
     sigma_rad = alignment.axes_sigma_rad
-    if sigma_rad > _LARGEST_SIGMA_RAD:
+    if sigma_rad > _MAX_SIGMA_RAD:
         turned = dict(zip(("x: nod", "y: turn", "z: roll"), alignment.rates_radps.tolist(), strict=True))
         least = sorted(turned, key=lambda axis: turned[axis])[:2]
         raise CalibrationError(
@@ -43,7 +43,7 @@ def axes_of(seen: Watched, config: Config, snap_rad: float) -> Result:
         + " rad/s (learnt while it runs)",
         *guessed(seen),
     )
-    if abs(alignment.offset_s - config.imu.time_offset_s) > _LARGEST_LAG_S:
+    if abs(alignment.offset_s - config.imu.time_offset_s) > _MAX_LAG_S:
         lag_ms = 1000 * alignment.offset_s
         findings += (f"the clocks are {lag_ms:.0f} ms apart, which is not configured: run lcf-edge calibrate time",)
     return axes_result(axes, findings, {}, config, painter(alignment))

@@ -8,12 +8,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.calibrate import report
-from lcf_edge.calibrate.board import Board, Sighting
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
 from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.target import Sighting, Target
 from lcf_edge.calibrate.views import CELLS, Views
 from lcf_edge.lens import Lens
 
@@ -24,18 +24,18 @@ Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.float32]
 Model = Literal["radial-tangential", "equidistant"]
 
-LEAST_VIEWS = 8
+MIN_VIEWS = 8
 
-_MOST_LEFT_OUT = 0.25  # of the views, as outliers
+_MAX_LEFT_OUT = 0.25  # of the views, as outliers
 _OUTLIER = 3.0  # times the median error of a view
 _OUTLIER_PX = 0.3
-_LARGEST_ERROR_PX = 1.0
-_LARGEST_FOCAL_SIGMA = 0.005  # of the focal length
-_LARGEST_CENTRE_SIGMA = 0.005  # of the picture's width
-_LEAST_COVERAGE = 0.5  # of the cells
-_LEAST_SPREAD = 0.2  # of width and height, of the middles of the board
-_LEAST_TILT_RAD = np.radians(15)
-_LEAST_TILTED = 3  # views
+_MAX_ERROR_PX = 1.0
+_MAX_FOCAL_SIGMA = 0.005  # of the focal length
+_MAX_CENTRE_SIGMA = 0.005  # of the picture's width
+_MIN_COVERAGE = 0.5  # of the cells
+_MIN_SPREAD = 0.2  # of width and height, of the middles of the board
+_MIN_TILT_RAD = np.radians(15)
+_MIN_TILTED = 3  # views
 
 
 @dataclass(frozen=True)
@@ -59,13 +59,13 @@ class Solution:
         return float(np.sqrt((np.concatenate(self.residuals) ** 2).sum(axis=1).mean()))
 
 
-def calibrate_camera(source: Source, board: Board, model: Model, wanted: int, guide: Guide) -> Result:
+def calibrate_camera(source: Source, board: Target, model: Model, wanted: int, guide: Guide) -> Result:
     """Lens by ``wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
     views = collect(source, board, wanted, guide)
     return solve(views, model)
 
 
-def collect(source: Source, board: Board, wanted: int, guide: Guide) -> Views:
+def collect(source: Source, board: Target, wanted: int, guide: Guide) -> Views:
     """Views of the board, with prompts where it should be held."""
     views = Views(board, source.film)
     if source.live:
@@ -99,7 +99,7 @@ def solve(views: Views, model: Model) -> Result:
     solution = fit(kept, views.board, views.size, model)
     limit = max(_OUTLIER * float(np.median(solution.errors_px)), _OUTLIER_PX)
     good = solution.errors_px <= limit
-    if not good.all() and np.count_nonzero(~good) <= _MOST_LEFT_OUT * len(kept) and good.sum() >= LEAST_VIEWS:
+    if not good.all() and np.count_nonzero(~good) <= _MAX_LEFT_OUT * len(kept) and good.sum() >= MIN_VIEWS:
         dropped = int(np.count_nonzero(~good))
         kept = [view for view, is_good in zip(kept, good, strict=True) if is_good]
         solution = fit(kept, views.board, views.size, model)
@@ -109,40 +109,40 @@ def solve(views: Views, model: Model) -> Result:
 
 def refuse_poor(views: Views) -> None:
     """Views that cannot tell a lens. Raises ``CalibrationError``."""
-    if len(views.kept) < LEAST_VIEWS:
+    if len(views.kept) < MIN_VIEWS:
         reasons = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common(3)) or "no pictures"
         raise CalibrationError(
-            f"camera: {len(views.kept)} usable views of {views.board.name}, at least {LEAST_VIEWS} are needed "
+            f"camera: {len(views.kept)} usable views of {views.board.name}, at least {MIN_VIEWS} are needed "
             f"(left out: {reasons}); check --board, light and focus, and show it from more sides"
         )
     middles = np.array([view.corners.mean(axis=0) for view in views.kept]) / views.size
     spread = np.ptp(middles, axis=0)
-    if spread.min() < _LEAST_SPREAD:
+    if spread.min() < _MIN_SPREAD:
         way = ("from left to right", "up and down")[int(np.argmin(spread))]
         raise CalibrationError(f"camera: the board was always in one place; move it {way} through the whole picture")
     share = float(views.covered().mean())
-    if share < _LEAST_COVERAGE:
+    if share < _MIN_COVERAGE:
         raise CalibrationError(
-            f"camera: corners were seen in {share:.0%} of the picture, {_LEAST_COVERAGE:.0%} are needed; hold the "
+            f"camera: corners were seen in {share:.0%} of the picture, {_MIN_COVERAGE:.0%} are needed; hold the "
             "board nearer, and into the picture's corners"
         )
 
 
 def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
     """A lens that does not follow from the views. Raises ``CalibrationError``."""
-    if not solution.error_px < _LARGEST_ERROR_PX:
+    if not solution.error_px < _MAX_ERROR_PX:
         raise CalibrationError(
             f"camera: corners are {solution.error_px:.2f} px from where a {model} lens would put them; check that the "
             "board is flat and --board right, or try the other --model"
         )
-    tilted = int(np.count_nonzero(solution.tilts_rad > _LEAST_TILT_RAD))
-    if tilted < _LEAST_TILTED:
+    tilted = int(np.count_nonzero(solution.tilts_rad > _MIN_TILT_RAD))
+    if tilted < _MIN_TILTED:
         raise CalibrationError(
-            f"camera: the board was tilted in {tilted} views, {_LEAST_TILTED} are needed to tell the focal length; "
+            f"camera: the board was tilted in {tilted} views, {_MIN_TILTED} are needed to tell the focal length; "
             "tilt it by 30 to 45° to each side"
         )
     focal, centre = solution.sigma[:2] / solution.intrinsics[:2], solution.sigma[2:4] / views.size[0]
-    if focal.max() > _LARGEST_FOCAL_SIGMA or centre.max() > _LARGEST_CENTRE_SIGMA:
+    if focal.max() > _MAX_FOCAL_SIGMA or centre.max() > _MAX_CENTRE_SIGMA:
         raise CalibrationError(
             f"camera: the focal length is only known to {focal.max():.1%}, the centre to "
             f"{solution.sigma[2:4].max():.1f} px; take more views, nearer and more tilted"
@@ -158,7 +158,7 @@ def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
         )
 
 
-def fit(kept: list[Sighting], board: Board, size: tuple[int, int], model: Model) -> Solution:
+def fit(kept: list[Sighting], board: Target, size: tuple[int, int], model: Model) -> Solution:
     """Least squares of all corners. Raises ``CalibrationError``."""
     places = [board.places[view.numbers] for view in kept]
     corners = [view.corners for view in kept]

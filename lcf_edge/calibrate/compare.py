@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame, ImuSample
+from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.image_rotation import Turn, turn
 from lcf_edge.calibrate.sources import Source, for_a_while

@@ -45,7 +45,7 @@ def write(path: Path, table: str, values: Mapping[str, Value]) -> None:
     except OSError as error:
         raise ConfigError(f"{path}: cannot be written ({error.strerror}); use sudo, or name another file") from error
     except (TOMLKitError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: not valid TOML ({error}); mend it first") from error
+        raise ConfigError(f"{path}: not valid TOML ({error}); fix it first") from error
 
 
 def _replace(target: Path, text: str) -> None:

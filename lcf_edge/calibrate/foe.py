@@ -14,7 +14,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.compare import lens_of
 from lcf_edge.calibrate.guide import Guide
@@ -32,19 +32,19 @@ Floats = npt.NDArray[np.float64]
 
 LIVE_S = 20.0
 
-_LEAST_MOTION_PX = 4.0
-_MOST_FRAMES = 5
-_LEAST_INTERVALS = 12
-_LEAST_PARALLAX_RAD = 0.004  # median flow that rotation does not explain: else it stands still
+_MIN_MOTION_PX = 4.0
+_MAX_FRAMES = 5
+_MIN_INTERVALS = 12
+_MIN_PARALLAX_RAD = 0.004  # median flow that rotation does not explain: else it stands still
 _STRAIGHT_RADPS = 0.06  # mean over _STRAIGHT_S
 _STRAIGHT_S = 1.0
-_LEAST_STRAIGHT = 0.6  # of the intervals
+_MIN_STRAIGHT = 0.6  # of the intervals
 _ITERATIONS = 12
 _SCALE_SHARES = (8.0, 4.0, 2.0)  # of the robust fit, from coarse to fine
-_LEAST_SCALE = 1e-4
-_LARGEST_SLOPE = 1.0  # of the direction of travel; beyond it lies outside of most pictures
+_MIN_SCALE = 1e-4
+_MAX_SLOPE = 1.0  # of the direction of travel; beyond it lies outside of most pictures
 _PIECES = 5
-_LARGEST_SIGMA_RAD = np.radians(0.5)
+_MAX_SIGMA_RAD = np.radians(0.5)
 _SETTLED = 1e-6
 
 
@@ -89,7 +89,7 @@ def calibrate_foe(source: Source, config: Config, seconds: float | None, guide: 
                 raise CalibrationError(
                     "camera.intrinsics: not known, and directions need them; run lcf-edge calibrate camera first"
                 )
-            tracker = Tracker(lens, _LEAST_MOTION_PX, _MOST_FRAMES)
+            tracker = Tracker(lens, _MIN_MOTION_PX, _MAX_FRAMES)
         image = item.image
         tracks = tracker.add(item)
         if tracks is not None:
@@ -104,14 +104,14 @@ def calibrate_foe(source: Source, config: Config, seconds: float | None, guide: 
 
 def find_focus(tracked: Sequence[Tracks]) -> Focus:
     """The direction of travel of a straight drive. Raises ``CalibrationError``."""
-    if len(tracked) < _LEAST_INTERVALS:
+    if len(tracked) < _MIN_INTERVALS:
         raise CalibrationError(
-            f"camera: corners could be followed over {len(tracked)} intervals, {_LEAST_INTERVALS} are needed; drive "
+            f"camera: corners could be followed over {len(tracked)} intervals, {_MIN_INTERVALS} are needed; drive "
             "longer, with better light, past things with corners"
         )
     slope, rotations = _solve(tracked, np.zeros(2))
     straight = _straight(tracked, rotations)
-    if np.mean(straight) < _LEAST_STRAIGHT:
+    if np.mean(straight) < _MIN_STRAIGHT:
         raise CalibrationError(
             f"camera: the drive is not straight, it turned in {1 - np.mean(straight):.0%} of the time; drive straight "
             "ahead and keep your hands off the steering"
@@ -121,22 +121,22 @@ def find_focus(tracked: Sequence[Tracks]) -> Focus:
         slope, rotations = _solve(used, slope)
     place, flow = _derotated(used, rotations)
     parallax = float(np.median(np.hypot(*flow.T)))
-    if parallax < _LEAST_PARALLAX_RAD:
+    if parallax < _MIN_PARALLAX_RAD:
         raise CalibrationError(
             f"camera: next to nothing came nearer (median flow {np.degrees(parallax):.2f}° between pictures); drive "
             "faster, or past nearer things"
         )
-    if np.abs(slope).max() > _LARGEST_SLOPE:
+    if np.abs(slope).max() > _MAX_SLOPE:
         raise CalibrationError("camera: no focus of expansion before it; the camera must look ahead")
     if np.median(np.einsum("ni,ni->n", flow, place - slope)) < 0:
         raise CalibrationError("camera: the flow goes inwards, it drives backwards; drive straight ahead")
     parts = np.array_split(np.arange(len(used)), _PIECES)
     pieces = np.array([_solve([used[row] for row in part], slope)[0] for part in parts])
     sigma = pieces.std(axis=0, ddof=1) / np.sqrt(_PIECES)
-    if sigma.max() > _LARGEST_SIGMA_RAD:
+    if sigma.max() > _MAX_SIGMA_RAD:
         raise CalibrationError(
             f"camera: parts of the drive disagree by {np.degrees(sigma.max()):.1f}° (1 sigma, "
-            f"{np.degrees(_LARGEST_SIGMA_RAD):.1f}° at most); drive straighter, longer, and past still things at "
+            f"{np.degrees(_MAX_SIGMA_RAD):.1f}° at most); drive straighter, longer, and past still things at "
             "several distances"
         )
     return Focus(slope, sigma, place, flow, len(used), len(tracked) - len(used), pieces)
@@ -162,7 +162,7 @@ def _solve(used: Sequence[Tracks], slope: Floats) -> tuple[Floats, list[Floats]]
         parts = []
         for tracks, rotation in zip(used, rotations, strict=True):
             by_slope, by_rotation, errors = _linearised(tracks, rotation, slope)
-            scale = max(1.4826 * float(np.median(np.abs(errors))), _LEAST_SCALE)
+            scale = max(1.4826 * float(np.median(np.abs(errors))), _MIN_SCALE)
             weights = 1 / (1 + (errors / (share * scale)) ** 2) / scale**2
             own = np.linalg.pinv(by_rotation.T @ (by_rotation * weights[:, None]))
             cross = by_slope.T @ (by_rotation * weights[:, None])

@@ -18,7 +18,7 @@ Floats = npt.NDArray[np.float64]
 FORWARD = np.array([0.0, 0.0, 1.0])
 
 _ITERATIONS = 8
-_LEAST_SCALE = 2e-4  # of x/z: about 0.1 px
+_MIN_SCALE = 2e-4  # of x/z: about 0.1 px
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ def turn(tracks: Tracks, travel: Floats = FORWARD) -> Turn:
         slopes = motion_field(place)
         rows = np.concatenate([np.einsum("ni,nij->nj", way, slopes) for way in (across, along)])
         errors = np.concatenate([np.einsum("ni,ni->n", way, error) for way in (across, along)])
-        scale = max(1.4826 * float(np.median(np.abs(errors[: len(place)]))), _LEAST_SCALE)
+        scale = max(1.4826 * float(np.median(np.abs(errors[: len(place)]))), _MIN_SCALE)
         weights = 1 / (1 + (errors / (2 * scale)) ** 2)
         normal = rows.T @ (rows * weights[:, None])
         covariance = np.linalg.pinv(normal)

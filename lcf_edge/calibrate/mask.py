@@ -12,12 +12,12 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
 from lcf_edge.calibrate.sources import Source, for_a_while
-from lcf_edge.config import MOST_POINTS, MOST_POLYGONS, Config
+from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -29,15 +29,15 @@ Polygon = list[list[float]]
 LIVE_S = 30.0
 
 _APART_S = 0.2  # pictures that are closer tell the same again
-_LEAST_PICTURES = 20
+_MIN_PICTURES = 20
 _SMOOTH_PX = 1.0
 _STILL = 0.8  # mean gradient to the root mean square
 _TEXTURED = 6.0  # root mean square of the gradients; by Sobel's weights, 8 are one grey level a px
 _PASSES = 0.5  # of the textured pixels must move, else it stood
 _WALLED = 0.7  # of a plain surface's rim must stand still
 _CLOSED_SHARE = 0.02  # of the picture's width: gaps that are closed
-_LEAST_SHARE = 0.001  # of the picture
-_MOST_SHARE = 0.6
+_MIN_SHARE = 0.001  # of the picture
+_MAX_SHARE = 0.6
 _SMOOTHED_PX = 2.0  # by which a polygon may miss the outline
 _GROWN_PX = 2
 
@@ -107,9 +107,9 @@ def given_mask(source: Source, config: Config, polygons: Sequence[Polygon], guid
 
 def own_parts(stillness: Stillness) -> Marked:
     """What stands still, and the plain surfaces that it encloses. Raises ``CalibrationError``."""
-    if stillness.pictures < _LEAST_PICTURES:
+    if stillness.pictures < _MIN_PICTURES:
         raise CalibrationError(
-            f"camera: {stillness.pictures} pictures {_APART_S:g} s apart, {_LEAST_PICTURES} are needed; drive longer"
+            f"camera: {stillness.pictures} pictures {_APART_S:g} s apart, {_MIN_PICTURES} are needed; drive longer"
         )
     textured, still = stillness.textured(), stillness.still()
     moves = 1 - still.sum() / max(textured.sum(), 1)
@@ -118,7 +118,7 @@ def own_parts(stillness: Stillness) -> Marked:
             f"camera: only {moves:.0%} of what can be seen moved; drive past things, and turn to both sides"
         )
     own = _solid(still | _enclosed(still, ~textured))
-    if own.mean() > _MOST_SHARE:
+    if own.mean() > _MAX_SHARE:
         raise CalibrationError(
             f"camera: {own.mean():.0%} of the picture never moved; drive past things, and turn to both sides"
         )
@@ -150,7 +150,7 @@ def _solid(marked: Marked) -> Marked:
     opened = cv2.morphologyEx(closed, cv2.MORPH_OPEN, small)[reach:-reach, reach:-reach]
     count, label, stats, _ = cv2.connectedComponentsWithStats(opened)
     at_border = np.unique(np.concatenate([label[0], label[-1], label[:, 0], label[:, -1]]))
-    large = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] >= _LEAST_SHARE * width * height)
+    large = np.flatnonzero(stats[:, cv2.CC_STAT_AREA] >= _MIN_SHARE * width * height)
     return np.isin(label, np.intersect1d(large, at_border[at_border > 0])) if count > 1 else np.zeros_like(marked)
 
 
@@ -159,7 +159,7 @@ def outlines(own: Marked) -> list[Polygon]:
     grown = cv2.dilate(own.astype(np.uint8), np.ones((2 * _GROWN_PX + 1,) * 2, np.uint8))
     found, _ = cv2.findContours(grown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     simple = [cv2.approxPolyDP(each, _SMOOTHED_PX, True)[:, 0] for each in sorted(found, key=cv2.contourArea)[::-1]]
-    return [each.astype(float).tolist() for each in simple if 3 <= len(each) <= MOST_POINTS][:MOST_POLYGONS]
+    return [each.astype(float).tolist() for each in simple if 3 <= len(each) <= MAX_POINTS][:MAX_POLYGONS]
 
 
 def _result(polygons: Sequence[Polygon], image: Grey, config: Config, findings: tuple[str, ...]) -> Result:

@@ -12,7 +12,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.axes import axes_result, snapped
 from lcf_edge.calibrate.guide import Guide
@@ -34,8 +34,8 @@ _STILL_GYRO_RADPS = 0.06
 _STILL_GYRO_STD_RADPS = 0.05
 _STILL_ACCEL_STD_MPS2 = 0.4
 _LEVEL_RAD = np.radians(10)
-_MOST_SATURATED_S = 0.02
-_LARGEST_MISFIT_RAD = np.radians(25)
+_MAX_SATURATED_S = 0.02
+_MAX_MISFIT_RAD = np.radians(25)
 _UP_WEIGHT = 4.0  # gravity is better known than a hand's axis
 
 
@@ -133,7 +133,7 @@ class Motions:
         dt_s = (now.stamp_ns - before.stamp_ns) * 1e-9
         if now.saturated:
             self._saturated_s += dt_s
-            if self._saturated_s > _MOST_SATURATED_S:
+            if self._saturated_s > _MAX_SATURATED_S:
                 raise CalibrationError(
                     f"imu: the gyro was at the end of its range ({self.name}); move more slowly, or raise "
                     "imu.gyro_range_dps"
@@ -212,7 +212,7 @@ def axes_of(rest: Rest, turns: dict[str, Floats]) -> tuple[Floats, dict[str, flo
     names = ["up", *turns]
     misfits = {name: _between(axes @ here, there) for name, (there, here, _) in zip(names, pairs, strict=True)}
     worst = max(misfits, key=lambda name: misfits[name])
-    if misfits[worst] > _LARGEST_MISFIT_RAD:
+    if misfits[worst] > _MAX_MISFIT_RAD:
         raise CalibrationError(
             f"imu: the motions contradict each other ({worst} is {np.degrees(misfits[worst]):.0f}° off); one went the "
             "other way or askew, or the gyro's axes are not the accelerometer's: try again, one axis at a time"

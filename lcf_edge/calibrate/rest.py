@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
 from lcf_edge.calibrate.sources import Source, for_a_while
 from lcf_edge.config import Config, Vehicle
-from lcf_edge.ego_motion import EgoMotionEstimator
+from lcf_edge.ego_motion.estimator import EgoMotionEstimator
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -24,8 +24,8 @@ Floats = npt.NDArray[np.float64]
 LIVE_S = 10.0
 GRAVITY_MPS2 = 9.81
 
-_LEAST_S = 3.0
-_LEAST_SAMPLES = 100
+_MIN_S = 3.0
+_MIN_SAMPLES = 100
 _PIECE_S = 0.5
 _MOVED_RADPS = 0.02  # the mean of a piece off that of all
 _MOVED_MPS2 = 0.2
@@ -33,7 +33,7 @@ _QUIET_RADPS = 0.05  # 1 sigma of a sample; more is no noise
 _QUIET_MPS2 = 0.5
 _GRAVITY_ERROR = 0.08  # more, and the daemon does not believe that it stands
 _GRAVITY_DOUBT = 0.02
-_LEAST_NOISE_RADPS = 0.001
+_MIN_NOISE_RADPS = 0.001
 _FRAME_NS = 50_000_000
 
 
@@ -61,7 +61,7 @@ class Rest:
     @property
     def gyro_noise_radps(self) -> float:
         """``imu.gyro_noise_radps``: of its worst axis, noise and wander together, two digits, rounded up."""
-        worst = max(float(np.hypot(self.noise_radps, self.wander_radps).max()), _LEAST_NOISE_RADPS)
+        worst = max(float(np.hypot(self.noise_radps, self.wander_radps).max()), _MIN_NOISE_RADPS)
         step = 10.0 ** (np.floor(np.log10(worst)) - 1)
         return float(f"{ceil(worst / step - 1e-6) * step:.2g}")
 
@@ -97,9 +97,9 @@ def calibrate_rest(source: Source, seconds: float | None, guide: Guide) -> Resul
 def measure(samples: Sequence[ImuSample]) -> Rest:
     """What samples at rest tell. Raises ``CalibrationError`` when they were not at rest, or are too few."""
     seconds = (samples[-1].stamp_ns - samples[0].stamp_ns) * 1e-9 if samples else 0.0
-    if seconds < _LEAST_S or len(samples) < _LEAST_SAMPLES:
+    if seconds < _MIN_S or len(samples) < _MIN_SAMPLES:
         raise CalibrationError(
-            f"imu: {len(samples)} samples in {seconds:.1f} s; {_LEAST_SAMPLES} in {_LEAST_S:g} s are needed at least"
+            f"imu: {len(samples)} samples in {seconds:.1f} s; {_MIN_SAMPLES} in {_MIN_S:g} s are needed at least"
         )
     if any(sample.saturated for sample in samples):
         raise CalibrationError("imu: samples at the end of its range while at rest; check wiring, chip and ranges")

@@ -1,4 +1,4 @@
-"""What a calibration answers with, and how it refuses."""
+"""What a calibration returns, and how it refuses."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

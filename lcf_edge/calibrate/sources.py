@@ -14,20 +14,20 @@ import msgspec
 
 from drivers.device import Device
 from drivers.errors import DriverError
-from drivers.records import Frame, ImuSample
+from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.config import Config
 from lcf_edge.devices import open_camera, open_imu
 from lcf_edge.errors import ConfigError, RecordingError
 from lcf_edge.lens import Lens
-from lcf_edge.recordings import open_recording
-from lcf_edge.recordings.pictures import PictureFolder
+from lcf_edge.recording.read import open_recording
+from lcf_edge.recording.read.pictures import PictureFolder
 
 Item = Frame | ImuSample
 
 _AS_IT_COMES = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
 _HELD = 512
-_LONGEST_CLOSE_S = 2.0
+_MAX_CLOSE_S = 2.0
 _POLL_S = 0.2
 
 
@@ -155,4 +155,4 @@ def _merged(devices: list[Device[Any]]) -> Iterator[Item]:
     finally:
         ended.set()
         for thread in threads:
-            thread.join(_LONGEST_CLOSE_S)
+            thread.join(_MAX_CLOSE_S)

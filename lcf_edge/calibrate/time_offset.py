@@ -16,14 +16,14 @@ from lcf_edge.config import Config
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-_LARGEST_SIGMA_S = 0.004
+_MAX_SIGMA_S = 0.004
 
 
 def calibrate_time(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``imu.time_offset_s``. Raises ``CalibrationError``."""
     seen = watch(source, config, seconds, guide)
     alignment = align(seen.turns, seen.samples, config.imu.time_offset_s)
-    if alignment.offset_sigma_s > _LARGEST_SIGMA_S:
+    if alignment.offset_sigma_s > _MAX_SIGMA_S:
         raise CalibrationError(
             f"camera and imu: the offset is only known to {1000 * alignment.offset_sigma_s:.1f} ms; turn more briskly, "
             "or for more seconds"

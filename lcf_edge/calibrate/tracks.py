@@ -7,19 +7,19 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.lens import Lens
 
 Floats = npt.NDArray[np.float64]
 Pixels = npt.NDArray[np.float32]
 
 _CORNERS = 400
-_LEAST_TRACKS = 25
-_LEAST_CORNER_PX = 8.0
+_MIN_TRACKS = 25
+_MIN_CORNER_PX = 8.0
 _THERE_AND_BACK_PX = 0.7
 _WINDOW_PX = (21, 21)
 _LEVELS = 4
-_LONGEST_S = 0.5  # between two pictures
+_MAX_S = 0.5  # between two pictures
 
 
 @dataclass(frozen=True)
@@ -54,19 +54,19 @@ class Tracker:
         self._frames = 0
 
     def add(self, frame: Frame) -> Tracks | None:
-        """Follow into ``frame``; answers with the interval that ends here, if one does."""
+        """Follow into ``frame``. Return the interval that ends here, if one does."""
         last, self._last = self._last, frame
         if self._first is None or last is None:
             self._begin(frame)
             return None
         dt_s = (frame.stamp_ns - last.stamp_ns) * 1e-9
-        if not 0 < dt_s <= _LONGEST_S:
+        if not 0 < dt_s <= _MAX_S:
             self.left_out["pictures too far apart"] += 1
             self._begin(frame)
             return None
         self._follow(last, frame)
         self._frames += 1
-        if len(self._now) < _LEAST_TRACKS:
+        if len(self._now) < _MIN_TRACKS:
             self.left_out["too few corners"] += 1
             self._begin(frame)
             return None
@@ -79,7 +79,7 @@ class Tracker:
 
     def _begin(self, frame: Frame) -> None:
         self._first, self._frames = frame, 0
-        found = np.asarray(cv2.goodFeaturesToTrack(frame.image, _CORNERS, 0.01, _LEAST_CORNER_PX))
+        found = np.asarray(cv2.goodFeaturesToTrack(frame.image, _CORNERS, 0.01, _MIN_CORNER_PX))
         self._start = self._now = (found if found.ndim == 3 else np.empty(0)).astype(np.float32).reshape(-1, 2)
 
     def _follow(self, last: Frame, frame: Frame) -> None:

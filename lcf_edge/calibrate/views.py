@@ -7,18 +7,18 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
-from drivers.records import Frame
-from lcf_edge.calibrate.board import Board, Sighting
+from drivers.samples import Frame
+from lcf_edge.calibrate.target import Sighting, Target
 
 Floats = npt.NDArray[np.float64]
 
 CELLS = (8, 6)  # across and down, of the coverage
 
-_LARGEST_EDGE_PX = 5.0
-_LARGEST_MOTION_PX = 1.0  # between two pictures of a film
-_LONGEST_INTERVAL_S = 1.0  # finding a board takes a small computer most of that
-_LEAST_NEWS = 0.08  # of the picture's width, that the board's corners are from where they were in any other view
-_LEAST_NEWS_OF_PICTURES = 0.01  # somebody chose these
+_MAX_EDGE_PX = 5.0
+_MAX_MOTION_PX = 1.0  # between two pictures of a film
+_MAX_INTERVAL_S = 1.0  # finding a board takes a small computer most of that
+_MIN_CORNER_SHIFT = 0.08  # of the picture's width, that the board's corners are from where they were in any other view
+_MIN_CORNER_SHIFT_OF_PICTURES = 0.01  # somebody chose these
 _SIDES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 _TILTED = 1.12  # ratio of opposite sides
 _WANTED_TILTED = 0.5  # share of the views
@@ -31,7 +31,7 @@ class Views:
     ``film``: pictures follow each other closely, so that a board in motion is seen to move.
     """
 
-    board: Board
+    board: Target
     film: bool
     kept: list[Sighting] = field(default_factory=list)
     left_out: Counter[str] = field(default_factory=Counter)
@@ -40,7 +40,7 @@ class Views:
     _before: tuple[int, Sighting] | None = None
 
     def consider(self, frame: Frame) -> str:
-        """Keep the board in ``frame``, or answer with the reason why not; "" when it is kept."""
+        """Keep the board in ``frame``, or return the reason why not; "" when it is kept."""
         self.size = frame.image.shape[1], frame.image.shape[0]
         seen = self.board.find(frame.image)
         before, self._before = self._before, None if seen is None else (frame.stamp_ns, seen)
@@ -50,7 +50,7 @@ class Views:
         return reason
 
     def _flaw(self, seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> str:
-        if seen.edge_px > _LARGEST_EDGE_PX:
+        if seen.edge_px > _MAX_EDGE_PX:
             return "blurred"
         if self.film and not _stands(seen, before, stamp_ns):
             return "moving"
@@ -58,7 +58,7 @@ class Views:
         if outline is None:
             return "too few corners"
         news = min((np.hypot(*(outline - other).T).mean() for other in self._outlines), default=np.inf)
-        if news < (_LEAST_NEWS if self.film else _LEAST_NEWS_OF_PICTURES) * self.size[0]:
+        if news < (_MIN_CORNER_SHIFT if self.film else _MIN_CORNER_SHIFT_OF_PICTURES) * self.size[0]:
             return "seen like this before"
         self.kept.append(seen)
         self._outlines.append(outline)
@@ -100,11 +100,11 @@ class Views:
 
 def _stands(seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
     """Whether the corners are where they were in the picture before."""
-    if before is None or stamp_ns - before[0] > _LONGEST_INTERVAL_S * 1e9:
+    if before is None or stamp_ns - before[0] > _MAX_INTERVAL_S * 1e9:
         return False
     _, now, then = np.intersect1d(seen.numbers, before[1].numbers, return_indices=True)
     moved = seen.corners[now] - before[1].corners[then]
-    return bool(len(moved)) and float(np.median(np.hypot(*moved.T))) < _LARGEST_MOTION_PX
+    return bool(len(moved)) and float(np.median(np.hypot(*moved.T))) < _MAX_MOTION_PX
 
 
 def _foreshortening(outline: Floats) -> float:

@@ -22,7 +22,7 @@ class Backlog(Generic[Item]):
         self._changed = threading.Condition()
 
     def put(self, item: Item, size_bytes: int, reserve_bytes: int = 0) -> bool:
-        """Append an item if it leaves ``reserve_bytes`` free; answers whether."""
+        """Append an item if it leaves ``reserve_bytes`` free. Return whether."""
         with self._changed:
             fits = not self._items or self.bytes + size_bytes <= self.limit_bytes - reserve_bytes
             if fits:

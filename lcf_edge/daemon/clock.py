@@ -3,22 +3,12 @@
 import threading
 import time
 from collections.abc import Callable
-from datetime import UTC, datetime, timedelta
 
 STEP_NS = 1_000_000
 """The two clocks run at one rate; a difference between them that changes by more is a step."""
 
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-_LAST_S = (datetime.max.replace(tzinfo=UTC) - _EPOCH) // timedelta(seconds=1)
-_FIRST_S = (datetime.min.replace(tzinfo=UTC) - _EPOCH) // timedelta(seconds=1)
-
 _TRIES = 5
 _GOOD_BRACKET_NS = 20_000
-
-
-def utc(system_ns: int) -> datetime:
-    """A time of the system clock as a date, to the second; beyond the years 1 to 9999 the nearest of them."""
-    return _EPOCH + timedelta(seconds=min(max(system_ns // 1_000_000_000, _FIRST_S), _LAST_S))
 
 
 class StoppableClock:

@@ -2,9 +2,9 @@
 
 from collections.abc import Iterator
 
-from drivers.records import Frame
+from drivers.samples import Frame
 from lcf_edge.config import Config
-from lcf_edge.records import Scene
+from lcf_edge.messages import PipelineScene
 
 DARK = 25  # mean grey level of a dark picture
 _BLIND_S = 0.5  # without corners
@@ -19,23 +19,29 @@ _WORDS = {
     "speed drifts": "speed comes from the accelerometer alone and drifts",
 }
 
+_WORDS_OF_A_RECORDING = {  # which has no cable
+    "imu gap": "inertial samples are missing between two pictures of the recording, or where it begins again",
+    "gyro stuck": "the gyro of the recording repeats one value without noise: it is not used",
+}
+
 
 class Degradation:
     """Follows the scenes; ``notes``: what is wrong at present, the worst first."""
 
     def __init__(self, config: Config) -> None:
         self.notes: tuple[str, ...] = ()
+        self._words = _WORDS | (_WORDS_OF_A_RECORDING if config.imu.driver == "recording" else {})
         self._leap_px = config.filter.leap_px
         self._depth_m = config.filter.scene_depth_m
         self._last_ns: int | None = None
         self._corners_ns: int | None = None  # when there were some
 
-    def add(self, frame: Frame, scene: Scene) -> None:
+    def add(self, frame: Frame, scene: PipelineScene) -> None:
         """Take a frame and what it gave."""
         self.notes = tuple(self._found(frame, scene))
         self._last_ns = frame.stamp_ns
 
-    def _found(self, frame: Frame, scene: Scene) -> Iterator[str]:
+    def _found(self, frame: Frame, scene: PipelineScene) -> Iterator[str]:
         if scene.sizes.corners or self._corners_ns is None:
             self._corners_ns = frame.stamp_ns
         if frame.stamp_ns - self._corners_ns >= _BLIND_S * 1e9:
@@ -47,9 +53,9 @@ class Degradation:
             )
         if self._last_ns is not None:
             yield from self._too_slow(scene, (frame.stamp_ns - self._last_ns) / 1e9)
-        yield from (_WORDS[note] for note in scene.notes if note in _WORDS)
+        yield from (self._words[note] for note in scene.notes if note in self._words)
 
-    def _too_slow(self, scene: Scene, interval_s: float) -> Iterator[str]:
+    def _too_slow(self, scene: PipelineScene, interval_s: float) -> Iterator[str]:
         """What stands at ``filter.scene_depth_m`` and the edge of the picture moves x V dt / Z in a frame."""
         moved_px = scene.image_width / 2 * abs(scene.vehicle_speed) * interval_s / self._depth_m
         if moved_px > self._leap_px:  # NaN is not

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 
 RESERVED = 24
-LENT = 8  # at a time: a device or a file needs two or three
+LENT = 12  # at a time: a device or a file needs two or three, a camera of libcamera nine
 
 
 class Reserve:

@@ -6,7 +6,7 @@ from typing import Any
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import WrongDeviceError
-from drivers.records import ImuSample, SpeedSample
+from drivers.samples import ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock
 from lcf_edge.daemon.descriptors import Reserve

@@ -9,13 +9,13 @@ import msgspec
 
 from lcf_edge.cdr import CdrError
 from lcf_edge.config import Config
+from lcf_edge.config.shown import shown
 from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.log import LOGGER
-from lcf_edge.recorder.destination import MIB, Destination, Named, free_mib
-from lcf_edge.recorder.messages import PICTURES, Message
-from lcf_edge.recorder.recording_file import CHUNK_BYTES, RecordingFile
-from lcf_edge.shown_config import shown
+from lcf_edge.recording.write.destination import MIB, Destination, Named, free_mib
+from lcf_edge.recording.write.messages import PICTURES, Message
+from lcf_edge.recording.write.recording_file import CHUNK_BYTES, RecordingFile
 
 SYNC_S = 0.5
 """So much of a recording a power cut costs, and what the disk takes to write it."""

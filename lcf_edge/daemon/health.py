@@ -12,14 +12,15 @@ import msgspec
 from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Config
 from lcf_edge.daemon.board import read_board
-from lcf_edge.daemon.clock import SystemTime, utc
+from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.descriptors import Reserve
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.loop import Loop, Mail
 from lcf_edge.daemon.memory import MemoryWatch
 from lcf_edge.daemon.reader import Reader
+from lcf_edge.dates import utc
 from lcf_edge.diagnostics import DeviceStatus, Level
-from lcf_edge.records import Kind
+from lcf_edge.messages import Kind
 
 LATENCY_TURN_S = 30.0
 _SILENT_S = 1.0  # or so many intervals:
@@ -58,14 +59,14 @@ class Health:
         return [*devices, self._pipeline(config), _memory(memory), self._board(), self._published()]
 
     def line(self, memory: MemoryWatch) -> str:
-        """Rate, circles, memory, and the camera's error if it has one."""
+        """Rate, objects, circles, memory, and the camera's error if it has one."""
         camera = self._readers[0]
         scene = self._loop.scene
         rate_hz = camera.intervals.rate_hz
         what = f"{0 if math.isnan(rate_hz) else rate_hz:.1f} frames/s" if camera.away_since_ns is None else "no camera"
         if scene is not None and camera.away_since_ns is None:
             rebels = int((scene.circles["kind"] == Kind.REBEL).sum())
-            what += f", {len(scene.circles)} circles ({rebels} rebel)"
+            what += f", {len(scene.objects)} objects, {len(scene.circles)} circles ({rebels} rebel)"
         what += f", {memory.resident_mib:.0f} MiB"
         return f"{what}; {camera.error}" if camera.error else what
 
@@ -131,7 +132,10 @@ class Health:
 
     def _published(self) -> DeviceStatus:
         counts: Mapping[str, int] = {**self._link.counts, "descriptor shortages": self._reserve.shortages}
-        values = {name: str(count) for name, count in sorted(counts.items())}
+        sessions = self._link.sessions
+        values = {"sessions": str(sessions)} | {name: str(count) for name, count in sorted(counts.items())}
+        if sessions >= self._link.most_sessions:
+            return DeviceStatus("link", Level.WARN, f"{sessions} sessions: nobody else is let in", values)
         if self._reserve.short:
             return DeviceStatus("link", Level.WARN, "connections use up all file descriptors", values)
         return DeviceStatus("link", Level.OK, "open", values)

@@ -4,10 +4,10 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Protocol
 
-from drivers.records import SpeedSample
+from drivers.samples import SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 
 
 class Link(Protocol):
@@ -40,6 +40,31 @@ class Link(Protocol):
 
     def show_config(self, config: Config) -> None:
         """What to answer when somebody asks for the configuration."""
+        ...
+
+    most_sessions: int
+    """That can be at a time."""
+
+    @property
+    def sessions(self) -> int:
+        """Others that are connected now."""
+        ...
+
+    @property
+    def charged_mib(self) -> float:
+        """Growth of the process's memory that was laid to peers so far."""
+        ...
+
+    def charge(self, grown_mib: float) -> None:
+        """Lay growth since the last call to the peers that have sent something meanwhile."""
+        ...
+
+    def cut(self, charge_mib: float) -> int:
+        """Cut connections to which that much is laid. Return how many."""
+        ...
+
+    def renew(self) -> bool:
+        """Drop all that peers have declared, and everybody for a moment; False: there is no session now, call again."""
         ...
 
     def close(self) -> None:

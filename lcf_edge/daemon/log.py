@@ -16,7 +16,7 @@ LOGGER = logging.getLogger("lcf_edge")
 AT_ONCE = 5  # lines of one kind, then
 EACH_S = 10.0  # one more in this time
 KINDS = 256  # that are remembered
-LONGEST_LINE = 500  # of a library's
+MAX_LINE_CHARACTERS = 500  # of a library's
 
 _PRIORITIES = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3}
 _LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARNING, "error": logging.ERROR}
@@ -51,7 +51,7 @@ def take_over_standard_error() -> None:
 
 def _log_lines(reading: int) -> None:
     with os.fdopen(reading, encoding="utf-8", errors="backslashreplace") as lines:
-        while line := lines.readline(LONGEST_LINE):
+        while line := lines.readline(MAX_LINE_CHARACTERS):
             if line.strip():
                 LOGGER.warning("library: %s", printable(line.strip()))
 

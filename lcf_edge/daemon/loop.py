@@ -6,30 +6,25 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
 from itertools import chain
-from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+import numpy.typing as npt
 
-from drivers.records import Frame, ImuSample, SpeedSample
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock, SystemTime
 from lcf_edge.daemon.degrade import Degradation
+from lcf_edge.daemon.lenses import lens_for
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.mailbox import Newest, SampleRing
-from lcf_edge.daemon.preview import Previewer
-from lcf_edge.ego_motion import IMU_CAPACITY, SPEED_CAPACITY
+from lcf_edge.daemon.outputs import Outputs
+from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY
+from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.filter.line_circle_filter import Mounting
-from lcf_edge.gyro_bias import GyroBias
-from lcf_edge.lens import Lens
+from lcf_edge.messages import PipelineScene
 from lcf_edge.meters import DurationHistogram
-from lcf_edge.pipeline import Outcome, Pipeline
-from lcf_edge.recorder.messages import Seen
-from lcf_edge.records import Scene
-
-if TYPE_CHECKING:  # most daemons record nothing
-    from lcf_edge.daemon.recorder import Recorder
+from lcf_edge.pipeline import Pipeline
 
 FRAME_WAIT_S = 0.25  # then the loop turns without one
 IMU_WAIT_S = 4e-3  # for the sample after a frame; the last one is held beyond
@@ -47,28 +42,10 @@ class Mail:
     speeds: SampleRing[SpeedSample] = field(default_factory=lambda: SampleRing(SPEED_CAPACITY))
 
 
-def lens_for(config: Config, width: int, height: int) -> Lens:
-    """The lens of pictures of that size, by the field of view if nothing better is known. Raises ``LcfError``."""
-    return known_lens(config, width, height) or Lens.from_config(config.camera, width, height)
-
-
-def known_lens(config: Config, width: int, height: int) -> Lens | None:
-    """The calibrated lens: by the configuration, else a stand-in recording's own. Raises ``LcfError``."""
-    camera = config.camera
-    if camera.intrinsics:
-        return Lens.from_config(camera, width, height)
-    if camera.driver == "recording":
-        from lcf_edge.recordings import open_recording  # noqa: PLC0415  # a vehicle has none
-
-        recorded = open_recording(Path(camera.recording), config).lens
-        return recorded and recorded.scaled(width, height)
-    return None
-
-
 def try_out(pipeline: Pipeline, width: int, height: int) -> None:
     """Let a pipeline take some pictures of clutter that moves, as the next ones might be."""
     across, down = -(-width // CLUTTER_PX) + TRIALS, -(-height // CLUTTER_PX)
-    clutter = np.random.default_rng(0).integers(0, 256, (down, across), np.uint8)
+    clutter = _scattered(down * across).reshape(down, across)
     picture = clutter.repeat(CLUTTER_PX, axis=0).repeat(CLUTTER_PX, axis=1)
     for seq in range(TRIALS):
         left = seq * CLUTTER_PX // 2
@@ -76,12 +53,20 @@ def try_out(pipeline: Pipeline, width: int, height: int) -> None:
         pipeline.view()
 
 
+def _scattered(number: int) -> npt.NDArray[np.uint8]:
+    """Greys without order; a generator of NumPy's would be loaded by a reload, for which descriptors may be short."""
+    mixed = np.arange(number, dtype=np.uint32) * np.uint32(2654435761)
+    mixed = (mixed ^ (mixed >> np.uint32(15))) * np.uint32(2246822519)
+    return (mixed >> np.uint32(24)).astype(np.uint8)
+
+
 class Loop(threading.Thread):
     """Turns whenever a frame comes, and without one each ``FRAME_WAIT_S``, until ``clock`` is stopped.
 
     For others to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last), ``evicted``,
-    ``latency`` (from the frame's stamp to after the put) and in it ``detect`` and ``filter``, ``degradation``.
-    ``first_scene`` is called once. Raises ``ConfigError`` for pictures that the lens of the configuration does not fit.
+    ``latency`` (from the frame's stamp until the first of ``outputs`` has its scene) and in it ``detect`` and
+    ``filter``, ``degradation``. ``first_scene`` is called once. Raises ``ConfigError`` for pictures that the lens of
+    the configuration does not fit.
     """
 
     def __init__(
@@ -89,16 +74,15 @@ class Loop(threading.Thread):
         config: Config,
         mail: Mail,
         link: Link,
-        previewer: Previewer,
+        outputs: Outputs,
         clock: StoppableClock,
         system_time: SystemTime,
         first_scene: Callable[[], object],
-        recorder: "Recorder | None" = None,
     ) -> None:
         super().__init__(name="pipeline", daemon=True)
         self.turns = 0
         self.frames = 0
-        self.scene: Scene | None = None
+        self.scene: PipelineScene | None = None
         self.evicted = 0
         self.latency, self.detect, self.filter = DurationHistogram(), DurationHistogram(), DurationHistogram()
         self.degradation = Degradation(config)
@@ -109,11 +93,10 @@ class Loop(threading.Thread):
         self._refused_before: Counter[str] = Counter()  # by earlier pipelines
         self._mail = mail
         self._link = link
-        self._previewer = previewer
+        self._outputs = outputs
         self._clock = clock
         self._system_time = system_time
         self._first_scene = first_scene
-        self._recorder = recorder
 
     @property
     def refused(self) -> Counter[str]:
@@ -160,12 +143,14 @@ class Loop(threading.Thread):
                 self._feed(self._pipeline)
             return
         pipeline = self._pipeline_for(frame)
-        self._await_imu(frame)
+        imu_by_s = time.monotonic() + IMU_WAIT_S
+        look = pipeline.look(frame)  # meanwhile the IMU's next sample comes
+        self._await_imu(frame, imu_by_s)
         self._feed(pipeline)
-        scene = pipeline.process(frame)
+        scene = pipeline.follow(look)
         scene = replace(scene, stamp_ns=self._system_time.system_ns(frame.stamp_ns))
-        self._link.put_scene(scene)
-        self.latency.add((time.monotonic_ns() - frame.stamp_ns) / 1e9)
+        delivered_ns = self._outputs.put(frame, scene, pipeline.view)
+        self.latency.add((delivered_ns - frame.stamp_ns) / 1e9)
         self.detect.add(scene.timing.detect / 1e6)
         self.filter.add(scene.timing.filter / 1e6)
         self.scene = scene
@@ -174,10 +159,6 @@ class Loop(threading.Thread):
         if self.frames == 1:
             self._first_scene()
         self.degradation.add(frame, scene)
-        if self._recorder is not None:
-            self._recorder.put(Seen(frame, scene))
-        if self._previewer.wants():
-            self._previewer.offer(frame, Outcome(scene, pipeline.view()))
 
     def _pipeline_for(self, frame: Frame) -> Pipeline:
         """The one in use, or a new one: asked for by ``rebuild``, or because the pictures have another size."""
@@ -194,9 +175,10 @@ class Loop(threading.Thread):
             self.degradation = Degradation(self._config)
         return pipeline
 
-    def _await_imu(self, frame: Frame) -> None:
+    def _await_imu(self, frame: Frame, until_s: float) -> None:
         offset_ns = round(self._config.imu.time_offset_s * 1e9)
-        self._mail.imu.wait_until(frame.stamp_ns - offset_ns, IMU_WAIT_S, IMU_SILENT_NS)
+        wait_s = max(until_s - time.monotonic(), 0.0)
+        self._mail.imu.wait_until(frame.stamp_ns - offset_ns, wait_s, IMU_SILENT_NS)
 
     def _feed(self, pipeline: Pipeline) -> None:
         received = (
@@ -206,5 +188,4 @@ class Loop(threading.Thread):
         samples: Iterable[ImuSample | SpeedSample] = chain(self._mail.imu.take(), self._mail.speeds.take(), received)
         for sample in samples:
             pipeline.add(sample)
-            if self._recorder is not None:
-                self._recorder.put(sample)
+            self._outputs.put_sample(sample)

@@ -1,68 +1,84 @@
 """The preview: the overlay drawn beside the pipeline, one at a time, while somebody looks."""
 
 import threading
+from collections.abc import Callable
 
 import cv2
 import numpy as np
 
-from drivers.records import Frame
-from lcf_edge.daemon.clock import StoppableClock
+from drivers.samples import Frame
+from lcf_edge.config import Config
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.mailbox import Newest
-from lcf_edge.pipeline import Outcome
+from lcf_edge.messages import PipelineScene, View
+from lcf_edge.sinks.sink import Sink
 
 JPEG_QUALITY = 70
 WIDEST_PX = 1920  # both panels: a message may not be larger than 1 MiB
 _WAKE_S = 0.25
+_ENDS_WITHIN_S = 0.3  # a picture that is being drawn
 
 
-Drawable = tuple[Frame, Outcome]
+class Previewer(Sink):
+    """Draws a frame when a preview is wanted and no other is being drawn, and hands it to ``link`` as a JPEG."""
 
+    name = "preview"
+    sheds = "the preview"
 
-class Previewer(threading.Thread):
-    """Draws what it is offered when it ``wants`` something, and hands JPEG pictures to ``link``.
-
-    ``off``: nothing is drawn any more, to save memory.
-    """
-
-    def __init__(self, link: Link, clock: StoppableClock) -> None:
-        super().__init__(name="preview", daemon=True)
-        self.off = False
+    def __init__(self, link: Link) -> None:
+        self._off = False
         self._drawing = False
-        self._offered: Newest[Drawable] = Newest()
+        self._closing = False
+        self._next: Newest[tuple[Frame, PipelineScene, View]] = Newest()
         self._link = link
-        self._clock = clock
+        self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
 
-    def wants(self) -> bool:
-        """Whether a preview is wanted now, and nothing else is being drawn."""
-        return not self.off and not self._drawing and self._link.preview_wanted()
+    def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:
+        """Have this drawn, if a preview is wanted now."""
+        if not (self._off or self._drawing) and self._link.preview_wanted():
+            self._drawing = True
+            self._next.put((frame, scene, view()))
 
-    def offer(self, frame: Frame, outcome: Outcome) -> None:
-        """Draw this; its scene is stamped by the system clock."""
-        self._drawing = True
-        self._offered.put((frame, outcome))
+    def start(self) -> None:
+        """Start drawing."""
+        self._thread.start()
 
-    def run(self) -> None:
-        """Draw until stopped."""
-        while not self._clock.stopped:
-            drawable = self._offered.take(_WAKE_S)
-            if drawable is not None:
-                self._draw(*drawable)
+    def show_config(self, config: Config) -> None:  # noqa: ARG002
+        """Draw again, if that was given up."""
+        self._off = False
+
+    def shed(self) -> None:
+        """Draw nothing any more."""
+        self._off = True
+
+    def close(self) -> None:
+        """Draw nothing more; what is being drawn may still go out."""
+        self._closing = True
+        self._next.close()
+        self.join(_ENDS_WITHIN_S)
+
+    def join(self, timeout_s: float) -> bool:
+        """Wait until nothing is drawn; False: it still is."""
+        if self._thread.ident is not None:
+            self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        while not self._closing:
+            given = self._next.take(_WAKE_S)
+            if given is not None:
+                self._draw(*given)
                 self._drawing = False
 
-    def wake(self) -> None:
-        """Notice a stop at once."""
-        self._offered.close()
-
-    def _draw(self, frame: Frame, outcome: Outcome) -> None:
+    def _draw(self, frame: Frame, scene: PipelineScene, view: View) -> None:
         try:
             from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
         except OSError:  # no descriptor is left; the next one may find one
             return
-        picture = draw(frame.image, outcome)
+        picture = draw(frame.image, scene, view)
         height, width = picture.shape[:2]
         if width > WIDEST_PX:
             size = WIDEST_PX, round(height * WIDEST_PX / width)
             picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
         _, jpeg = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
-        self._link.put_preview(jpeg.tobytes(), outcome.scene.stamp_ns)
+        self._link.put_preview(jpeg.tobytes(), scene.stamp_ns)

@@ -6,19 +6,22 @@ in the ring of the last seconds. What does not fit is dropped and counted, pictu
 
 import threading
 import time
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.cdr import CdrError
 from lcf_edge.config import Config
 from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.disk_writer import DiskWriter, EndOfFile
 from lcf_edge.diagnostics import DeviceStatus, Level
-from lcf_edge.recorder.destination import MIB, Destination
-from lcf_edge.recorder.messages import PICTURES, Encoder, KnownLens, Message, Record, Seen, Statuses
-from lcf_edge.recorder.ring import Ring, size_bytes
-from lcf_edge.records import Kind, Scene
+from lcf_edge.messages import Kind, PipelineScene, View
+from lcf_edge.recording.write.destination import MIB, Destination
+from lcf_edge.recording.write.messages import PICTURES, Encoder, KnownLens, Message, Record, Seen, Statuses
+from lcf_edge.recording.write.ring import Ring, size_bytes
+from lcf_edge.sinks.sink import Sink
 
 INBOX_BYTES = 2 * MIB
 SHED_BYTES = MIB  # of the backlog, when memory is short
@@ -26,10 +29,14 @@ _RESERVE = 1 / 8  # of inbox and backlog is kept free of pictures
 _SAMPLE_BYTES = 512
 _STATUSES_BYTES = 8192
 _WAKE_S = 0.25
+_PROBABLE = 0.5  # that an object is met
 
 
-class Recorder:
+class Recorder(Sink):
     """Records by ``config.record``, whose ``when`` is not ``never``, into ``destination``."""
+
+    name = "recorder"
+    sheds = "most of the recording buffer"
 
     def __init__(
         self, config: Config, destination: Destination, system_time: SystemTime, known_lens: KnownLens
@@ -48,16 +55,18 @@ class Recorder:
         self._encoding = threading.Thread(target=self._encode, name="recorder", daemon=True)
         self._disk = DiskWriter(config, self._backlog, destination, system_time)
 
-    def put(self, record: Record) -> None:
-        """Record this, stamped by the monotonic clock; never waits, never raises. Takes a few µs."""
-        match record:
-            case Seen(frame, scene):
-                taken = frame.image.nbytes + scene.circles.nbytes + scene.psi.nbytes
-                self._inbox.put(record, taken, round(INBOX_BYTES * _RESERVE))
-            case Statuses():
-                self._inbox.put(record, _STATUSES_BYTES)
-            case _:
-                self._inbox.put(record, _SAMPLE_BYTES)
+    def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:  # noqa: ARG002
+        """Record a frame and its scene, with the stamp of the frame. Takes a few µs."""
+        taken = frame.image.nbytes + scene.circles.nbytes + scene.psi.nbytes + scene.objects.nbytes
+        self._inbox.put(Seen(frame, scene), taken, round(INBOX_BYTES * _RESERVE))
+
+    def put_sample(self, sample: ImuSample | SpeedSample) -> None:
+        """Record a sample."""
+        self._inbox.put(sample, _SAMPLE_BYTES)
+
+    def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
+        """Record how each part of the daemon is."""
+        self._inbox.put(Statuses(stamp_ns, statuses), _STATUSES_BYTES)
 
     def show_config(self, config: Config) -> None:
         """What is in effect from now on; it goes into the file."""
@@ -173,7 +182,9 @@ def _stamp_ns(record: Seen | Statuses) -> int:
     return record.frame.stamp_ns if isinstance(record, Seen) else record.stamp_ns
 
 
-def _threatens(scene: Scene, ttc_s: float) -> bool:
-    """Whether a rebel circle will be met within ``ttc_s``."""
-    circles = scene.circles
-    return bool(np.any((circles["kind"] == Kind.REBEL) & (circles["ttc"] < ttc_s)))
+def _threatens(scene: PipelineScene, ttc_s: float) -> bool:
+    """Whether an object will probably be met within ``ttc_s``, or a rebel circle that belongs to none."""
+    circles, objects = scene.circles, scene.objects
+    alone = (circles["kind"] == Kind.REBEL) & (scene.circle_objects == 0)
+    met = objects["probability"] >= _PROBABLE
+    return bool(np.any(alone & (circles["ttc"] < ttc_s)) or np.any(met & (objects["ttc"] < ttc_s)))

@@ -1,4 +1,4 @@
-"""Which keys can change while the daemon runs, and which want a restart."""
+"""Which keys can change while the daemon runs, and which need a restart."""
 
 from collections.abc import Mapping
 from pathlib import Path
@@ -20,6 +20,7 @@ PIPELINE_KEYS: Mapping[str, frozenset[str]] = {
 """A change of these makes a new pipeline, whose tables are empty."""
 
 OTHER_KEYS: Mapping[str, frozenset[str]] = {
+    "camera": frozenset({"ahead_m", "left_m"}),
     "memory": frozenset({"budget_mib"}),
     "log": frozenset({"level"}),
 }

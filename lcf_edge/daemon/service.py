@@ -21,23 +21,24 @@ from lcf_edge.daemon.clock import StoppableClock, SystemTime
 from lcf_edge.daemon.descriptors import Reserve
 from lcf_edge.daemon.devices import readers
 from lcf_edge.daemon.health import Health
+from lcf_edge.daemon.heap import leave_start
 from lcf_edge.daemon.link import Link
 from lcf_edge.daemon.log import LOGGER
-from lcf_edge.daemon.loop import Loop, Mail, known_lens
+from lcf_edge.daemon.loop import Loop, Mail
 from lcf_edge.daemon.memory import MemoryWatch, ResidentMemory, Shedding, check_budget
 from lcf_edge.daemon.notify import Notifier
-from lcf_edge.daemon.preview import Previewer
+from lcf_edge.daemon.outputs import Outputs
+from lcf_edge.daemon.peers import CHECK_S, PeersMemory
 from lcf_edge.daemon.reload import changed, merged, signature, wants_pipeline, wants_restart
+from lcf_edge.daemon.sinks import sinks
 from lcf_edge.errors import LcfError
-from lcf_edge.recorder.messages import Statuses
 
-if TYPE_CHECKING:
-    from lcf_edge.daemon.recorder import Recorder
-    from lcf_edge.recorder.destination import Destination
+if TYPE_CHECKING:  # most daemons record nothing
+    from lcf_edge.recording.write.destination import Destination
 
 TICK_S = 1.0
 ENDS_WITHIN_S = 0.7  # all threads together; the link has its own limit
-RECORDED_WITHIN_S = 1.9  # all, with the recording, of which the disk writes the last while the link closes
+WRITTEN_WITHIN_S = 1.9  # all, with the sinks, which write the last while the link closes
 
 
 class InternalError(LcfError):
@@ -49,7 +50,7 @@ class Service:
 
     ``config`` is one that ``check_budget`` let pass; ``notifier`` is told how it goes. ``destination``: of what
     ``config.record`` wants recorded; None: its folder. ``seconds``: end so long after the start is over; None: never.
-    ``recorder``: None where nothing is recorded.
+    ``sinks``: where its scenes go.
     """
 
     def __init__(
@@ -76,19 +77,19 @@ class Service:
         self._reserve = Reserve()
         self._resident_mib = ResidentMemory()
         self._readers = readers(config, self._mail, self._clock, self._reserve)
-        self._previewer = Previewer(link, self._clock)
-        self.recorder = _recorder(config, destination, self._system_time)
+        self.sinks = sinks(config, link, self._system_time, destination)
+        self._outputs = Outputs(self.sinks)
         self._loop = Loop(
             config,
             self._mail,
             link,
-            self._previewer,
+            self._outputs,
             self._clock,
             self._system_time,
             lambda: self._to_do.put(self._check_ready),
-            self.recorder,
         )
         self._memory = self._watched()
+        self._peers = PeersMemory(link, self._resident_mib)
         self._health = Health(self._readers, self._mail, self._loop, link, self._system_time, self._reserve)
         self._ready = False
         self._seconds = seconds
@@ -98,15 +99,15 @@ class Service:
         self._turns = 0
         self._tick_s = tick_s
         self._tick_at_s = time.monotonic() + tick_s
+        self._check_at_s = time.monotonic() + CHECK_S
         self._notes: set[str] = set()
 
     def run(self) -> None:
         """Run until ``stop`` or a failure. Raises ``LcfError`` when a thread failed."""
         with self._failures_noticed():
             try:
-                if self.recorder is not None:
-                    self.recorder.start()
-                for thread in (self._loop, self._previewer, *self._readers):
+                self._outputs.start()
+                for thread in (self._loop, *self._readers):
                     thread.start()
                 gc.collect()
                 gc.freeze()  # what is here now stays: later collections need not look at it
@@ -154,27 +155,34 @@ class Service:
             threading.excepthook = before
 
     def _do_next(self) -> None:
-        next_s = min(self._tick_at_s, self._ends_at_s)
+        next_s = min(self._tick_at_s, self._check_at_s, self._ends_at_s)
         try:
             self._to_do.get(timeout=max(next_s - time.monotonic(), 0))()
         except queue.Empty:
             if next_s == self._ends_at_s:
                 self._end(f"{self._seconds:g} s are over")
-                return
-            self._tick_at_s = max(self._tick_at_s + self._tick_s, time.monotonic())
-            self._tick()
+            elif next_s == self._check_at_s:
+                self._check_at_s = max(self._check_at_s + CHECK_S, time.monotonic())
+                self._check_peers()
+            else:
+                self._tick_at_s = max(self._tick_at_s + self._tick_s, time.monotonic())
+                self._tick()
+
+    def _check_peers(self) -> None:
+        if self._ready:  # what a start takes is not theirs
+            self._peers.check(self._memory.budget_mib)
 
     def _tick(self) -> None:
-        self._memory.check()
+        self._check_peers()
+        if not self._peers.blamed:
+            self._memory.check()
         self._check_descriptors()
         self._check_ready()
         if self._loop.turns != self._turns:  # the watchdog lives on the pipeline's progress
             self._turns = self._loop.turns
             self._notifier.alive()
-        statuses = self._health.statuses(self._config, self._memory)
-        if self.recorder is not None:
-            statuses.append(self.recorder.status())
-            self.recorder.put(Statuses(time.monotonic_ns(), statuses))
+        statuses = [*self._health.statuses(self._config, self._memory), *self._outputs.statuses()]
+        self._outputs.put_diagnostics(time.monotonic_ns(), statuses)
         self._link.put_diagnostics(statuses, time.time_ns())
         self._notifier.status(self._health.line(self._memory))
         self._log_notes(self._loop.degradation.notes)
@@ -192,6 +200,7 @@ class Service:
         """Frames flow, or it has been told why not."""
         if not self._ready and (self._loop.frames or self._readers[0].error):
             self._ready = True
+            leave_start()
             self._ends_at_s = math.inf if self._seconds is None else time.monotonic() + self._seconds
             self._notifier.status(self._health.line(self._memory))
             self._notifier.ready()
@@ -229,24 +238,16 @@ class Service:
             self._loop.rebuild(config)
         self._config = config
         self._link.show_config(config)
-        if self.recorder is not None:
-            self.recorder.show_config(config)
+        self._outputs.show_config(config)
         log.set_level(config.log.level)
-        self._previewer.off = False
         self._memory = self._watched()
         LOGGER.info("reload: changed %s", ", ".join(sorted(keys)) or "nothing")
         if refused:
             LOGGER.warning("reload: %s cannot change while running; restart to change it", ", ".join(sorted(refused)))
 
     def _watched(self) -> MemoryWatch:
-        order = [Shedding("the preview", self._shed_preview)]
-        if self.recorder is not None:
-            order.append(Shedding("most of the recording buffer", self.recorder.shed))
-        order.append(Shedding("half of the corners", self._shed_corners))
+        order = [*self._outputs.sheddings(), Shedding("half of the corners", self._shed_corners)]
         return MemoryWatch(self._config.memory.budget_mib, order, self._resident_mib)
-
-    def _shed_preview(self) -> None:
-        self._previewer.off = True
 
     def _shed_corners(self) -> None:
         replace = msgspec.structs.replace
@@ -268,36 +269,23 @@ class Service:
         self._ending = True
 
     def _close(self) -> None:
-        """Devices first, then what lives on them, then the link, while the recorder writes the last."""
+        """Devices first, then what lives on them, then the link, while the sinks write the last."""
         self._notifier.stopping()
         self._clock.stop()
         self._loop.wake()
-        self._previewer.wake()
         begun_s = time.monotonic()
         deadline_s = begun_s + ENDS_WITHIN_S
-        threads: tuple[Any, ...] = (*self._readers, self._loop, self._previewer)
+        threads: tuple[Any, ...] = (*self._readers, self._loop)
         for thread in threads:
             if thread.ident is not None:
                 thread.join(max(deadline_s - time.monotonic(), 0))
                 if thread.is_alive():
                     LOGGER.warning("%s: does not end; left behind", thread.name)
-        if self.recorder is not None:
-            self.recorder.close()
+        self._outputs.close()
         self._link.close()
-        if self.recorder is not None and not self.recorder.join(begun_s + RECORDED_WITHIN_S - time.monotonic()):
-            LOGGER.warning("recorder: the disk does not take the last messages in time; left behind")
+        self._outputs.join(begun_s + WRITTEN_WITHIN_S - time.monotonic())
         self._notifier.close()
         self._reserve.close()
-
-
-def _recorder(config: Config, destination: "Destination | None", system_time: SystemTime) -> "Recorder | None":
-    """Not started; None: nothing is to be recorded."""
-    if config.record.when == "never":
-        return None
-    from lcf_edge.daemon.recorder import Recorder  # noqa: PLC0415  # its formats take megabytes
-    from lcf_edge.recorder.destination import Folder  # noqa: PLC0415
-
-    return Recorder(config, destination or Folder(config.record), system_time, known_lens)
 
 
 def _told(failed: threading.ExceptHookArgs) -> LcfError:

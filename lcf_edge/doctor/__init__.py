@@ -2,7 +2,8 @@
 
 ``examination`` has the order of the checks and runs them, each within a limit of time. A check is a function from a
 ``Context`` to its ``Finding``s (both in ``finding``), in a file by its subject: ``configuration``, ``software``,
-``board``, ``clock``, ``memory``, ``service``, ``network``, ``health``, ``permissions``, ``camera``, ``imu``,
-``calibration``. They rest on ``daemon`` (one that runs already, asked over Zenoh), ``endpoints`` and ``processes`` (who
-has what open), ``measuring`` (a device, read for a while) and ``wiring`` (which chip or protocol answers).
+``board``, ``clock``, ``memory``, ``service``, ``instances``, ``network``, ``health``, ``permissions``, ``camera``,
+``imu``, ``calibration``. They rest on ``daemon`` (one that runs already, asked over Zenoh), ``endpoints`` and
+``processes`` (who has what open), ``measuring`` (a device, read for a while), ``wiring`` (which chip or protocol
+answers) and ``program`` (how a remedy calls this program).
 """

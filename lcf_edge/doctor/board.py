@@ -51,12 +51,12 @@ def _disk(context: Context) -> Iterator[Finding]:
     except OSError:  # the recorder makes it, or it leads into a folder of root's
         return
     free_mib = room.f_bavail * room.f_frsize / _MIB
-    told = f"{free_mib / 1024:.1f} GiB are free in {record.folder}"
+    summary = f"{free_mib / 1024:.1f} GiB are free in {record.folder}"
     if free_mib < record.free_mib:
-        text = f"{told}: nothing is recorded, record.free_mib = {record.free_mib:g} are left free"
+        text = f"{summary}: nothing is recorded, record.free_mib = {record.free_mib:g} are left free"
         yield warn("board", text, f"sudo du -h {record.folder}/")
     else:
-        yield ok("board", told)
+        yield ok("board", summary)
 
 
 def _text(context: Context, name: str) -> str:

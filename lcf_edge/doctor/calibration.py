@@ -1,4 +1,4 @@
-"""What the filter must be told about the vehicle, and was not."""
+"""What the filter must know about the vehicle, and does not."""
 
 import math
 from collections.abc import Iterator

@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.camera import offers
 from drivers.camera.controls import EXPOSURE_UNIT_S
-from drivers.camera.find import cameras, open_camera_node
+from drivers.camera.find import cameras, is_libcameras, open_camera_node
 from drivers.camera.luminance import PIXEL_FORMATS
 from drivers.camera.v4l2_ioctl import CID_EXPOSURE_ABSOLUTE, G_CTRL, Control, Node
 from drivers.errors import (
@@ -17,19 +17,20 @@ from drivers.errors import (
     DeviceMissingError,
     DeviceStalledError,
     DriverError,
+    MissingSoftwareError,
     UnsupportedSettingError,
     WrongDeviceError,
 )
-from drivers.records import Frame
-from lcf_edge import own_parts
+from drivers.samples import Frame
 from lcf_edge.config import Config
-from lcf_edge.corners import CornerDetector
+from lcf_edge.corners import own_parts
+from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.daemon.degrade import DARK
 from lcf_edge.doctor import permissions
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, short, warn
 from lcf_edge.doctor.health import daemon_having, of_device
 from lcf_edge.doctor.measuring import Measured, measure
-from lcf_edge.doctor.processes import in_use
+from lcf_edge.doctor.processes import in_use, processes
 from lcf_edge.lens import Lens
 
 SECONDS = 2.0
@@ -44,6 +45,9 @@ def check(context: Context) -> Iterator[Finding]:
     camera = context.config.camera
     if camera.driver == "recording":
         yield from _recorded(context)
+        return
+    if camera.driver == "libcamera" or (camera.driver == "auto" and is_libcameras(camera.device, context.kernel)):
+        yield from _through_libcamera(context)
         return
     try:
         node = open_camera_node(camera.device, context.kernel)
@@ -72,10 +76,33 @@ def _recorded(context: Context) -> Iterator[Finding]:
     try:
         measured = measure(lambda: context.open_camera(context.config, context.clock), SECONDS, context.clock)
     except DriverError as error:
-        yield fail("camera", short(error), "lcf-edge demo --out demo-out  # makes a recording")
+        yield fail("camera", short(error), f"{context.program} demo --out demo-out  # makes a recording")
         return
     yield ok("camera", f"the recording {name} stands in for it")
     yield from judged(context, measured)
+
+
+def _through_libcamera(context: Context) -> Iterator[Finding]:
+    device = context.config.camera.device
+    try:
+        measured = measure(
+            lambda: context.open_camera(context.config, context.clock), SECONDS, context.clock, SETTLING_S
+        )
+    except DeviceBusyError as error:
+        daemon = next((process for process in processes(context.proc) if process.is_daemon), None)
+        if daemon is None:
+            yield fail("camera", short(error), "sudo fuser -v /dev/media*")
+        else:
+            yield of_device(context, "camera", daemon)
+    except MissingSoftwareError as error:
+        yield fail("camera", short(error), "sudo apt install python3-libcamera libcamera-ipa")
+    except DeviceForbiddenError as error:
+        yield fail("camera", short(error), permissions.join("video"))
+    except DriverError as error:
+        yield fail("camera", str(error))
+    else:
+        yield ok("camera", f"{device}: through libcamera")
+        yield from judged(context, measured)
 
 
 def _absent(context: Context, error: DriverError) -> Finding:
@@ -90,8 +117,8 @@ def _absent(context: Context, error: DriverError) -> Finding:
         remedy = context.again(f"camera.device={there[0][0]}")
         return fail("camera", f"{short(error)}; there is {found}", remedy)
     if isinstance(error, DeviceMissingError):
-        text = f"{short(error)}, and no other; a camera at the ribbon cable of a Raspberry Pi cannot be used"
-        return fail("camera", text, "lsusb  # with the camera plugged in: does the kernel see it?")
+        text = f"{short(error)}, and no other, neither at USB nor at a ribbon cable"
+        return fail("camera", text, "lsusb; sudo dmesg | grep -i csi  # does the kernel see it? docs/raspberry-pi.md")
     return fail("camera", str(error))
 
 
@@ -140,20 +167,20 @@ def judged(context: Context, measured: Measured[Frame], exposure_s: float | None
 
 def _rate(context: Context, measured: Measured[Frame], exposure_s: float | None) -> Finding:
     camera = context.config.camera
-    told = f"{measured.told()}, longest gap {1e3 * measured.longest_s:.0f} ms"
+    summary = f"{measured.summary()}, longest gap {1e3 * measured.longest_s:.0f} ms"
     too_long = exposure_s is not None and exposure_s * camera.fps > 1
     if exposure_s is not None and not too_long:
-        told += f", exposure {1e3 * exposure_s:.1f} ms"
+        summary += f", exposure {1e3 * exposure_s:.1f} ms"
     lost = _counts(measured)
-    told += f"; {lost}" if lost else ""
+    summary += f"; {lost}" if lost else ""
     if camera.driver == "recording" or measured.rate_hz >= _SLOW * camera.fps:
-        return ok("camera", told)
+        return ok("camera", summary)
     why = "as cameras are that expose longer in the dark"
     if exposure_s is not None and too_long:
         why = f"its exposure of {1e3 * exposure_s:.1f} ms is longer than a frame"
     return warn(
         "camera",
-        f"{told}: slower than camera.fps = {camera.fps:g}, {why}",
+        f"{summary}: slower than camera.fps = {camera.fps:g}, {why}",
         context.again(f"camera.exposure_s={0.5 / camera.fps:.3g}"),
     )
 
@@ -164,14 +191,14 @@ def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Confi
     detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
     corners, _ = detector.detect(image)
     grey, count = float(image.mean()), len(corners.pixel)
-    told = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"
+    summary = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"
     if grey < DARK:
-        return warn("camera", f"dark: {told}; take off the cap, give light, or let it expose by itself")
+        return warn("camera", f"dark: {summary}; take off the cap, give light, or let it expose by itself")
     if grey > BRIGHT:
-        return warn("camera", f"burnt out: {told}; shade it, or let it expose by itself")
+        return warn("camera", f"burnt out: {summary}; shade it, or let it expose by itself")
     if count < FEW_CORNERS:
-        return warn("camera", f"blind: {told}; the lens is covered, out of focus, or looks at something plain")
-    return ok("camera", told)
+        return warn("camera", f"blind: {summary}; the lens is covered, out of focus, or looks at something plain")
+    return ok("camera", summary)
 
 
 def _exposure_s(context: Context, path: Path) -> float | None:

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import msgspec
 
-from lcf_edge import bounded_toml
-from lcf_edge.config import DEFAULT_PATH, Config, load
+from lcf_edge.config import DEFAULT_PATH, Config, bounded_toml, load
 from lcf_edge.doctor.finding import Context, Finding, edit, fail, ok
 from lcf_edge.errors import ConfigError
 
@@ -25,7 +24,7 @@ def check(context: Context) -> Iterator[Finding]:
     if context.error is not None:
         yield fail(
             "configuration",
-            f"{context.error}; camera, IMU, memory and network are looked at when it is mended",
+            f"{context.error}; camera, IMU, memory and network are looked at when it is fixed",
             edit(context.path) if str(context.path) in str(context.error) else "",
         )
     elif context.path.exists():

@@ -5,6 +5,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 
+from drivers.errors import DriverError
 from lcf_edge.doctor import (
     board,
     calibration,
@@ -13,6 +14,7 @@ from lcf_edge.doctor import (
     configuration,
     health,
     imu,
+    instances,
     memory,
     network,
     permissions,
@@ -41,6 +43,7 @@ STEPS = (
     Step("clock", clock.check, needs_config=False),
     Step("memory", memory.check),
     Step("service", service.check, needs_config=False),
+    Step("instances", instances.check),
     Step("network", network.check),
     Step("daemon", health.check),
     Step("permissions", permissions.check),
@@ -53,7 +56,7 @@ STEPS = (
 def examine(context: Context, steps: Sequence[Step] = STEPS, limit_s: float = LIMIT_S) -> Iterator[Finding]:
     """What all checks find, as they find it.
 
-    A check that says nothing for ``limit_s`` is left behind in its thread, and told.
+    A check that says nothing for ``limit_s`` is left behind in its thread, and reported.
     """
     for step in steps:
         if context.error is None or not step.needs_config:
@@ -79,7 +82,7 @@ def _run(step: Step, context: Context, put: Callable[[Finding | None], None]) ->
             put(finding)
     except OSError as error:  # of a file that the check did not expect to fail
         put(fail(step.subject, f"{error.filename or 'a device'}: {error.strerror}"))
-    except (LcfError, ValueError) as error:  # the latter: the kernel tells something in another form than known
+    except (LcfError, DriverError, ValueError) as error:  # the last: what the kernel says has an unknown form
         put(fail(step.subject, short(error)))
     finally:
         put(None)

@@ -1,8 +1,8 @@
-"""What a check is given, and what it answers."""
+"""What a check is given, and what it returns."""
 
 import shlex
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
 from pathlib import Path
@@ -12,14 +12,15 @@ from drivers.camera.v4l2_ioctl import LINUX, Kernel
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.imu.i2c_bus import I2cBus
-from drivers.records import Frame, ImuSample
+from drivers.samples import Frame, ImuSample
 from lcf_edge.config import DEFAULT_PATH, Config
 from lcf_edge.devices import open_camera, open_imu
 from lcf_edge.doctor.daemon import Daemon, ask
+from lcf_edge.doctor.program import program
 from lcf_edge.errors import ConfigError
 
 
-class Level(Enum):
+class Severity(Enum):
     """How bad it is."""
 
     OK = "ok"
@@ -31,7 +32,7 @@ class Level(Enum):
 class Finding:
     """One line of the report. ``remedy``: where one exists, a command to paste."""
 
-    level: Level
+    level: Severity
     subject: str
     text: str
     remedy: str = ""
@@ -59,6 +60,8 @@ class Context:
     open_bus: Callable[[int], I2cBus] = I2cBus
     clock: Clock = SYSTEM_CLOCK
     systemctl: Sequence[str] = ("systemctl",)
+    installed: Path = DEFAULT_PATH.parent  # where the configurations of the units are
+    program: str = field(default_factory=program)  # as a remedy calls it
 
     @cached_property
     def daemon(self) -> Daemon | None:
@@ -69,13 +72,18 @@ class Context:
         """The command that looks again with more settings, as "imu.bus=3"."""
         words = [f"-c {shlex.quote(str(self.path))}"] if self.path != DEFAULT_PATH else []
         words += [f"--set {shlex.quote(setting)}" for setting in (*self.settings, *settings)]
-        return " ".join(("lcf-edge doctor", *words)) + ("  # then in the configuration" if settings else "")
+        return " ".join((f"{self.program} doctor", *words)) + ("  # then in the configuration" if settings else "")
 
     def calibrate(self, what: str) -> str:
-        """The command that measures something and writes it into the configuration, which must be there."""
+        """The command that measures something and writes it into the configuration.
+
+        Where the configuration does not exist yet, the command makes it, unless another remedy has by then.
+        """
         file = shlex.quote(str(self.path))
-        command = f"lcf-edge calibrate {what} -c {file} --write"
-        return command if self.path.is_file() else f"sudo install -D /dev/null {file} && sudo {command}"
+        sudo = "sudo " if _belongs_to_root(self.path) else ""
+        command = f"{sudo}{self.program} calibrate {what} -c {file} --write"
+        make = f"test -e {file} || {sudo}install -D -m 644 /dev/null {file}"
+        return command if self.path.is_file() else f"{make} && {command}"
 
 
 Check: TypeAlias = Callable[[Context], Iterator[Finding]]
@@ -83,24 +91,28 @@ Check: TypeAlias = Callable[[Context], Iterator[Finding]]
 
 def ok(subject: str, text: str) -> Finding:
     """As it should be."""
-    return Finding(Level.OK, subject, text)
+    return Finding(Severity.OK, subject, text)
 
 
 def warn(subject: str, text: str, remedy: str = "") -> Finding:
     """Works, but worse than it could."""
-    return Finding(Level.WARN, subject, text, remedy)
+    return Finding(Severity.WARN, subject, text, remedy)
 
 
 def fail(subject: str, text: str, remedy: str = "") -> Finding:
     """Does not work."""
-    return Finding(Level.FAIL, subject, text, remedy)
+    return Finding(Severity.FAIL, subject, text, remedy)
 
 
 def edit(path: Path, comment: str = "") -> str:
     """The command that opens a file for editing."""
     file = shlex.quote(str(path))
-    command = f"sudoedit {file}" if path.is_relative_to("/etc") else f"${{EDITOR:-nano}} {file}"
+    command = f"sudoedit {file}" if _belongs_to_root(path) else f"${{EDITOR:-nano}} {file}"
     return f"{command}  # {comment}" if comment else command
+
+
+def _belongs_to_root(path: Path) -> bool:
+    return path.is_relative_to("/etc")
 
 
 def short(error: Exception) -> str:

@@ -3,12 +3,11 @@
 from collections.abc import Iterator
 from pathlib import Path
 
-from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 from lcf_edge.doctor.processes import Process, daemon_with, processes
 
-_DEVICES = ("camera", "imu")  # told by their own checks
+_DEVICES = ("camera", "imu")  # reported by their own checks
 _TOLD = (
     "rate_hz",
     "jitter_ms",
@@ -64,6 +63,6 @@ def of_device(context: Context, name: str, daemon: Process) -> Finding:
 def _of_status(subject: str, whose: str, status: DeviceStatus) -> Finding:
     values = [f"{name} {status.values[name]}" for name in _TOLD if name in status.values]
     text = f"{whose}: {status.message}" + (f" ({', '.join(values)})" if values else "")
-    if status.level is StatusLevel.OK:
+    if status.level is Level.OK:
         return ok(subject, text)
-    return (warn if status.level is StatusLevel.WARN else fail)(subject, text, _JOURNAL)
+    return (warn if status.level is Level.WARN else fail)(subject, text, _JOURNAL)

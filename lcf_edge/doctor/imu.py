@@ -17,16 +17,15 @@ from drivers.errors import (
     DriverError,
     WrongDeviceError,
 )
+from drivers.imu.registry import has_interface
 from drivers.imu.serial_port import ports
-from drivers.records import STANDARD_GRAVITY_MPS2, ImuSample
-from lcf_edge.devices import SERIAL
+from drivers.samples import STANDARD_GRAVITY_MPS2, ImuSample
 from lcf_edge.doctor import permissions
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, short, warn
 from lcf_edge.doctor.health import daemon_having, of_device
 from lcf_edge.doctor.measuring import Measured, measure
 from lcf_edge.doctor.processes import Process, in_use, processes
-from lcf_edge.doctor.wiring import Chip, chips, spoken
-from lcf_edge.errors import LcfError
+from lcf_edge.doctor.wiring import Chip, chips, spoken, strangers
 
 SECONDS = 2.0
 SLOWEST_HZ = 50.0
@@ -48,14 +47,14 @@ def check(context: Context) -> Iterator[Finding]:
     if daemon is not None:
         yield of_device(context, "imu", daemon)
         return
-    if imu.driver in SERIAL:
+    if has_interface(imu.driver, "serial"):
         yield from _latency(context)
     try:
         measured = measure(lambda: _opened(context), SECONDS, context.clock)
     except DriverError as error:
         yield _unusable(context, error)
         return
-    if not measured.records and imu.driver in SERIAL:
+    if not measured.records and has_interface(imu.driver, "serial"):
         yield _other_protocol(context, f"{measured.name}: no sample came")
     else:
         yield from judged(context, measured)
@@ -67,12 +66,12 @@ def judged(context: Context, measured: Measured[ImuSample]) -> Iterator[Finding]
     if len(measured.records) < 2:
         yield fail("imu", f"{measured.name}: opens, but {len(measured.records)} samples came in {SECONDS:g} s")
         return
-    told = f"{measured.name}: {measured.told()}"
+    summary = f"{measured.name}: {measured.summary()}"
     if measured.rate_hz < SLOWEST_HZ:
-        remedy = "" if imu.driver in SERIAL else context.again("imu.rate_hz=200")
-        yield warn("imu", f"{told}, too few to follow a turn; {SLOWEST_HZ:g}/s at least, better 200", remedy)
+        remedy = "" if has_interface(imu.driver, "serial") else context.again("imu.rate_hz=200")
+        yield warn("imu", f"{summary}, too few to follow a turn; {SLOWEST_HZ:g}/s at least, better 200", remedy)
     else:
-        yield ok("imu", told)
+        yield ok("imu", summary)
     yield from _losses(measured)
     if measured.steps_back:
         yield warn("imu", f"{measured.steps_back} stamps that are not after the one before")
@@ -90,8 +89,8 @@ def _losses(measured: Measured[ImuSample]) -> Iterator[Finding]:
         )
     bad = {what: n for what, n in measured.counts.items() if what not in _HARMLESS | {"implausible"}}
     if sum(bad.values()) > max(_BAD_SHARE * len(measured.records), 1):
-        told = ", ".join(f"{what} {n}" for what, n in sorted(bad.items()))
-        yield warn("imu", f"losses: {told}; shorter wires, better supply, or a slower bus (docs/imus.md)")
+        summary = ", ".join(f"{what} {n}" for what, n in sorted(bad.items()))
+        yield warn("imu", f"losses: {summary}; shorter wires, better supply, or a slower bus (docs/imus.md)")
 
 
 def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
@@ -99,42 +98,47 @@ def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
     accel = np.array([sample.accel for sample in samples])
     if gyro.std(axis=0).max() > _STILL_RADPS or accel.std(axis=0).max() > _STILL_MPS2:
         yield warn(
-            "imu", "moves, so that gravity and bias cannot be told", f"{context.again()}  # while it stands still"
+            "imu", "moves, so that gravity and bias cannot be measured", f"{context.again()}  # while it stands still"
         )
         return
     gravity_mps2 = float(np.linalg.norm(accel.mean(axis=0)))
     axes = ", ".join(f"{value:+.2f}" for value in accel.mean(axis=0))
-    told = f"gravity {gravity_mps2:.2f} m/s² (x, y, z: {axes})"
+    summary = f"gravity {gravity_mps2:.2f} m/s² (x, y, z: {axes})"
     off_mps2 = abs(gravity_mps2 - STANDARD_GRAVITY_MPS2)
     if off_mps2 > _GRAVITY_WRONG_MPS2:
-        yield fail("imu", f"{told} instead of 9.81: it does not send m/s², falls, or its accelerometer is broken")
+        yield fail("imu", f"{summary} instead of 9.81: it does not send m/s², falls, or its accelerometer is broken")
     elif off_mps2 > _GRAVITY_OFF_MPS2:
-        yield warn("imu", f"{told} instead of 9.81", context.calibrate("imu"))
+        yield warn("imu", f"{summary} instead of 9.81", context.calibrate("imu"))
     else:
-        yield ok("imu", told)
+        yield ok("imu", summary)
     bias_radps = float(np.linalg.norm(gyro.mean(axis=0)))
     noise_radps = float(gyro.std(axis=0).max())
-    told = f"gyro at rest {bias_radps:.4f} rad/s, noise {noise_radps:.4f}"
+    summary = f"gyro at rest {bias_radps:.4f} rad/s, noise {noise_radps:.4f}"
     if bias_radps > _BIAS_RADPS:
         yield warn(
             "imu",
-            f"{told}: a large bias, or not rad/s; the daemon learns it, soonest while the vehicle stands",
+            f"{summary}: a large bias, or not rad/s; the daemon learns it, soonest while the vehicle stands",
             context.calibrate("imu"),
         )
     else:
-        yield ok("imu", told)
+        yield ok("imu", summary)
 
 
 def _none(context: Context) -> Finding:
-    text = "imu.driver is none: turns cannot be told from motion of others, and flow lines are widened"
+    text = "imu.driver is none: its own turns cannot be told from the motion of others, and flow lines are widened"
     shared = daemon_having(context, "imu", context.dev / f"i2c-{context.config.imu.bus}") is not None
     found = [] if shared else _chips(context)  # a look could take a byte out of the FIFO that the daemon reads
     if found:
         there = f"{', '.join(map(str, found))} on i2c-{context.config.imu.bus}"
-        return warn("imu", f"{text}; there is a {there}", context.again(*found[0].settings))
+        return warn("imu", f"{text}; found {there}", context.again(*found[0].settings))
     iio = sorted(context.sys.glob("bus/iio/devices/iio:device*/in_anglvel_x_raw"))
     if iio:
         return warn("imu", f"{text}; the kernel has one", context.again("imu.driver=iio"))
+    unknown = [] if shared else _strangers(context)
+    if unknown:
+        where = f"{', '.join(f'0x{address:02x}' for address in unknown)} on i2c-{context.config.imu.bus}"
+        what = f"{text}; at {where} is something that no driver knows: a copy of an IMU?"
+        return warn("imu", what, context.again("imu.driver=mpu6500", f"imu.address=0x{unknown[0]:02x}"))
     serial = ports(context.dev)
     there = f"; at a serial port: {', '.join(serial)}" if serial else ""
     return warn("imu", text + there, context.again("imu.driver=csv", f"imu.port={serial[0]}") if serial else "")
@@ -145,7 +149,7 @@ def _daemon(context: Context) -> Process | None:
     imu = context.config.imu
     if imu.driver == "recording":
         return None
-    if imu.driver == "iio":  # its files are open only for moments
+    if has_interface(imu.driver, "iio"):  # its files are open only for moments
         return next((process for process in processes(context.proc) if process.is_daemon), None)
     if not os.access(_node(context), os.R_OK | os.W_OK):
         return None  # opening it tells why
@@ -154,7 +158,7 @@ def _daemon(context: Context) -> Process | None:
 
 def _node(context: Context) -> Path:
     imu = context.config.imu
-    return Path(imu.port) if imu.driver in SERIAL else context.dev / f"i2c-{imu.bus}"
+    return Path(imu.port) if has_interface(imu.driver, "serial") else context.dev / f"i2c-{imu.bus}"
 
 
 def _opened(context: Context) -> Device[ImuSample]:
@@ -169,12 +173,12 @@ def _unusable(context: Context, error: DriverError) -> Finding:
     if imu.driver == "recording":
         return fail("imu", str(error))
     if isinstance(error, DeviceForbiddenError):
-        owner = "" if imu.driver == "iio" else permissions.owner(_node(context))
+        owner = "" if has_interface(imu.driver, "iio") else permissions.owner(_node(context))
         whose = f" (it belongs to the {owner})" if owner else ""
         return fail("imu", f"{short(error)}{whose}", permissions.join(permissions.group_of(imu.driver)))
-    if imu.driver == "iio":
+    if has_interface(imu.driver, "iio"):
         return fail("imu", str(error), "sudo modprobe inv_mpu6050_i2c  # or the driver of your chip")
-    if imu.driver in SERIAL:
+    if has_interface(imu.driver, "serial"):
         return _serial(context, error)
     return _i2c(context, error)
 
@@ -218,7 +222,7 @@ def _i2c(context: Context, error: DriverError) -> Finding:
     if found and isinstance(error, DeviceMissingError | WrongDeviceError):
         there = ", ".join(map(str, found))
         remedy = context.again(*found[0].settings)
-        return fail("imu", f"{short(error)}; there is a {there}", remedy)
+        return fail("imu", f"{short(error)}; found {there}", remedy)
     if isinstance(error, DeviceMissingError | DeviceLostError):
         return fail("imu", str(error), f"sudo i2cdetect -y {bus}  # nothing there: check VCC, GND, SDA, SCL")
     return fail("imu", str(error))
@@ -250,7 +254,16 @@ def _chips(context: Context) -> list[Chip]:
     try:
         with closing(context.open_bus(context.config.imu.bus)) as bus:
             return list(chips(bus))
-    except LcfError:
+    except DriverError:
+        return []
+
+
+def _strangers(context: Context) -> list[int]:
+    """On the configured bus; none where it cannot be opened."""
+    try:
+        with closing(context.open_bus(context.config.imu.bus)) as bus:
+            return strangers(bus)
+    except DriverError:
         return []
 
 

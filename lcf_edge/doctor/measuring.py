@@ -59,7 +59,7 @@ class Measured(Generic[Record]):
         stamps_ns = [record.stamp_ns for record in self.records]
         return [(later - earlier) / 1e9 for earlier, later in pairwise(stamps_ns)]
 
-    def told(self) -> str:
+    def summary(self) -> str:
         """Rate and jitter in words."""
         return f"{self.rate_hz:.1f}/s, jitter {1e3 * self.jitter_s:.1f} ms"
 

@@ -24,8 +24,8 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def _free(context: Context, budget_mib: float) -> Iterator[Finding]:
-    told = (context.proc / "meminfo").read_text(encoding="ascii")
-    sizes_mib = {name: int(kib) / 1024 for name, kib in re.findall(r"^(\w+):\s+(\d+) kB$", told, re.MULTILINE)}
+    meminfo = (context.proc / "meminfo").read_text(encoding="ascii")
+    sizes_mib = {name: int(kib) / 1024 for name, kib in re.findall(r"^(\w+):\s+(\d+) kB$", meminfo, re.MULTILINE)}
     available_mib = sizes_mib.get("MemAvailable", 0.0)
     text = f"{available_mib:.0f} MiB of {sizes_mib.get('MemTotal', 0.0):.0f} are available"
     swapped_mib = sizes_mib.get("SwapTotal", 0.0) - sizes_mib.get("SwapFree", 0.0)

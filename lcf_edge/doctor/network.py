@@ -93,8 +93,10 @@ def _with_the_files(options: Zenoh) -> Zenoh:
 
 def _endpoints(settings: zenoh.Config, name: str) -> list[str]:
     """A list, or one for each mode."""
-    told = json.loads(settings.get_json(f"{name}/endpoints"))
-    return [endpoint for one in told.values() for endpoint in one] if isinstance(told, dict) else list(told)
+    endpoints = json.loads(settings.get_json(f"{name}/endpoints"))
+    return (
+        [endpoint for one in endpoints.values() for endpoint in one] if isinstance(endpoints, dict) else list(endpoints)
+    )
 
 
 def _settings(options: Zenoh) -> zenoh.Config:

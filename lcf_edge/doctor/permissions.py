@@ -3,19 +3,19 @@
 import getpass
 import grp
 import os
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
+from drivers.imu.registry import DRIVERS, Interface
 from lcf_edge.config import Config
-from lcf_edge.devices import SERIAL
 from lcf_edge.doctor.finding import Context, Finding, ok, warn
+
+_GROUPS: Mapping[Interface, str] = {"i2c": "i2c", "serial": "dialout", "iio": "iio"}
 
 
 def group_of(driver: str) -> str:
     """The group that may use what ``imu.driver`` means; "" for none."""
-    if driver in ("none", "recording"):
-        return ""
-    return "iio" if driver == "iio" else "dialout" if driver in SERIAL else "i2c"
+    return _GROUPS[DRIVERS[driver].interface] if driver in DRIVERS else ""
 
 
 def check(context: Context) -> Iterator[Finding]:
@@ -41,7 +41,7 @@ def owner(path: Path) -> str:
 def needed(config: Config) -> list[tuple[str, str]]:
     """Groups, and which nodes in /dev should be theirs."""
     nodes = {"video": "video*", "i2c": f"i2c-{config.imu.bus}", "dialout": _inside(config.imu.port), "iio": "iio:*"}
-    video = "video" if config.camera.driver == "v4l2" else ""
+    video = "" if config.camera.driver == "recording" else "video"
     return [(group, nodes[group]) for group in (video, group_of(config.imu.driver)) if group]
 
 

@@ -1,14 +1,15 @@
-"""The unit of systemd: installed, enabled, running, and how it last ended."""
+"""The unit of systemd that has this configuration: installed, enabled, running, and how it last ended."""
 
 import subprocess
 from collections.abc import Iterator, Mapping
+from pathlib import Path
 
+from lcf_edge.config import DEFAULT_PATH
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 
-UNIT = "lcf-edge.service"
+UNIT = "lcf-edge"
 ANSWER_S = 5.0
 _ASKED = ("LoadState", "UnitFileState", "ActiveState", "SubState", "Result", "NRestarts", "ExecMainStatus", "MemoryMax")
-_JOURNAL = "journalctl -u lcf-edge -n 30 --no-pager"
 _ENDS = {
     "watchdog": "the pipeline hung and the watchdog killed it",
     "oom-kill": "it took more memory than MemoryMax",
@@ -18,61 +19,82 @@ _ENDS = {
 }
 
 
+def unit_of(path: Path, installed: Path) -> str:
+    """The unit that reads a configuration: lcf-edge@front for front.toml, where those of units are; else lcf-edge."""
+    file = path.absolute()
+    is_instance = file.parent == installed and file.suffix == ".toml" and file.name != DEFAULT_PATH.name
+    return f"{UNIT}@{file.stem}" if is_instance else UNIT
+
+
 def check(context: Context) -> Iterator[Finding]:
     """How systemd sees it."""
+    unit = unit_of(context.path, context.installed)
     try:
-        done = subprocess.run(
-            (*context.systemctl, "show", UNIT, f"--property={','.join(_ASKED)}"),
-            capture_output=True,
-            text=True,
-            timeout=ANSWER_S,
-            check=False,
-        )
+        properties = properties_of(context, unit)
     except FileNotFoundError:
         yield ok("service", "no systemd here: nothing starts lcf-edge at boot")
-        return
     except subprocess.TimeoutExpired:
-        yield warn("service", f"systemd does not answer within {ANSWER_S:g} s", "systemctl status lcf-edge")
-        return
-    told = dict(line.partition("=")[::2] for line in done.stdout.splitlines())
-    if not told:
-        yield ok("service", "systemd does not run here: nothing starts lcf-edge at boot")
+        yield warn("service", f"systemd does not answer within {ANSWER_S:g} s", f"systemctl status {unit}")
     else:
-        yield from judged(told, context.config.memory.budget_mib)
+        if not properties:
+            yield ok("service", "systemd does not run here: nothing starts lcf-edge at boot")
+        else:
+            yield from judged(properties, context.config.memory.budget_mib, unit)
 
 
-def judged(told: Mapping[str, str], budget_mib: float) -> Iterator[Finding]:
+def properties_of(context: Context, unit: str) -> Mapping[str, str]:
+    """What systemd says of a unit; empty: it does not run. Raises ``FileNotFoundError`` and ``TimeoutExpired``."""
+    done = subprocess.run(
+        (*context.systemctl, "show", f"{unit}.service", f"--property={','.join(_ASKED)}"),
+        capture_output=True,
+        text=True,
+        timeout=ANSWER_S,
+        check=False,
+    )
+    return dict(line.partition("=")[::2] for line in done.stdout.splitlines())
+
+
+def judged(properties: Mapping[str, str], budget_mib: float, unit: str = UNIT) -> Iterator[Finding]:
     """What is said of the unit's properties, as ``systemctl show`` tells them."""
-    if told.get("LoadState") == "not-found":
+    if properties.get("LoadState") == "not-found":
         yield ok("service", "not installed: nothing starts lcf-edge at boot (sudo make install, in the source)")
         return
-    if told.get("LoadState") != "loaded":
-        yield fail("service", f"the unit is {told.get('LoadState')}", f"systemd-analyze verify {UNIT}")
+    if properties.get("LoadState") != "loaded":
+        yield fail("service", f"the unit is {properties.get('LoadState')}", f"systemd-analyze verify {unit}.service")
         return
-    yield from _state(told)
-    if told.get("UnitFileState") not in ("enabled", "enabled-runtime"):
-        yield warn("service", "does not start at boot", "sudo systemctl enable lcf-edge")
-    limit = told.get("MemoryMax", "")
+    yield from _state(properties, unit)
+    if not starts_at_boot(properties):
+        yield warn("service", "does not start at boot", f"sudo systemctl enable {unit}")
+    limit = properties.get("MemoryMax", "")
     if limit.isdigit() and int(limit) / 2**20 < budget_mib * 4 / 3:
         yield warn(
             "service",
             f"MemoryMax is {int(limit) / 2**20:.0f} MiB, memory.budget_mib = {budget_mib:g} and a third is more",
-            f"sudo systemctl set-property lcf-edge MemoryMax={budget_mib * 4 / 3:.0f}M",
+            f"sudo systemctl set-property {unit} MemoryMax={budget_mib * 4 / 3:.0f}M",
         )
 
 
-def _state(told: Mapping[str, str]) -> Iterator[Finding]:
-    result, restarts = told.get("Result", ""), told.get("NRestarts", "0")
-    if told.get("ActiveState") == "failed":
-        if told.get("ExecMainStatus") == "2":
-            yield fail("service", "failed: its configuration cannot work", "lcf-edge config")
+def starts_at_boot(properties: Mapping[str, str]) -> bool:
+    """Whether a unit with these properties is enabled."""
+    return properties.get("UnitFileState") in ("enabled", "enabled-runtime")
+
+
+def _state(properties: Mapping[str, str], unit: str) -> Iterator[Finding]:
+    journal = f"journalctl -u {unit} -n 30 --no-pager"
+    result, restarts = properties.get("Result", ""), properties.get("NRestarts", "0")
+    if properties.get("ActiveState") == "failed":
+        if properties.get("ExecMainStatus") == "2":
+            file = f" -c {DEFAULT_PATH.parent}/{unit.partition('@')[2]}.toml" if "@" in unit else ""
+            yield fail("service", "failed: its configuration cannot work", f"lcf-edge config{file}")
         else:
-            why = _ENDS.get(result, f"{result}, exit status {told.get('ExecMainStatus')}")
-            again = "sudo systemctl reset-failed lcf-edge && sudo systemctl start lcf-edge"
-            yield fail("service", f"failed: {why}", f"{_JOURNAL}; {again}")
-    elif told.get("ActiveState") != "active":
-        yield warn("service", f"{told.get('ActiveState')} ({told.get('SubState')})", "sudo systemctl start lcf-edge")
+            why = _ENDS.get(result, f"{result}, exit status {properties.get('ExecMainStatus')}")
+            again = f"sudo systemctl reset-failed {unit} && sudo systemctl start {unit}"
+            yield fail("service", f"failed: {why}", f"{journal}; {again}")
+    elif properties.get("ActiveState") != "active":
+        yield warn(
+            "service", f"{properties.get('ActiveState')} ({properties.get('SubState')})", f"sudo systemctl start {unit}"
+        )
     elif restarts != "0":
-        yield warn("service", f"runs, after it was started anew {restarts} times by itself", _JOURNAL)
+        yield warn("service", f"runs, after it was started anew {restarts} times by itself", journal)
     else:
-        yield ok("service", f"{told.get('SubState')}, never started anew")
+        yield ok("service", f"{properties.get('SubState')}, never started anew")

@@ -42,8 +42,8 @@ def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
             wanted = f">={least[0]}.{least[1]},<{below[0]}"
             text = f"{name} {installed[name]} was never tried, wanted is {wanted}"
             yield (fail if numbers < least else warn)("software", text, f"pip install '{name}{wanted}'")
-    told = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
-    yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {told}")
+    versions = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
+    yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {versions}")
 
 
 def compilation(compiled: Compiled) -> Finding:

@@ -3,18 +3,15 @@
 from collections.abc import Iterator
 from contextlib import closing, suppress
 from dataclasses import dataclass
-from importlib import import_module
 
 from drivers.clock import Clock
 from drivers.errors import DriverError
+from drivers.imu import registry
 from drivers.imu.i2c_bus import I2cBus
-from drivers.imu.i2c_chips import CHIPS
-from drivers.imu.i2c_imu import I2cImu
 from drivers.imu.serial_port import SerialPort
-from drivers.imu.serial_protocols import PROTOCOLS
 
 LISTENED_S = 0.6
-LEAST_READINGS = 3  # fewer can be chance, or end with a slow one
+MIN_READINGS = 3  # fewer can be chance, or end with a slow one
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,18 +33,32 @@ class Chip:
 
 def chips(bus: I2cBus) -> Iterator[Chip]:
     """The chips at the addresses that IMUs have."""
-    kinds: dict[str, type[I2cImu]] = {
-        driver: getattr(import_module(f"drivers.imu.{driver}"), name) for driver, name in CHIPS.items()
-    }
-    addresses = sorted({kind.usual_address | last for kind in kinds.values() for last in (0, 1)})
-    for address in bus.scan(addresses):
+    kinds = registry.chips()
+    for address in bus.scan(_addresses()):
         for driver, kind in kinds.items():
-            if address in (kind.usual_address, kind.usual_address | 1):
+            if address in kind.addresses:
                 with suppress(DriverError):
-                    model = kind.identities.get(bus.read(address, kind.identity_register, 1, tries=2)[0])
+                    model = kind.recognised(bus, address)
                     if model is not None:
                         yield Chip(driver, model, address)
                         break
+
+
+def strangers(bus: I2cBus) -> list[int]:
+    """Addresses of IMUs at which something acknowledges that no driver knows, and that the kernel does not own."""
+    known = {chip.address for chip in chips(bus)}
+    found = []
+    for address in bus.scan(_addresses()):
+        if address not in known:
+            with suppress(DriverError):
+                bus.read(address, 0, 1, tries=2)
+                found.append(address)
+    return found
+
+
+def _addresses() -> list[int]:
+    """That IMUs have."""
+    return sorted({address for kind in registry.chips().values() for address in kind.addresses})
 
 
 @dataclass(frozen=True, slots=True)
@@ -66,14 +77,14 @@ class Spoken:
 
 def spoken(port: str, clock: Clock) -> Spoken | None:
     """What is spoken at a port, tried at all baud rates in use; None: nothing that is known."""
-    bauds = dict.fromkeys(baud for protocol in PROTOCOLS.values() for baud in protocol.bauds)
+    bauds = dict.fromkeys(baud for protocol in registry.protocols().values() for baud in protocol.bauds)
     understood = [found for baud in bauds for found in _understood(_heard(port, baud, clock), baud)]
     best = max(understood, key=lambda found: found.readings, default=None)
-    return best if best is not None and best.readings >= LEAST_READINGS else None
+    return best if best is not None and best.readings >= MIN_READINGS else None
 
 
 def _understood(data: bytes, baud: int) -> Iterator[Spoken]:
-    for name, protocol in PROTOCOLS.items():
+    for name, protocol in registry.protocols().items():
         yield Spoken(name, baud, len(protocol.parser().feed(data)))
 
 

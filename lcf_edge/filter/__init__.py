@@ -22,11 +22,15 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``baselines``        what the displacement since each key frame implies for this picture
 ``flow_fit``         what all edges together tell of the camera: errors of its rotation, and of O
 ``rest``             whether the vehicle stands, as the picture tells
+``ground_speed``     how fast the vehicle is, as the ground tells
 ``rebel_detection``  what breaks the flow over a chain of key positions, as equations
 ``alpha``            applies them: chains become rebel edges, rebels that obey go home
 ``circles``          what normal and rebel circles share
 ``normal_circles``   C_n from E_n
 ``rebel_circles``    C_r from E_r, with cause and time to contact
+``group_motion``     how edges that go together move: mean velocity and rate of expansion
+``range_belief``     what an object's motion says about its range and its motion over ground
+``square_expert``    S: circles that belong to one thing are an object
 ``feedback``         trusted normal circles become ψ, and ψ gives way
 """
 

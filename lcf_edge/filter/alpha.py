@@ -64,7 +64,7 @@ def judge_all(
             j = verdicts.count
             verdicts.count += 1
             verdicts.oldest[j] = key_frames.oldest_key(edges, i, keys)
-            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines, around.pinhole)
+            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines, around)
             rebel_detection.judge(verdicts, j, edges, baselines, around, settings)
     rebel_detection.find_incoming(verdicts, edges, baselines, around, settings)
 
@@ -141,7 +141,7 @@ def decide(
         if middle <= verdicts.oldest[j]:
             wait(edges, i, key, around)
             continue
-        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines, around.pinhole)
+        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines, around)
         rebel_detection.judge(recent, 0, edges, baselines, around, settings)
         if rebel_detection.agree(verdicts, j, recent, 0, baselines, settings):
             born[births] = j
@@ -169,7 +169,7 @@ def give_births(
     for b in range(births):
         j = born[b]
         slot = middle_key(verdicts, j, keys, key) % KEYS
-        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines, around.pinhole)
+        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines, around)
         rebel_detection.give_birth(edges, verdicts, j, recent, 0, baselines.elapsed_s[slot], settings)
 
 

@@ -17,9 +17,9 @@ class Baselines:
     """A row a slot of ``KeyFrames``.
 
     ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
-    ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: what the gyro leaves uncertain of the rotation
-    since, used until the flow tells better: ``is_fitted``, ``rate_covariance`` (3, 3), (rad/s)², of the error of the
-    rotation's rate that stays.
+    ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: what is uncertain of the rotation since, of this key
+    frame by itself: what the gyro leaves, or, once the flow told it, what that leaves. ``is_fitted``,
+    ``rate_covariance`` (3, 3), (rad/s)²: of the error of the rotation's rate that stays of a fit, which all share.
     """
 
     def __init__(self) -> None:
@@ -93,4 +93,5 @@ def sigma_along(baselines: Baselines, pinhole: Pinhole, slot: int, x: float, y: 
         for j in range(3):
             one, other = turn_px(pinhole, i, x, y, cos, sin), turn_px(pinhole, j, x, y, cos, sin)
             variance += one * baselines.rate_covariance[i, j] * other
-    return math.sqrt(max(variance, 0.0)) * baselines.elapsed_s[slot]
+    t, own = baselines.elapsed_s[slot], baselines.sigma_px[slot]
+    return math.sqrt(max(variance, 0.0) * t * t + own * own)

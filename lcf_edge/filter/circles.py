@@ -82,6 +82,7 @@ def give_birth(circles: CircleColumns, c: int, members: Members, g: int, setting
     circles.cause[c] = 0
     circles.ttc[c], circles.range[c], circles.lateral[c] = INFINITY, NAN, NAN
     circles.unseen_s[c] = 0.0
+    circles.square[c] = -1
 
 
 def free_row(circles: CircleColumns) -> int:

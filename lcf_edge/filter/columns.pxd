@@ -4,7 +4,7 @@ cdef class EdgeColumns:
     cdef public Py_ssize_t count, capacity
     cdef double[::1] x, y, beta, speed, bl, trust, deviation, origin_x, origin_y
     cdef double[:, ::1] key_x, key_y
-    cdef int[::1] born_key, circle, links
+    cdef int[::1] born_key, circle, square, links
     cdef unsigned char[::1] rebel, held, matched
     cdef unsigned char[:, ::1] appearance
     cdef unsigned long long[:, ::1] words
@@ -20,6 +20,17 @@ cdef class CircleColumns:
     cdef unsigned int[::1] id
     cdef int[::1] support
     cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral, unseen_s
+    cdef int[::1] square
+
+cdef class ObjectColumns:
+    cdef public Py_ssize_t capacity
+    cdef unsigned char[::1] active, class_id, state
+    cdef unsigned int[::1] id
+    cdef int[::1] support
+    cdef double[::1] x, y, width, height, looming, sideways, mm, qq, mq, log_odds, foot, trust, age_s, unseen_s
+    cdef double[::1] reference, middle, middle_sigma
+    cdef double[::1] ttc, ttc_sigma, range, range_sigma, lateral, lateral_sigma, forward, forward_sigma
+    cdef double[::1] right, right_sigma, closest, closest_sigma, probability
 
 cdef class PsiColumns:
     cdef public Py_ssize_t capacity, live_count

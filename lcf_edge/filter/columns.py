@@ -18,7 +18,7 @@ class EdgeColumns:
         self.bl, self.trust, self.deviation = memory["bl"], memory["trust"], memory["deviation"]
         self.origin_x, self.origin_y = memory["origin_x"], memory["origin_y"]
         self.key_x, self.key_y, self.born_key = memory["key_x"], memory["key_y"], memory["born_key"]
-        self.circle, self.links = memory["circle"], memory["links"]
+        self.circle, self.square, self.links = memory["circle"], memory["square"], memory["links"]
         self.rebel, self.held, self.matched = memory["rebel"], memory["held"], memory["matched"]
         self.appearance, self.words = memory["appearance"], memory["words"]
         self.predicted_x, self.predicted_y = memory["predicted_x"], memory["predicted_y"]
@@ -50,7 +50,28 @@ class CircleColumns:
         self.speed, self.expansion, self.trust = memory["speed"], memory["expansion"], memory["trust"]
         self.corr, self.width, self.height = memory["corr"], memory["width"], memory["height"]
         self.ttc, self.range, self.lateral = memory["ttc"], memory["range"], memory["lateral"]
-        self.unseen_s = memory["unseen_s"]
+        self.unseen_s, self.square = memory["unseen_s"], memory["square"]
+
+
+class ObjectColumns:
+    """Of an ``ObjectTable``."""
+
+    def __init__(self, memory: Memory) -> None:
+        self.capacity = len(memory["x"])
+        self.active, self.id, self.class_id = memory["active"], memory["id"], memory["class_id"]
+        self.state, self.support, self.trust = memory["state"], memory["support"], memory["trust"]
+        self.x, self.y, self.width, self.height = memory["x"], memory["y"], memory["width"], memory["height"]
+        self.looming, self.sideways = memory["looming"], memory["sideways"]
+        self.mm, self.qq, self.mq, self.log_odds = memory["mm"], memory["qq"], memory["mq"], memory["log_odds"]
+        self.reference, self.middle, self.middle_sigma = memory["reference"], memory["middle"], memory["middle_sigma"]
+        self.foot, self.age_s, self.unseen_s = memory["foot"], memory["age_s"], memory["unseen_s"]
+        self.ttc, self.ttc_sigma = memory["ttc"], memory["ttc_sigma"]
+        self.range, self.range_sigma = memory["range"], memory["range_sigma"]
+        self.lateral, self.lateral_sigma = memory["lateral"], memory["lateral_sigma"]
+        self.forward, self.forward_sigma = memory["forward"], memory["forward_sigma"]
+        self.right, self.right_sigma = memory["right"], memory["right_sigma"]
+        self.closest, self.closest_sigma = memory["closest"], memory["closest_sigma"]
+        self.probability = memory["probability"]
 
 
 class PsiColumns:

@@ -7,6 +7,7 @@ from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
 cdef double MIN_CORR
+cdef int CROSSING
 cdef double SWING_SHARE
 cdef double MIN_ORIGIN_PX
 cdef double MIN_RADIUS_PX
@@ -19,9 +20,10 @@ cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept n
 cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
 cdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
 cdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
-cpdef void update(EdgeColumns edges, CircleColumns normal, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
+cpdef void update(EdgeColumns edges, CircleColumns normal, CircleColumns rebel, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
 cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner, double dt_s) noexcept nogil
-cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, double x, double y, double dt_s, Settings settings) noexcept nogil
+cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, CircleColumns rebel, double x, double y, double dt_s, Settings settings) noexcept nogil
+cdef double trust_in_prediction(EdgeColumns edges, Py_ssize_t i, CircleColumns rebel, double x, double y, double dt_s, Settings settings) noexcept nogil
 cdef void turn_own_way(EdgeColumns edges, Py_ssize_t i) noexcept nogil
 cdef void stray(EdgeColumns edges, Py_ssize_t i, double x0, double y0, CornerColumns corners, Py_ssize_t corner, double dt_s, Settings settings) noexcept nogil
 cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, double tr_cr) noexcept nogil

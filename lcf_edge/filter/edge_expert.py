@@ -8,8 +8,10 @@ from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Bytes
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause
 
 MIN_CORR = 0.25
+CROSSING = int(Cause.CROSSING)
 SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nearer to the focus there is no direction from it
@@ -77,6 +79,7 @@ def go_on(edges: EdgeColumns, i: int) -> None:
 def update(
     edges: EdgeColumns,
     normal: CircleColumns,
+    rebel: CircleColumns,
     corners: CornerColumns,
     delta_px: float,
     dt_s: float,
@@ -95,7 +98,7 @@ def update(
         relation = relation_of(edges, i, x, y, delta_px, settings)
         go_on(edges, i)
         if relation in (edge_equations.FOLLOWS, edge_equations.DISAGREES):
-            correct(edges, i, normal, x, y, dt_s, settings)
+            correct(edges, i, normal, rebel, x, y, dt_s, settings)
             take_corner(edges, i, corners, corner, dt_s)
         change = edge_equations.trust_change(relation)
         edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
@@ -117,10 +120,18 @@ def take_corner(edges: EdgeColumns, i: int, corners: CornerColumns, corner: int,
 
 
 def correct(
-    edges: EdgeColumns, i: int, normal: CircleColumns, x: float, y: float, dt_s: float, settings: Settings
+    edges: EdgeColumns,
+    i: int,
+    normal: CircleColumns,
+    rebel: CircleColumns,
+    x: float,
+    y: float,
+    dt_s: float,
+    settings: Settings,
 ) -> None:
     """L, V, BL of an edge whose corner was found at (x, y) (eq. EnEstimation); β and DL of rebels and chains."""
-    trust, tr_cr, predicted = edges.trust[i], settings.tr_cr, edges.predicted_speed[i]
+    trust, tr_cr = trust_in_prediction(edges, i, rebel, x, y, dt_s, settings), settings.tr_cr
+    predicted = edges.predicted_speed[i]
     along = (x - edges.predicted_x[i]) * edges.cos[i] + (y - edges.predicted_y[i]) * edges.sin[i]
     speed = edge_equations.update_speed(trust, tr_cr, predicted, along, dt_s)
     edges.x[i] = edge_equations.update_position(trust, tr_cr, edges.predicted_x[i], x)
@@ -136,6 +147,25 @@ def correct(
         swing = SWING_SHARE * dt_s * math.fabs(speed)  # what comes near accelerates in the picture
         edges.bl[i] = max(edges.bl[i], swing)
         turn_own_way(edges, i)
+
+
+def trust_in_prediction(
+    edges: EdgeColumns, i: int, rebel: CircleColumns, x: float, y: float, dt_s: float, settings: Settings
+) -> float:
+    """Tr of an edge, by which L' counts: less where what crosses goes on faster than it did.
+
+    What comes near accelerates along its way: weighed by trust alone L' would fall behind by more and more, and miss
+    its gate where ``SWING_SHARE`` of the motion is more than that. So L is no more than δ behind its corner.
+    """
+    if not edges.rebel[i] or edges.circle[i] < 0 or rebel.cause[edges.circle[i]] != CROSSING:
+        return edges.trust[i]
+    dx, dy = x - edges.predicted_x[i], y - edges.predicted_y[i]
+    behind = dx * edges.cos[i] + dy * edges.sin[i]
+    aside = math.fabs(dy * edges.cos[i] - dx * edges.sin[i])
+    swing = SWING_SHARE * dt_s * edges.predicted_speed[i]
+    if min(behind, swing) <= settings.bl_min_px or aside > behind or behind <= settings.delta_px:
+        return edges.trust[i]
+    return min(edges.trust[i], settings.tr_cr + settings.delta_px / (behind - settings.delta_px))
 
 
 def turn_own_way(edges: EdgeColumns, i: int) -> None:

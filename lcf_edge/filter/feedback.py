@@ -10,7 +10,7 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.memory import integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.records import Shape
+from lcf_edge.messages import Shape
 
 PI = 3.141592653589793
 SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands

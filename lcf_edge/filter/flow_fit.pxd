@@ -14,6 +14,10 @@ cdef int MIN_EDGES
 cdef int MAX_EDGES
 cdef double MIN_ELAPSED_S
 cdef double MIN_R_PX
+cdef double TURN_SHARE
+cdef double TURN_MEMORY_S
+cdef double MIN_TURN_PX
+cdef int MIN_TURNED
 cdef int COLUMNS
 cdef int ROWS
 cdef double CELL_EDGES
@@ -39,21 +43,22 @@ cdef int FOCUS_Y
 
 cdef class FlowFit:
     cdef public int count
-    cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px
-    cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, rest
+    cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px, turn_share
+    cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, turned, rest
     cdef readonly int[::1] slot, cell, cells, bins
     cdef public NormalEquations equations
 
 cdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
 cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
 cdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
-cdef double quantile(FlowFit fit, double share) noexcept nogil
+cdef double quantile(FlowFit fit, double share, double turned_px, double turn_share) noexcept nogil
 cpdef double weight_of(double rest_px, double width_px) noexcept nogil
 cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double explained(FlowFit fit) noexcept nogil
 cdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
 cpdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
-cdef void turn_slot(FlowFit fit, int k, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
+cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
 cdef int slot_edges(FlowFit fit, int k) noexcept nogil
-cdef void apply(FlowFit fit, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
-cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
+cdef void apply(FlowFit fit, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
+cdef void learn_turn_share(FlowFit fit, double dt_s) noexcept nogil
+cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, double dt_s, Settings settings) noexcept nogil

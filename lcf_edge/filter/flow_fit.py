@@ -7,8 +7,10 @@ seconds ago r px from the focus, and went outward by μ·r since, lies off its f
 
 with ω the error of the rotation's rate, a the px across the flow for a turn of 1 rad about each axis, and ΔO the
 error of the focus. Least squares over edges from all over the picture, robust against what moves, gives ω and ΔO with
-their covariance; a second one gives each key frame that edges enough have seen a rotation of its own. How far edges
-stay off their lines after that (``scale_px``) tells how far they can be believed.
+their covariance; a second one gives each key frame that edges enough have seen a rotation of its own, which it keeps
+when those edges are gone. How far edges stay off their lines after that (``scale_px``) tells how far they can be
+believed. What a turn moves in the picture, only the lens tells; where it is guessed, edges stay off their lines by a
+share of that way (``turn_share``), which is learnt.
 """
 
 import math
@@ -28,6 +30,10 @@ MIN_EDGES = 15
 MAX_EDGES = 320  # and so many are enough
 MIN_ELAPSED_S = 0.15  # over a shorter time an edge tells nothing
 MIN_R_PX = 6.0  # nearer to the focus there is no flow line
+TURN_SHARE = 0.03  # of the way that a turn moves an edge, by which that may be wrong, before it is learnt
+TURN_MEMORY_S = 2.0  # over which it is
+MIN_TURN_PX = 4.0  # a shorter way tells nothing
+MIN_TURNED = 12  # edges that have it
 COLUMNS = 8  # cells of the picture, that count alike however many edges they hold
 ROWS = 6
 CELL_EDGES = 6.0  # edges of a cell that count fully
@@ -38,7 +44,7 @@ ROUNDS = 8
 NARROWING = 0.7  # of the width beyond which an edge is an outlier, from round to round,
 MIN_WIDTH_PX = 0.7  # down to this
 FIRST_WIDTH = 3.0  # of the median drift, to begin with
-SLOT_EDGES = 20  # for a rotation of a key frame's own
+SLOT_EDGES = 10  # for a rotation of a key frame's own
 SLOT_ROUNDS = 3
 SLOT_WIDTH_PX = 1.0
 SLOT_SHARE = 0.3  # of the sigma of ω, by which key frames may differ,
@@ -56,10 +62,12 @@ class FlowFit:
     """The fit of one frame.
 
     ``count``: edges behind it, 0: too few, and the rest is as of no fit. ``focus_x``, ``focus_y``: ΔO, px;
-    ``focus_sigma_x``, ``focus_sigma_y``: 1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``scale_px``: 1
-    sigma of what stays off the flow lines.
+    ``focus_sigma_x``, ``focus_sigma_y``: 1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``turn_share``: 1
+    sigma of where a turn moves an edge, as a share of that way, learnt from frame to frame. ``scale_px``: 1 sigma of
+    what stays off the flow lines besides.
 
-    A row an edge: ``drift``, px; ``pitch``, ``yaw``, ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: what ΔO does to
+    A row an edge: ``drift``, px; ``turned``: how far the turn moved it across the flow, px; ``pitch``, ``yaw``,
+    ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: what ΔO does to
     the drift; ``share``: weight by its cell; ``slot``; ``cell``; ``rest``: what is left of the drift, px.
     """
 
@@ -69,7 +77,8 @@ class FlowFit:
         self.focus_sigma_x = self.focus_sigma_y = self.prior_x = self.prior_y = 0.0
         self.drift, self.pitch, self.yaw, self.roll = (doubles(MAX_EDGES) for _ in range(4))
         self.elapsed_s, self.on_x, self.on_y, self.share = (doubles(MAX_EDGES) for _ in range(4))
-        self.rest = doubles(MAX_EDGES)
+        self.turned, self.rest = (doubles(MAX_EDGES) for _ in range(2))
+        self.turn_share = TURN_SHARE
         self.slot, self.cell = (integers(MAX_EDGES) for _ in range(2))
         self.cells = integers(COLUMNS * ROWS)
         self.bins = integers(BINS)
@@ -121,6 +130,8 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     moved_x, moved_y = edges.x[i] - x, edges.y[i] - y
     mu = (moved_x * cos + moved_y * sin) / r
     fit.drift[k] = flow.line_distance(moved_x, moved_y, cos, sin)
+    turned_x, turned_y = x - edges.key_x[i, slot], y - edges.key_y[i, slot]
+    fit.turned[k] = math.fabs(flow.line_distance(turned_x, turned_y, cos, sin))
     fit.pitch[k] = lines.turn_px(pinhole, 0, x, y, -sin, cos)
     fit.yaw[k] = lines.turn_px(pinhole, 1, x, y, -sin, cos)
     fit.roll[k] = lines.turn_px(pinhole, 2, x, y, -sin, cos)
@@ -133,13 +144,21 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     fit.count += 1
 
 
-def quantile(fit: FlowFit, share: float) -> float:
-    """Distance that this share of the edges stay within, px, of ``rest``; at most ``BINS``·``BIN_PX``."""
+def quantile(fit: FlowFit, share: float, turned_px: float, turn_share: float) -> float:
+    """Distance that this share of the edges stay within, px, of ``rest``; at most ``BINS``·``BIN_PX``.
+
+    Of those that turned by ``turned_px`` at least, their distances less what ``turn_share`` makes of them.
+    """
     for b in range(BINS):
         fit.bins[b] = 0
+    counted = 0
     for k in range(fit.count):
-        fit.bins[rounding.whole(min(math.fabs(fit.rest[k]) / BIN_PX, BINS - 1.0))] += 1
-    wanted = share * fit.count
+        if fit.turned[k] >= turned_px:
+            more = turn_share * fit.turned[k] / NOISE_PX
+            rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
+            fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
+            counted += 1
+    wanted = share * counted
     below = 0.0
     for b in range(BINS):
         if below + fit.bins[b] >= wanted:
@@ -184,7 +203,7 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
     """ω and ΔO, round by round narrower."""
     for k in range(fit.count):
         fit.rest[k] = fit.drift[k]
-    width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5))
+    width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5, 0.0, 0.0))
     for _ in range(ROUNDS):
         least_squares.begin(fit.equations, UNKNOWNS)
         for i in range(3):
@@ -201,8 +220,8 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
         width = max(MIN_WIDTH_PX, NARROWING * width)
 
 
-def turn_slot(fit: FlowFit, k: int, baselines: Baselines, pinhole: Pinhole, sigma_rad: float) -> None:
-    """A rotation of key frame ``k``'s own, of what is left."""
+def turn_slot(fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float) -> None:
+    """A rotation of key frame ``k``'s own, of what is left; the key frame keeps it."""
     fit.equations.answer[0] = fit.equations.answer[1] = fit.equations.answer[2] = 0.0
     for _ in range(SLOT_ROUNDS):
         least_squares.begin(fit.equations, 3)
@@ -220,6 +239,10 @@ def turn_slot(fit: FlowFit, k: int, baselines: Baselines, pinhole: Pinhole, sigm
         if fit.slot[j] == k:
             fit.rest[j] -= turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j]
     lines.turn(baselines, k, pinhole, turn_x, turn_y, turn_z)
+    least_squares.invert(fit.equations)
+    left_rad = NOISE_PX * math.sqrt(max(fit.equations.inverse[0, 0], fit.equations.inverse[1, 1]))
+    baselines.sigma_px[k] = left_rad * pinhole.focal
+    key_frames.learn(keys, k, turn_x, turn_y, turn_z, left_rad)
 
 
 def slot_edges(fit: FlowFit, k: int) -> int:
@@ -231,12 +254,12 @@ def slot_edges(fit: FlowFit, k: int) -> int:
     return edges
 
 
-def apply(fit: FlowFit, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
+def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
     """Correct the baselines by ω and ΔO, and note what stays uncertain."""
     turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
     fit.focus_x, fit.focus_y = fit.equations.answer[FOCUS_X], fit.equations.answer[FOCUS_Y]
     least_squares.invert(fit.equations)
-    fit.scale_px = quantile(fit, SCALE_SHARE) / SCALE_SIGMAS
+    fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
     variance = max(NOISE_PX, fit.scale_px) * max(NOISE_PX, fit.scale_px)
     fit.focus_sigma_x = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_X, FOCUS_X])
     fit.focus_sigma_y = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_Y, FOCUS_Y])
@@ -251,12 +274,33 @@ def apply(fit: FlowFit, baselines: Baselines, pinhole: Pinhole, sigma_radps: flo
         lines.turn(baselines, k, pinhole, t * turn_x, t * turn_y, t * turn_z)
         if slot_edges(fit, k) >= SLOT_EDGES:
             sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, baselines.sigma_px[k] / pinhole.focal)
-            turn_slot(fit, k, baselines, pinhole, sigma_rad)
-    fit.scale_px = quantile(fit, SCALE_SHARE) / SCALE_SIGMAS
+            turn_slot(fit, k, keys, baselines, pinhole, sigma_rad)
+    fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
+
+
+def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
+    """What edges that a turn moved stay off their lines by, beyond the noise of all, as a share of that way."""
+    turned, way2 = 0, 0.0
+    for k in range(fit.count):
+        if fit.turned[k] >= MIN_TURN_PX:
+            turned += 1
+            way2 += fit.turned[k] * fit.turned[k]
+    if turned < MIN_TURNED:
+        return
+    off_px = quantile(fit, SCALE_SHARE, MIN_TURN_PX, 0.0) / SCALE_SIGMAS
+    told2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
+    gain = 1 - math.exp(-dt_s / TURN_MEMORY_S)
+    fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (told2 - fit.turn_share * fit.turn_share))
 
 
 def measure(
-    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, settings: Settings
+    fit: FlowFit,
+    edges: EdgeColumns,
+    keys: KeyFrames,
+    baselines: Baselines,
+    pinhole: Pinhole,
+    dt_s: float,
+    settings: Settings,
 ) -> None:
     """Fit the frame, and correct the baselines by it. ``prior_x``, ``prior_y`` must be set."""
     fit.focus_x = fit.focus_y = fit.scale_px = 0.0
@@ -267,4 +311,5 @@ def measure(
         return
     sigma_radps = rate_sigma(fit, baselines, pinhole.focal)
     solve(fit, sigma_radps)
-    apply(fit, baselines, pinhole, sigma_radps)
+    apply(fit, keys, baselines, pinhole, sigma_radps)
+    learn_turn_share(fit, dt_s)

@@ -79,10 +79,10 @@ def unpulled(shift_rad: float, prior_rad: float, sigma_rad: float) -> float:
 
 def mounting_gain(mounting_rad: float, prior_rad: float, sigma_rad: float, aside_rad: float, dt_s: float) -> float:
     """Kalman gain of one fit. All 1 sigma: of the mounting, of O before and after the fit, of O aside in a turn."""
-    told = 1 / max(sigma_rad * sigma_rad, MIN_VARIANCE) - 1 / (prior_rad * prior_rad)  # by the flow alone
-    if told <= 0:
+    information = 1 / max(sigma_rad * sigma_rad, MIN_VARIANCE) - 1 / (prior_rad * prior_rad)  # by the flow alone
+    if information <= 0:
         return 0.0
-    noise = 1 / told + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD + aside_rad * aside_rad
+    noise = 1 / information + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD + aside_rad * aside_rad
     noise *= max(1.0, FIT_WINDOW_S / dt_s)
     return mounting_rad * mounting_rad / (mounting_rad * mounting_rad + noise)
 

@@ -36,12 +36,11 @@ class Motion:
 
     ``dt_s``: t_f, from capture stamps. ``rotation``: float64 (3, 3), takes a direction from the last exposure's camera
     axes to this one's. ``rotation_sigma_rad``: its uncertainty. ``speed_mps``: V_ν, NaN: unknown.
-    ``yaw_rate_radps``: of the
-    vehicle's path, turning left is positive (the camera may shake besides).
+    ``path_yaw_rate_radps``: of the vehicle's path, turning left is positive (the camera may shake besides).
     """
 
     dt_s: float
     rotation: npt.NDArray[np.float64]
     rotation_sigma_rad: float
     speed_mps: float
-    yaw_rate_radps: float
+    path_yaw_rate_radps: float

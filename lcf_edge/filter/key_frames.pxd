@@ -5,12 +5,14 @@ from lcf_edge.filter.columns cimport EdgeColumns
 cdef int KEYS
 
 cdef class KeyFrames:
-    cdef readonly double[:, :, ::1] rotation
+    cdef readonly double[:, :, ::1] rotation, step
     cdef readonly double[:, ::1] displacement
     cdef readonly double[::1] elapsed_s, sigma_rad
     cdef public int number
     cdef public double since_s
 
+cdef void turn_one(KeyFrames keys, Py_ssize_t k, const double[:, :, ::1] rotation) noexcept nogil
+cdef void learn(KeyFrames keys, int k, double x, double y, double z, double sigma_rad) noexcept nogil
 cpdef void turn(KeyFrames keys, const double[:, :, ::1] rotation) noexcept nogil
 cpdef void advance(KeyFrames keys, const double[:, :, ::1] rotation, double ahead_x, double ahead_y, double ahead_z, double way_m, double dt_s) noexcept nogil
 cpdef void inflate(KeyFrames keys, double sigma_rad) noexcept nogil

@@ -13,27 +13,45 @@ class KeyFrames:
     """A point that stands still at X in the axes of key frame k is now at ``rotation[k]``·X - ``displacement[k]``.
 
     ``elapsed_s``: since each. ``sigma_rad``: uncertainty of the rotation since. ``number``: key frames so far; the slot
-    of key frame i is i mod KEYS. ``since_s``: time since the last one.
+    of key frame i is i mod KEYS. ``since_s``: time since the last one. ``step``: (1, 3, 3), room for a rotation.
     """
 
     def __init__(self) -> None:
         self.rotation = memory_of(np.tile(np.eye(3), (KEYS, 1, 1)))
         self.displacement = doubles(KEYS, 3)
+        self.step = doubles(1, 3, 3)
         self.elapsed_s, self.sigma_rad = doubles(KEYS), doubles(KEYS)
         self.number = 0
         self.since_s = 0.0
 
 
+def turn_one(keys: KeyFrames, k: int, rotation: Doubles) -> None:
+    """A rotation (1, 3, 3) comes on top of that since the key frame in slot ``k``."""
+    for j in range(3):
+        x, y, z = keys.rotation[k, 0, j], keys.rotation[k, 1, j], keys.rotation[k, 2, j]
+        for i in range(3):
+            keys.rotation[k, i, j] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
+    x, y, z = keys.displacement[k, 0], keys.displacement[k, 1], keys.displacement[k, 2]
+    for i in range(3):
+        keys.displacement[k, i] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
+
+
+def learn(keys: KeyFrames, k: int, x: float, y: float, z: float, sigma_rad: float) -> None:
+    """The flow tells the rotation since the key frame in slot ``k``: it was mistaken by so much, rad about each axis.
+
+    ``sigma_rad``: what stays uncertain.
+    """
+    keys.step[0, 0, 0] = keys.step[0, 1, 1] = keys.step[0, 2, 2] = 1.0
+    keys.step[0, 0, 1], keys.step[0, 0, 2], keys.step[0, 1, 2] = -z, y, -x
+    keys.step[0, 1, 0], keys.step[0, 2, 0], keys.step[0, 2, 1] = z, -y, x
+    turn_one(keys, k, keys.step)
+    keys.sigma_rad[k] = min(keys.sigma_rad[k], sigma_rad)
+
+
 def turn(keys: KeyFrames, rotation: Doubles) -> None:
     """A rotation (1, 3, 3) comes on top of those since each key frame: R ← rotation·R, d ← rotation·d."""
     for k in range(KEYS):
-        for j in range(3):
-            x, y, z = keys.rotation[k, 0, j], keys.rotation[k, 1, j], keys.rotation[k, 2, j]
-            for i in range(3):
-                keys.rotation[k, i, j] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
-        x, y, z = keys.displacement[k, 0], keys.displacement[k, 1], keys.displacement[k, 2]
-        for i in range(3):
-            keys.displacement[k, i] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
+        turn_one(keys, k, rotation)
 
 
 def advance(

@@ -14,12 +14,16 @@ from lcf_edge.filter import (
     feedback,
     flow,
     flow_fit,
+    ground_speed,
     key_frames,
+    leaps,
     line_expert,
     matching,
     normal_circles,
+    patches,
     rebel_circles,
     rest,
+    square_expert,
 )
 from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import heading as headings
@@ -29,23 +33,29 @@ from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
+from lcf_edge.filter.ground_speed import GroundSpeed
 from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import Corners, Motion
 from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.leaps import Leaps
 from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.memory import Doubles, integers, memory_of, octets
 from lcf_edge.filter.normal_circles import Flowing
+from lcf_edge.filter.patch_circles import PatchGroups
+from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.rest import RestTest
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation, follow
-from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, PsiTable
+from lcf_edge.filter.square_expert import Squares
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, ObjectTable, PsiTable
 from lcf_edge.lens import Lens
-from lcf_edge.records import Sizes
+from lcf_edge.messages import Sizes
 
 Matrix = npt.NDArray[np.float64]
+Grey = npt.NDArray[np.uint8]
 
 SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
 SURPRISES = 3.0  # and by so many times what the gyro lately missed
@@ -104,6 +114,7 @@ class LineCircleFilter:
         self.edges = EdgeTable(memory.edges_normal, memory.edges_rebel, memory.chains)
         self.normal = CircleTable(memory.circles_normal)
         self.rebel = CircleTable(memory.circles_rebel)
+        self.objects = ObjectTable(memory.objects)
         self.psi = PsiTable(memory.psi)
         self.groups = GroupTable(memory.groups)
         self.corners = CornerTable(memory.corners)
@@ -118,19 +129,24 @@ class LineCircleFilter:
         self._baselines = Baselines()
         self._fit = FlowFit()
         self._rest = RestTest()
+        self.ground = GroundSpeed()
         self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
         self._homography = Homography()
         self._off_line = OffLine()
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
+        self._leaps = Leaps(capacity)
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
         self._flowing = Flowing(capacity, memory.circles_normal)
         self._rebel_groups = RebelGroups(memory.edges_rebel, memory.circles_rebel)
+        self.patches = Patches(config.filter.patches)
+        self._patch_groups = PatchGroups(config.filter.patches)
+        self._squares = Squares(memory.circles_rebel, memory.objects, capacity)
         self._candidates = Candidates(memory.circles_normal)
         self._ids = Ids()  # one count, so that an id names one circle of either kind
-        self._psi_ids = Ids()
+        self._psi_ids, self._object_ids = Ids(), Ids()
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each preallocated table; the work space of a step, which is kept too, takes less than the edges."""
@@ -138,10 +154,12 @@ class LineCircleFilter:
             "edges (E_n, E_r, α)": self.edges.nbytes,
             "circles_normal (C_n)": self.normal.nbytes,
             "circles_rebel (C_r)": self.rebel.nbytes,
+            "objects (S)": self.objects.nbytes,
             "groups (λ)": self.groups.nbytes,
             "psi (ψ)": self.psi.nbytes,
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
+            "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
         }
 
     @property
@@ -160,8 +178,11 @@ class LineCircleFilter:
         """Whether the picture says that the vehicle stands, although a speed is told."""
         return bool(self._rest.stands)
 
-    def step(self, corners: Corners, motion: Motion) -> Step:
-        """Take one frame. ``motion.dt_s`` must be positive."""
+    def step(self, corners: Corners, motion: Motion, picture: Grey | None = None) -> Step:
+        """Take one frame. ``motion.dt_s`` must be positive.
+
+        ``picture``: uint8 (height, width), which the corners are of; without one no patches are followed.
+        """
         motion = self._rested(motion)
         self._take(corners)
         self._derotate(motion)
@@ -172,10 +193,15 @@ class LineCircleFilter:
         sigma_rad, residual = self._refine(motion)
         self._update(sigma_rad)
         evicted += self._add()
+        pixels = None if picture is None else memory_of(np.ascontiguousarray(picture).reshape(-1))
+        if pixels is not None:
+            patches.follow(self.patches, pixels, self._plane)
         rebels, left = self._detect()
         evicted += left
         evicted += self._update_circles(rebels)
         evicted += self.edges.trim()
+        if pixels is not None:
+            patches.renew(self.patches, self.edges.columns, pixels, self._plane, self._around)
         return Step(
             np.asarray(self.corners.omitted[: len(corners)].copy()),
             self._sizes(len(corners), omitted, evicted),
@@ -204,14 +230,16 @@ class LineCircleFilter:
     def _derotate(self, motion: Motion) -> None:
         """Step 0, and the predictions of circles and ψ."""
         rotation = _memory(motion.rotation)
-        headings.turn_heading(self._heading, rotation, motion.yaw_rate_radps, motion.dt_s)
+        headings.turn_heading(self._heading, rotation, motion.path_yaw_rate_radps, motion.dt_s)
         ray_x, ray_y = self._heading.ray_x, self._heading.ray_y
-        follow(self._around, ray_x, ray_y, motion.speed_mps, motion.yaw_rate_radps, motion.dt_s)
+        follow(self._around, ray_x, ray_y, motion.speed_mps, motion.path_yaw_rate_radps, motion.dt_s)
         self._advance_keys(rotation, motion)
         self._warp(rotation)
         normal_circles.predict(self.normal.columns, self._plane, self._around)
         rebel_circles.predict(self.rebel.columns, self._around)
         rebel_circles.end_outside(self.rebel.columns, self._plane, self._around, self._settings)
+        patches.predict(self.patches, self._around)
+        square_expert.predict(self.objects.columns, self._plane, self._around, self._settings)
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
     def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
@@ -227,6 +255,8 @@ class LineCircleFilter:
         derotation.derotate_edges(self.edges.columns, self._homography, roll)
         derotation.derotate_circles(self.normal.columns, self._homography, roll)
         derotation.derotate_circles(self.rebel.columns, self._homography, roll)
+        patches.derotate(self.patches, self._homography)
+        square_expert.derotate(self.objects.columns, self._homography)
         derotation.derotate_psi(self.psi.columns, self._homography)
 
     def _predict(self) -> None:
@@ -253,7 +283,9 @@ class LineCircleFilter:
     def _find(self, motion: Motion) -> None:
         """Corners for edges."""
         slack_px = self._slack_px(motion)
-        matching.find(self._index, self._plane, self.edges.columns, self.corners.columns, slack_px, self._settings)
+        edges, corners, settings = self.edges.columns, self.corners.columns, self._settings
+        matching.find(self._index, self._plane, edges, corners, slack_px, settings)
+        leaps.find(self._leaps, self._index, self._plane, edges, corners, settings)
 
     def _slack_px(self, motion: Motion) -> float:
         """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""
@@ -284,7 +316,9 @@ class LineCircleFilter:
         edges, settings = self.edges.columns, self._settings
         delta_px = settings.delta_px + 2 * sigma_rad * self._pinhole.focal
         dt_s = self._around.dt_s
-        edge_expert.update(edges, self.normal.columns, self.corners.columns, delta_px, dt_s, settings)
+        edge_expert.update(
+            edges, self.normal.columns, self.rebel.columns, self.corners.columns, delta_px, dt_s, settings
+        )
         edge_expert.delete(edges, self._plane, self._dead, settings.tr_cr)
 
     def _add(self) -> int:
@@ -326,6 +360,8 @@ class LineCircleFilter:
         lines.measure(baselines, keys, self._homography, self._pinhole, around)
         self._fit_flow()
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
+        ground_speed.measure(self.ground, edges, verdicts, baselines, around)
+        around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)
         wanted = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
         births, evicted = self._make_room(wanted)
@@ -337,7 +373,10 @@ class LineCircleFilter:
         fit, around, heading, pinhole = self._fit, self._around, self._heading, self._pinhole
         fit.prior_x = headings.focus_sigma_rad(heading.sigma_x) * pinhole.fx
         fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy
-        flow_fit.measure(fit, self.edges.columns, self._keys, self._baselines, pinhole, self._settings)
+        edges, settings = self.edges.columns, self._settings
+        flow_fit.measure(fit, edges, self._keys, self._baselines, pinhole, around.dt_s, settings)
+        around.turn_share = fit.turn_share
+        around.flow_is_seen = fit.count > 0
         if fit.count:
             around.focus_x += fit.focus_x
             around.focus_y += fit.focus_y
@@ -374,10 +413,25 @@ class LineCircleFilter:
             self._verdicts,
             self._breaking,
             rebels,
+            self.patches,
+            self._patch_groups,
             self._baselines,
             around,
             settings,
             self._ids,
+        )
+        evicted += square_expert.update(
+            self._squares,
+            self.objects.columns,
+            rebel,
+            self._verdicts,
+            edges,
+            self.patches,
+            self._baselines,
+            self._plane,
+            around,
+            settings,
+            self._object_ids,
         )
         evicted += feedback.write(psi, normal, edges, candidates, self._keys, around, settings, self._psi_ids)
         feedback.give_way(psi, candidates, edges, rebel, self._plane, settings.psi_margin_px)
@@ -397,6 +451,7 @@ class LineCircleFilter:
             groups=self.groups.count,
             psi=self.psi.count,
             evicted=evicted,
+            objects=self.objects.count,
         )
 
 

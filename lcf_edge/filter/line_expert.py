@@ -7,7 +7,7 @@ from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, G
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.settings import Settings
-from lcf_edge.records import Shape
+from lcf_edge.messages import Shape
 
 MISSING_SHARE = 0.4  # of the edges under ψ may have no corner where they are predicted
 NEW_SHARE = 0.4  # and so many corners, for each edge, may lie where none is

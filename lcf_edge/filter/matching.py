@@ -93,7 +93,7 @@ def last_cell(middle: float, gate: float, cells: int) -> int:
 def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> float:
     """Mean absolute grey difference of two appearances."""
     total = 0
-    for k in range(edges.appearance.shape[1]):
+    for k in range(16):  # APPEARANCE_SAMPLES, as a number: one vector instruction
         total += abs(edges.appearance[i, k] - index.appearance[place, k])
     return total * MEAN_OF_SUM
 
@@ -101,7 +101,7 @@ def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> fl
 def contrast(edges: EdgeColumns, i: int) -> float:
     """Mean absolute grey difference of an appearance from its mean."""
     total = 0
-    for k in range(edges.appearance.shape[1]):
+    for k in range(16):  # APPEARANCE_SAMPLES
         total += abs(edges.appearance[i, k] - MEAN_GREY)
     return total * MEAN_OF_SUM
 

@@ -1,11 +1,13 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter cimport edge_equations, flow, image_plane, patch_circles, path, situation
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.patch_circles cimport PatchGroups
+from lcf_edge.filter.patches cimport Patches
 from lcf_edge.filter.rebel_detection cimport Verdicts
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
@@ -23,6 +25,16 @@ cdef double MIN_SHOWN_PX
 cdef double LEADER_HEIGHT_SHARE
 cdef double MIRROR_NOISE_PX
 cdef double MIRROR_SIGMAS
+cdef double SURE_REBELS
+cdef double MOVER_SHARE
+cdef double LIKELY_OWN_S
+cdef double OWN_SHARE
+cdef double SPREAD_NOISE_PX
+cdef int STRAY_ROUNDS
+cdef double STRAY_SIGMAS
+cdef double STRAY_SHARE
+cdef double SPREAD_SIGMAS
+cdef double SPREAD_SHARE
 cdef double MAX_RANGE_M
 cdef double MAX_TTC_HORIZONS
 cdef double MIN_EXTENT2_PX
@@ -31,6 +43,7 @@ cdef double LINK_SHARE
 cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE
+cdef double MAX_TURN_RAD
 cdef int CROSSING
 cdef int INCOMING
 cdef int LEADING
@@ -43,14 +56,16 @@ cdef class RebelGroups:
     cdef readonly double[::1] vx, vy, elapsed_s
     cdef readonly Members members
     cdef readonly double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
-    cdef readonly double[::1] rate_below, r2_below2
+    cdef readonly double[::1] rate_below, r2_below2, then_x, then_y, spread, spreading
+    cdef readonly double[::1] expansion, weight, weighed_rate
     cdef readonly int[::1] standing, inwards, flowing, circle
     cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
     cdef unsigned char[::1] odd, updated, missed
 
 cpdef void predict(CircleColumns circles, Situation around) noexcept nogil
-cdef bint coasts(CircleColumns circles, Py_ssize_t c, double horizon_s, Settings settings) noexcept nogil
+cdef bint coasts(CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+@cython.locals(near=bint)
 cpdef void end_outside(CircleColumns circles, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 cdef int circle_at(CircleColumns circles, double x, double y, Settings settings) noexcept nogil
 cdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) noexcept nogil
@@ -65,8 +80,10 @@ cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
+cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
+cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
-@cython.locals(few=bint)
+@cython.locals(few=bint, stands=bint)
 cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 @cython.locals(inside=bint)
 cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
@@ -77,7 +94,6 @@ cpdef double bounded(double size_px, double shown_px) noexcept nogil
 cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef int largest_new(RebelGroups groups) noexcept nogil
 cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
-cdef double standing_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef double own_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil
 @cython.locals(stands=bint)
@@ -87,6 +103,6 @@ cdef double finite(double value) noexcept nogil
 cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint stands, double aside_mps, Situation around) noexcept nogil
 @cython.locals(across=bint)
 cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
-@cython.locals(waits=bint)
+@cython.locals(near=bint, waits=bint)
 cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

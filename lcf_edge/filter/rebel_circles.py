@@ -3,16 +3,18 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, image_plane, path, situation
+from lcf_edge.filter import edge_equations, flow, image_plane, patch_circles, path, situation
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Integers, doubles, integers, octets
+from lcf_edge.filter.patch_circles import PatchGroups
+from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.records import Cause
+from lcf_edge.messages import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
 STILL_PX = 6.0  # circles that moved less over that time have no direction
@@ -27,6 +29,16 @@ MIN_SHOWN_PX = 12.0  # which is taken for no smaller than this
 LEADER_HEIGHT_SHARE = 0.3  # of the camera's height that a leader has at least; paint and reflections have less
 MIRROR_NOISE_PX = 0.6  # 1 sigma of how far an edge went
 MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group better than something upright
+SURE_REBELS = 5.0  # fewer tell less, and must be seen once more before their circle is told
+MOVER_SHARE = 0.25  # of the edges in a circle that moves must be rebels: where things repeat, edges swap places
+LIKELY_OWN_S = 0.9  # what has not moved in the picture for so long may be of an own part;
+OWN_SHARE = 0.1  # so many of these, as a share of the rebels that they lie among, make them own parts too
+SPREAD_NOISE_PX = 0.85  # 1 sigma of how far an edge went, of two places
+STRAY_ROUNDS = 2
+STRAY_SIGMAS = 2.0  # of its place, and
+STRAY_SHARE = 0.25  # this share of the expansion, beyond which an edge is a stray
+SPREAD_SIGMAS = 2.0  # of it, by which what stands may spread less
+SPREAD_SHARE = 0.5  # than this share of what its way outward from O tells
 MAX_RANGE_M = 1000.0  # farther off nothing is known
 MAX_TTC_HORIZONS = 10.0  # and later than so many horizons
 MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
@@ -36,6 +48,7 @@ LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share 
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
+MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
 CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
@@ -51,8 +64,10 @@ class RebelGroups:
     stand still and are incoming, and how many fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
     ``focus_r2``, means of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h
     and r²·h², h px under the horizon; ``below2`` and ``below_vy``, of the height under the horizon squared, and
-    times V; ``flowing``, normal edges inside; ``odd``, too few of those inside are rebels; ``circle``, row of C_r, -1:
-    none; ``votes`` for each circle.
+    times V; ``then_x``, ``then_y``, means of where they were; ``spread``, ``spreading``, sums of how far they were
+    from there, squared, and times how fast they go away from there; ``expansion``, V_e/r about O, and the sums that it
+    comes from, ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, too few of those inside are
+    rebels; ``circle``, row of C_r, -1: none; ``votes`` for each circle.
     """
 
     def __init__(self, rebels: int, circles: int) -> None:
@@ -64,6 +79,8 @@ class RebelGroups:
         self.closing_mps, self.focus_rate = (doubles(rebels) for _ in range(2))
         self.focus_r2, self.below2, self.below_vy = (doubles(rebels) for _ in range(3))
         self.rate_below, self.r2_below2 = (doubles(rebels) for _ in range(2))
+        self.then_x, self.then_y, self.spread, self.spreading = (doubles(rebels) for _ in range(4))
+        self.expansion, self.weight, self.weighed_rate = (doubles(rebels) for _ in range(3))
         self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
         self.odd = octets(rebels)
         self.votes = integers(rebels, circles)
@@ -99,13 +116,17 @@ def predict(circles: CircleColumns, around: Situation) -> None:
         circles.ttc[c] -= around.dt_s
 
 
-def coasts(circles: CircleColumns, c: int, horizon_s: float, settings: Settings) -> bool:
-    """Whether a trusted circle is so near to contact that it grows too fast to be followed."""
+def coasts(circles: CircleColumns, c: int, around: Situation, settings: Settings) -> bool:
+    """Whether a circle that was seen three times or more is so near that it grows too fast to be followed.
+
+    In a turn it may as well be lost for another reason, and passed by.
+    """
     return (
         circles.active[c] != 0
-        and math.fabs(circles.ttc[c]) < COAST_SHARE * horizon_s
+        and math.fabs(circles.ttc[c]) < COAST_SHARE * around.horizon_s
+        and math.fabs(circles.ttc[c] * around.yaw_rate_radps) < MAX_TURN_RAD
         and max(circles.width[c], circles.height[c]) > settings.min_coast_px
-        and circles.trust[c] >= settings.tr_s
+        and circles.trust[c] >= 0.5 * (settings.tr_s + settings.tr_max)
     )
 
 
@@ -113,12 +134,13 @@ def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, se
     """Circles that left the frame end.
 
     What is about to be met fills the picture, and is not gone because its middle has left: there the innermost point of
-    its extent must leave.
+    its extent must leave, and what stands must be seen to flow again.
     """
     for c in range(circles.capacity):
-        if not circles.active[c]:
+        near = coasts(circles, c, around, settings)
+        if not circles.active[c] or (near and not around.flow_is_seen):
             continue
-        half = 0.5 if coasts(circles, c, around.horizon_s, settings) else 0.0
+        half = 0.5 if near else 0.0
         across, down = half * circles.width[c], half * circles.height[c]
         x = circles.x[c] + min(max(around.pinhole.cx - circles.x[c], -across), across)
         y = circles.y[c] + min(max(around.pinhole.cy - circles.y[c], -down), down)
@@ -251,6 +273,7 @@ def clear_group(groups: RebelGroups, g: int) -> None:
     groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
     groups.rate_below[g] = groups.r2_below2[g] = 0.0
+    groups.then_x[g] = groups.then_y[g] = groups.spread[g] = groups.spreading[g] = 0.0
     groups.flowing[g] = groups.standing[g] = groups.inwards[g] = 0
 
 
@@ -279,6 +302,8 @@ def average(
         below = verdicts.y[j] - around.horizon_y
         members.x[g] += share * edges.x[i]
         members.y[g] += share * edges.y[i]
+        groups.then_x[g] += share * verdicts.x[j]
+        groups.then_y[g] += share * verdicts.y[j]
         groups.mean_vx[g] += share * groups.vx[k]
         groups.mean_vy[g] += share * groups.vy[k]
         groups.mean_s[g] += share * groups.elapsed_s[k]
@@ -300,6 +325,47 @@ def average(
             dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
             members.variance_x[g] += dx * dx / members.size[g]
             members.variance_y[g] += dy * dy / members.size[g]
+            j = groups.verdict[k]
+            dx, dy = verdicts.x[j] - groups.then_x[g], verdicts.y[j] - groups.then_y[g]
+            groups.spread[g] += dx * dx + dy * dy
+            groups.spreading[g] += dx * (groups.vx[k] - groups.mean_vx[g]) + dy * (groups.vy[k] - groups.mean_vy[g])
+
+
+def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
+    """V_e/r about O of each group, by least squares, so that far edges count more, and strays hardly.
+
+    A stray is an edge that took the place of another one; w = 1/(1 + (off/width)²)² (Geman and McClure).
+    """
+    for g in range(groups.groups):
+        groups.expansion[g] = groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
+    for _ in range(STRAY_ROUNDS):
+        for g in range(groups.groups):
+            groups.weight[g] = groups.weighed_rate[g] = 0.0
+        for k in range(groups.count):
+            g, j = groups.group[k], groups.verdict[k]
+            if g < 0:
+                continue
+            r2 = verdicts.r[j] * verdicts.r[j]
+            usual = SPREAD_NOISE_PX / groups.elapsed_s[k] / verdicts.r[j] + STRAY_SHARE * math.fabs(groups.expansion[g])
+            off = (verdicts.expansion[j] - groups.expansion[g]) / (STRAY_SIGMAS * usual)
+            weight = r2 / ((1 + off * off) * (1 + off * off))
+            groups.weight[g] += weight
+            groups.weighed_rate[g] += weight * verdicts.expansion[j]
+        for g in range(groups.groups):
+            groups.expansion[g] = groups.weighed_rate[g] / max(groups.weight[g], MIN_EXTENT2_PX)
+
+
+def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
+    """Whether a group that is to stand near does not spread as what is near does.
+
+    Its parts go outward from O by μ/t, and so away from each other. An error of rotation, of the lens or of O shifts
+    them all alike.
+    """
+    if 2 * groups.standing[g] < members.size[g]:
+        return False
+    sigma = SPREAD_NOISE_PX / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
+    spreads = groups.spreading[g] / max(groups.spread[g], MIN_EXTENT2_PX)
+    return spreads + SPREAD_SIGMAS * sigma < SPREAD_SHARE * groups.expansion[g]
 
 
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
@@ -333,16 +399,22 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
 
 
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """A few odd ones among edges that were seen to follow the flow are mistakes, not an object; nor is what is flat."""
+    """A few odd ones among edges that follow the flow are no object; nor is what is flat, shifted, or an own part."""
     for g in range(groups.groups):
         radius = shared.radius_of(members, g, settings.bs_px)
+        own_parts = 0
         for i in range(edges.count):
-            if edges.matched[i] and edges.trust[i] > settings.tr_s and not edges.own_way(i):
-                dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
-                if dx * dx + dy * dy < radius * radius:
-                    groups.flowing[g] += 1
-        few = members.size[g] < settings.rebel_share * (members.size[g] + groups.flowing[g])
-        groups.odd[g] = 1 if few or is_flat(groups, g, members, around) else 0
+            dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
+            if not edges.matched[i] or dx * dx + dy * dy >= radius * radius:
+                continue
+            if edges.fixed_s[i] >= LIKELY_OWN_S:
+                own_parts += 1
+            elif edges.trust[i] > settings.tr_s and not edges.own_way(i):
+                groups.flowing[g] += 1
+        stands = 2 * groups.standing[g] >= members.size[g]
+        least = settings.rebel_share if stands else max(settings.rebel_share, MOVER_SHARE)
+        few = members.size[g] < least * (members.size[g] + groups.flowing[g]) or own_parts > OWN_SHARE * members.size[g]
+        groups.odd[g] = 1 if few or is_flat(groups, g, members, around) or is_shifted(groups, g, members) else 0
 
 
 # Groups and circles
@@ -431,7 +503,8 @@ def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation,
     """
     c = groups.circle[g]
     trust, width, height = circles.trust[c], circles.width[c], circles.height[c]
-    change = 1.0 if is_aligned(groups, g, circles, c, around, settings) else -1.0
+    sure = min(1.0, float(groups.members.size[g]) / SURE_REBELS)
+    change = sure if is_aligned(groups, g, circles, c, around, settings) else -1.0
     shared.blend(circles, c, groups.members, g, settings)
     slow_width = edge_equations.update_position(trust, settings.tr_cr, width, circles.width[c])
     slow_height = edge_equations.update_position(trust, settings.tr_cr, height, circles.height[c])
@@ -464,6 +537,8 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
             c = shared.make_room(edges, circles, True, settings)
         if c >= 0:
             shared.give_birth(circles, c, groups.members, g, settings, ids)
+            if groups.members.size[g] < SURE_REBELS:
+                circles.trust[c] = settings.tr_cr
             groups.circle[g] = c
             groups.updated[c] = 1
         else:
@@ -473,11 +548,6 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
 
 
 # Contact
-
-
-def standing_expansion(groups: RebelGroups, g: int) -> float:
-    """V_e/r about the focus, 1/s: least squares over the members, so that far ones count more."""
-    return groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
 
 
 def own_expansion(groups: RebelGroups, g: int) -> float:
@@ -496,7 +566,7 @@ def expansion_of(groups: RebelGroups, g: int, stands: bool, range_m: float, arou
     if not stands:
         return own_expansion(groups, g)
     if not math.isfinite(around.speed_mps):
-        return standing_expansion(groups, g)
+        return groups.expansion[g]
     return max(around.speed_mps, 0.0) / max(range_m, MIN_RANGE_M)
 
 
@@ -507,7 +577,7 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     """
     c = groups.circle[g]
     stands = 2 * groups.standing[g] >= groups.members.size[g]
-    range_m = groups.closing_mps[g] / max(standing_expansion(groups, g), MIN_RATE)
+    range_m = groups.closing_mps[g] / max(groups.expansion[g], MIN_RATE)
     rate = expansion_of(groups, g, stands, range_m, around)
     before = rate
     if math.isfinite(circles.ttc[c]):
@@ -564,11 +634,16 @@ def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
 
 
 def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it."""
+    """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it.
+
+    What is about to be met may hide all that flows: then it goes on until contact.
+    """
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
-        waits = coasts(circles, c, around.horizon_s, settings) or is_hidden(circles, c, settings)
+        near = coasts(circles, c, around, settings)
+        waits = near or is_hidden(circles, c, settings)
         waits = waits and circles.unseen_s[c] < COAST_TIME_SHARE * around.horizon_s
+        waits = waits or (near and not around.flow_is_seen)
         groups.missed[c] = 1 if circles.active[c] and not groups.updated[c] and not waits else 0
     for c in range(circles.capacity):
         if groups.missed[c]:
@@ -584,12 +659,14 @@ def update(
     verdicts: Verdicts,
     breaking: Integers,
     rebels: int,
+    patches: Patches,
+    patch_groups: PatchGroups,
     baselines: Baselines,
     around: Situation,
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve); return evictions.
+    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), and patches; return evictions.
 
     The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
     """
@@ -599,6 +676,7 @@ def update(
     cluster(groups, verdicts, edges, around, settings)
     number_groups(groups, settings.rebel_support)
     average(groups, groups.members, verdicts, edges, baselines, around)
+    fit_expansion(groups, verdicts)
     find_odd(groups, groups.members, edges, around, settings)
     involve(groups, verdicts, edges, circles, settings)
     for g in range(groups.groups):
@@ -614,6 +692,7 @@ def update(
     for k in range(groups.count):
         if groups.group[k] >= 0:
             edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
+    evicted += patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
     lose_trust(groups, circles, around, settings)
     shared.release(edges, circles, True)
     return evicted

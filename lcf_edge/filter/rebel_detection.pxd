@@ -4,7 +4,6 @@ from lcf_edge.filter cimport baselines as lines
 from lcf_edge.filter cimport edge_equations, flow, path
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
-from lcf_edge.filter.flow cimport Pinhole
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
@@ -38,7 +37,7 @@ cdef class Verdicts:
     cdef Py_ssize_t near_count
     cdef double shared, ground, total
 
-cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines, Pinhole pinhole) noexcept nogil
+cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(drifts=bint)
 cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cdef double ground_outward(double y, double lever, Situation around) noexcept nogil

@@ -12,7 +12,6 @@ from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import edge_equations, flow, path
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
-from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
@@ -65,14 +64,15 @@ class Verdicts:
 
 
 def link(
-    verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole
+    verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, around: Situation
 ) -> None:
     """Where edge ``i`` was at the key frame in ``slot``, derotated to now."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
     x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
     verdicts.row[j], verdicts.slot[j] = i, slot
     verdicts.x[j], verdicts.y[j] = x, y
-    verdicts.sigma[j] = lines.sigma_along(baselines, pinhole, slot, x, y)
+    rotation_px = lines.sigma_along(baselines, around.pinhole, slot, x, y)
+    verdicts.sigma[j] = flow.length(rotation_px, around.turn_share * flow.length(x - key_x, y - key_y))
 
 
 def judge(

@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.filter import edge_rows
-from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, PsiColumns
+from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, ObjectColumns, PsiColumns
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, KEYS
 from lcf_edge.filter.line_expert import group_at
 from lcf_edge.filter.memory import memory_of
@@ -24,6 +24,7 @@ Mask = npt.NDArray[np.bool_]
 Floats = npt.NDArray[np.floating[Any]]
 
 NO_CIRCLE = -1
+NO_OBJECT = -1
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,6 +78,14 @@ EDGE_COLUMNS = (
         empty=NO_CIRCLE,
     ),
     Column(
+        "square",
+        "row of the object that it belongs to, also while it breaks no flow, -1: none",
+        "row",
+        ("square_expert",),
+        np.int32,
+        empty=NO_OBJECT,
+    ),
+    Column(
         "links",
         "ℓ: key frames for which it has broken the flow; above 0 it is in α",
         "1",
@@ -101,39 +110,102 @@ EDGE_COLUMNS = (
     Column("predicted_speed", "V', in this frame", "px/s", ("edge_expert",)),
     Column("cos", "cos of the direction of the prediction", "1", ("edge_expert",)),
     Column("sin", "sin of the direction of the prediction", "1", ("edge_expert",)),
-    Column("corner", "row of its corner in this frame, -1: none", "row", ("matching",), np.int32),
+    Column("corner", "row of its corner in this frame, -1: none", "row", ("matching", "leaps"), np.int32),
     Column("best", "row of the corner that it would choose, -1: none", "row", ("matching",), np.int32),
     Column("cost", "of that choice", "grey", ("matching",)),
     Column("psi", "row of the ψ region that holds L', -1: none", "row", ("line_expert",), np.int32),
 )
 """E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
+CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "square_expert")
 CIRCLE_COLUMNS = (
     Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles"), np.bool_),
     Column("id", "identity, never 0", "1", ("circles",), np.uint32),
     Column("x", "centre, to the right", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
     Column("y", "centre, down", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
     Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles")),
-    Column("beta", "β of its motion in the picture", "rad", ("derotation", "normal_circles", "rebel_circles")),
-    Column("speed", "V along β", "px/s", ("normal_circles", "rebel_circles")),
+    Column(
+        "beta",
+        "β of its motion in the picture",
+        "rad",
+        ("derotation", "normal_circles", "rebel_circles", "patch_circles"),
+    ),
+    Column("speed", "V along β", "px/s", ("normal_circles", "rebel_circles", "patch_circles")),
     Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
-    Column("trust", "Tr", "1", ("circles", "normal_circles", "rebel_circles", "feedback")),
+    Column("trust", "Tr", "1", ("circles", "normal_circles", "rebel_circles", "patch_circles", "feedback")),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles",), np.int32),
     Column("width", "extent of its edges", "px", ("circles", "rebel_circles")),
     Column("height", "extent of its edges", "px", ("circles", "rebel_circles")),
-    Column("cause", "`records.Cause` of C_r", "", ("circles", "rebel_circles"), np.uint8),
-    Column("ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles")),
-    Column("range", "of C_r, NaN: unknown", "m", ("circles", "rebel_circles")),
-    Column("lateral", "miss to the side of the path, right positive, NaN: unknown", "m", ("circles", "rebel_circles")),
+    Column("cause", "`messages.Cause` of C_r", "", CONTACT_WRITERS, np.uint8),
+    Column("ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles", "patch_circles")),
+    Column("range", "of C_r, NaN: unknown", "m", CONTACT_WRITERS),
+    Column(
+        "lateral",
+        "miss to the side of the path, right positive, NaN: unknown",
+        "m",
+        CONTACT_WRITERS,
+    ),
     Column("unseen_s", "of C_r: since edges last showed it", "s", ("circles", "rebel_circles")),
+    Column(
+        "square",
+        "row of the object that a C_r belongs to, -1: none",
+        "row",
+        ("circles", "square_expert"),
+        np.int32,
+        empty=NO_OBJECT,
+    ),
 )
 """C_n and C_r, a table each."""
+
+OBJECT_COLUMNS = (
+    Column("active", "row in use", "", ("square_expert",), np.bool_),
+    Column("id", "identity, never 0", "1", ("square_expert",), np.uint32),
+    Column("x", "middle of its box, to the right", "px", ("square_expert",)),
+    Column("y", "middle of its box, down", "px", ("square_expert",)),
+    Column("width", "of its box", "px", ("square_expert",)),
+    Column("height", "of its box", "px", ("square_expert",)),
+    Column("looming", "m = (V - w_z)/Z, at the V of ``reference``", "1/s", ("square_expert",)),
+    Column(
+        "reference",
+        "V of the vehicle that m tells of: the mean of those at which it was measured",
+        "m/s",
+        ("square_expert",),
+    ),
+    Column("sideways", "q = w_x/Z", "1/s", ("square_expert",)),
+    Column("mm", "variance of m", "1/s²", ("square_expert",)),
+    Column("qq", "variance of q", "1/s²", ("square_expert",)),
+    Column("mq", "covariance of both", "1/s²", ("square_expert",)),
+    Column("foot", "1/Z of the ground where its lowest edge is or was seen", "1/m", ("square_expert",)),
+    Column("log_odds", "logarithmic odds that it stands", "1", ("square_expert",)),
+    Column("class_id", "`messages.ObjectClass`", "", ("square_expert",), np.uint8),
+    Column("state", "`messages.ObjectState`", "", ("square_expert",), np.uint8),
+    Column("support", "edges behind it", "1", ("square_expert",), np.int32),
+    Column("trust", "Tr", "1", ("square_expert",)),
+    Column("age_s", "since it was founded", "s", ("square_expert",)),
+    Column("unseen_s", "since edges last showed it", "s", ("square_expert",)),
+    Column("ttc", "time to contact, inf: none", "s", ("square_expert",)),
+    Column("ttc_sigma", "1 sigma of it; so for all that follow, NaN: unknown", "s", ("square_expert",)),
+    Column("middle", "Z of the middle of its edges, NaN: unknown", "m", ("square_expert",)),
+    Column("middle_sigma", "1 sigma of its logarithm", "1", ("square_expert",)),
+    Column("range", "Z of its front", "m", ("square_expert",)),
+    Column("range_sigma", "", "m", ("square_expert",)),
+    Column("lateral", "miss to the side of the path, right positive", "m", ("square_expert",)),
+    Column("lateral_sigma", "", "m", ("square_expert",)),
+    Column("forward", "w_z, velocity over ground", "m/s", ("square_expert",)),
+    Column("forward_sigma", "", "m/s", ("square_expert",)),
+    Column("right", "w_x, velocity over ground", "m/s", ("square_expert",)),
+    Column("right_sigma", "", "m/s", ("square_expert",)),
+    Column("closest", "until its front is passed, NaN: never", "s", ("square_expert",)),
+    Column("closest_sigma", "", "s", ("square_expert",)),
+    Column("probability", "that it is met within the horizon", "1", ("square_expert",)),
+)
+"""S, objects."""
 
 PSI_COLUMNS = (
     Column("active", "row in use", "", ("feedback", "line_expert"), np.bool_),
     Column("id", "identity, never 0", "1", ("feedback",), np.uint32),
-    Column("shape", "Ty: `records.Shape`", "", ("feedback",), np.uint8),
+    Column("shape", "Ty: `messages.Shape`", "", ("feedback",), np.uint8),
     Column("x", "centre, to the right", "px", ("derotation", "feedback")),
     Column("y", "centre, down", "px", ("derotation", "feedback")),
     Column("width", "full width", "px", ("feedback",)),
@@ -171,7 +243,7 @@ CORNER_COLUMNS = (
     Column("pixel_y", "place in the input frame", "px", ("matching",), np.int32),
     Column("appearance", "grey samples around it", "grey", ("matching",), np.uint8, (APPEARANCE_SAMPLES,)),
     Column("omitted", "inside ψ", "", ("line_expert",), np.bool_),
-    Column("free", "may still be found by an edge", "", ("line_expert", "matching"), np.bool_),
+    Column("free", "may still be found by an edge", "", ("line_expert", "matching", "leaps"), np.bool_),
     Column("taken", "an edge has made it its own", "", ("matching", "edge_expert"), np.bool_),
     Column("expected", "under ψ, and an edge is predicted there", "", ("line_expert",), np.bool_),
     Column("edge", "row of the edge that would choose it at the least cost, -1: none", "row", ("matching",), np.int32),
@@ -277,6 +349,19 @@ class CircleTable(Table):
     def __init__(self, capacity: int) -> None:
         super().__init__(CIRCLE_COLUMNS, capacity)
         self.columns = CircleColumns(self.memory())
+
+    @property
+    def count(self) -> int:
+        """Rows in use."""
+        return int(np.count_nonzero(self.active))
+
+
+class ObjectTable(Table):
+    """``OBJECT_COLUMNS``; rows keep their place."""
+
+    def __init__(self, capacity: int) -> None:
+        super().__init__(OBJECT_COLUMNS, capacity)
+        self.columns = ObjectColumns(self.memory())
 
     @property
     def count(self) -> int:

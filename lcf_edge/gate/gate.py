@@ -1,4 +1,4 @@
-"""Lets parties through to the daemon. Whatever strangers do takes no more than ``MOST_STRANGERS`` descriptors.
+"""Lets parties through to the daemon. Whatever strangers do takes no more than ``MAX_STRANGERS`` descriptors.
 
 A connection is a stranger's until its TLS handshake has shown a certificate. The oldest stranger gives way to the
 newest: an honest handshake is over in a few round trips, long before so many others have come.
@@ -15,10 +15,10 @@ from typing import Any
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.gate.certificates import ROVER_NAME, Certificates, common_name
 
-MOST_STRANGERS = 64
+MAX_STRANGERS = 64
 HANDSHAKE_S = 5.0
-MOST_OF_ONE = 8  # connections of one common name
-MOST_PARTIES = 32  # connections in all
+MAX_OF_ONE_NAME = 8  # connections of one common name
+MAX_PARTIES = 32  # connections in all
 DIAL_S = 2.0
 SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
 PIECE_BYTES = 2**16
@@ -68,7 +68,7 @@ class Gate:
                 self.counts["no descriptor"] += 1
                 await asyncio.sleep(PAUSE_S)
                 continue
-            while len(self._strangers) >= MOST_STRANGERS:
+            while len(self._strangers) >= MAX_STRANGERS:
                 oldest = next(iter(self._strangers))
                 del self._strangers[oldest]
                 oldest.cancel()
@@ -139,7 +139,7 @@ class Gate:
         if name not in self._certificates.parties:
             return "of no known name"
         names = list(self._parties.values())
-        if len(names) >= MOST_PARTIES or names.count(name) >= MOST_OF_ONE:
+        if len(names) >= MAX_PARTIES or names.count(name) >= MAX_OF_ONE_NAME:
             return f"too many of {name}"
         return ""
 

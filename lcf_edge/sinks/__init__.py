@@ -1,4 +1,9 @@
-"""Where results go: JSON lines (``results``), a two-panel video (``overlay``), a plot (``size_plot``)."""
+"""Where scenes go: each output is a ``Sink`` (``sink``), used by ``replay`` and by the daemon alike.
+
+JSON lines (``results``), Zenoh (``scenes``), a video (``video``) of the two panels that ``overlay`` draws, a plot of
+the tables' sizes (``size_plot``). Sinks that only a running daemon has are in ``lcf_edge/daemon``: ``preview`` and
+``recorder``.
+"""
 
 from pathlib import Path
 

@@ -1,7 +1,8 @@
 """Text as a mask, in one size, put together from a picture of its letters.
 
 OpenCV 5 would write as well, but its fonts cost the process 8 MiB. ``letters.png`` holds printable ASCII as OpenCV
-draws it: a white dot in the first row begins each letter, which reaches ``_OVERLAP_PX`` into its neighbours.
+draws it: a white dot in the first row begins each letter, which reaches ``_OVERLAP_PX`` into its neighbours. The sign ±
+is made of them, and the zero, which has a stroke there that makes it look like Ø.
 """
 
 from functools import cache
@@ -18,11 +19,12 @@ LETTERS = [chr(code) for code in range(32, 127)]
 HEIGHT_PX = 15
 
 _OVERLAP_PX = 2
+_BAR_ROW, _UNDER_ROW = 7, 11  # of the plus, and where ± has a second one
 _UNKNOWN = "?"
 
 
 def lettering(text: str) -> Mask:
-    """The text on one line, ``HEIGHT_PX`` high; what is not printable ASCII becomes a question mark."""
+    """The text on one line, ``HEIGHT_PX`` high; what is neither printable ASCII nor ± becomes a question mark."""
     cells = [_cells().get(letter, _cells()[_UNKNOWN]) for letter in text]
     widths = [cell.shape[1] - _OVERLAP_PX for cell in cells]
     line = np.zeros((HEIGHT_PX, sum(widths) + _OVERLAP_PX), np.uint8)
@@ -39,4 +41,11 @@ def _cells() -> dict[str, Mask]:
     packed = np.frombuffer((files("lcf_edge.sinks") / "letters.png").read_bytes(), np.uint8)
     picture = np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), np.uint8)
     starts = np.flatnonzero(picture[0])
-    return dict(zip(LETTERS, np.split(picture[1:], starts[1:], axis=1), strict=True))
+    cells: dict[str, Mask] = dict(zip(LETTERS, np.split(picture[1:], starts[1:], axis=1), strict=True))
+    height, width = cells["0"].shape
+    narrow = np.asarray(cv2.resize(cells["O"], (width - 1, height), interpolation=cv2.INTER_AREA), np.uint8)
+    cells["0"] = np.pad(narrow, ((0, 0), (0, 1)))
+    plus = cells["+"]
+    cells["±"] = np.roll(plus, -1, axis=0)
+    cells["±"][_UNDER_ROW] = plus[_BAR_ROW]
+    return cells

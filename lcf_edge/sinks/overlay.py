@@ -1,26 +1,19 @@
-"""The overlay: two panels that show what the filter made of a frame, and the video of them.
+"""The overlay: two panels that show what the filter made of a frame.
 
 Left, the Line expert: corners (yellow dots), those omitted by ψ (red dots), estimated normal edges (blue
 squares), λ groups (green lines from each edge to the group's centre), ψ (yellow circles and rectangles).
-Right, the Circle expert: C_n (green circles), C_r (red circles, cause and time to contact beside them), rebel
-edges (red squares), the focus of expansion (white cross). Own parts that the configuration masks are hatched in both.
-The caption names each in its colour.
+Right, what becomes of it: objects (boxes with class, time to contact and its standard deviation; orange: will probably
+be met, blue: will not; thin and dashed: not seen in this frame), C_n (green circles), C_r (red circles; those of no
+object with cause and time to contact), rebel edges (red squares), the focus of expansion (white cross). Own parts that
+the configuration masks are hatched in both. The caption names each in its colour.
 """
-
-from pathlib import Path
-from types import TracebackType
-from typing import TYPE_CHECKING, Self
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.records import Cause, Kind, Scene, Shape, View
-from lcf_edge.sinks import SinkError, check_output
+from lcf_edge.messages import Cause, Kind, ObjectClass, ObjectState, PipelineScene, Shape, View
 from lcf_edge.sinks.lettering import Mask, lettering
-
-if TYPE_CHECKING:
-    from lcf_edge.pipeline import Outcome
 
 Picture = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
@@ -31,11 +24,11 @@ RED: Colour = (50, 50, 255)
 LIGHT_RED: Colour = (150, 150, 255)  # text
 BLUE: Colour = (255, 140, 30)
 GREEN: Colour = (70, 215, 70)
+ORANGE: Colour = (40, 160, 255)
+LIGHT_BLUE: Colour = (255, 215, 110)
 GREY: Colour = (150, 150, 150)
 WHITE: Colour = (255, 255, 255)
 BLACK: Colour = (0, 0, 0)
-
-SUFFIXES = (".mp4",)
 
 _FRACTION_BITS = 3  # OpenCV draws at an eighth of a pixel
 _FARTHEST_PX = 100_000  # what lies beyond cannot be seen, and would overflow OpenCV's fixed point
@@ -45,23 +38,25 @@ _HALO = np.ones((3, 3), np.uint8)
 _STRIP_PX = 20
 _HATCH_PX = 8
 _HALO_PX = 2
+_DASH_PX, _GAP_PX = 7, 5
+_PROBABLY = 0.5
 
 
-def draw(image: npt.NDArray[np.uint8], outcome: "Outcome") -> Picture:
+def draw(image: npt.NDArray[np.uint8], scene: PipelineScene, view: View) -> Picture:
     """The two panels of one frame: (h, w) luminance in, (h, 2w, 3) blue, green, red out."""
     base = cv2.cvtColor(cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR)  # dimmed: the marks stand out
     width = image.shape[1]
     panels = np.concatenate((base, base), axis=1).astype(np.uint8, copy=False)
     left, right = panels[:, :width], panels[:, width:]
-    for panel, paint in ((left, _line_expert), (right, _circle_expert)):
+    for panel, paint in ((left, _line_expert), (right, _found)):
         own = np.ascontiguousarray(panel)  # nothing drawn in one panel spills over into the other
-        _hatch(own, outcome.view.own_parts)
-        paint(own, outcome.scene, outcome.view)
+        _hatch(own, view.own_parts)
+        paint(own, scene, view)
         panel[...] = own
     return panels
 
 
-def _line_expert(panel: Picture, scene: Scene, view: View) -> None:
+def _line_expert(panel: Picture, scene: PipelineScene, view: View) -> None:
     member = view.edge_group >= 0
     centres = view.groups[view.edge_group[member], :2]
     _outlines(panel, np.stack((view.edges[member], centres), axis=1), GREEN)
@@ -90,28 +85,84 @@ def _line_expert(panel: Picture, scene: Scene, view: View) -> None:
     )
 
 
-def _circle_expert(panel: Picture, scene: Scene, view: View) -> None:
+def _found(panel: Picture, scene: PipelineScene, view: View) -> None:
     _outlines(panel, view.rebels[:, None] + _SQUARE, RED)
     _outlines(panel, view.focus + _CROSS, BLACK, 3)
     _outlines(panel, view.focus + _CROSS, WHITE)
     for circle in scene.circles[scene.circles["kind"] == Kind.NORMAL]:
         _circle(panel, (circle["x"], circle["y"], circle["radius"]), GREEN, 1)
-    rebels = scene.circles[scene.circles["kind"] == Kind.REBEL]
-    for circle in rebels:
+    is_rebel = scene.circles["kind"] == Kind.REBEL
+    for circle in scene.circles[is_rebel]:
         _circle(panel, (circle["x"], circle["y"], circle["radius"]), RED, 2)
+    urgent_first = scene.objects[np.lexsort((scene.objects["ttc"], -scene.objects["probability"]))]
+    for thing in urgent_first[::-1]:
+        _box(panel, thing)
     taken: list[_Box] = []
-    for circle in rebels[np.argsort(rebels["ttc"], kind="stable")]:  # the most urgent has the best place
-        _beside(panel, _label(circle), circle, taken)
+    for thing in urgent_first:  # which has the best place
+        around = (thing["x"], thing["y"], thing["width"] / 2, thing["height"] / 2)
+        is_met = thing["probability"] >= _PROBABLY
+        _beside(panel, _object_label(thing), around, taken, _colour(thing), needed=is_met)
+    alone = is_rebel
+    if len(scene.circle_objects):
+        alone = is_rebel & (scene.circle_objects == 0)
+    rebels = scene.circles[alone]
+    for circle in rebels[np.argsort(rebels["ttc"], kind="stable")]:
+        around = (circle["x"], circle["y"], circle["radius"], circle["radius"])
+        _beside(panel, _label(circle), around, taken, LIGHT_RED)
     sizes = scene.sizes
+    count, met = len(scene.objects), int((scene.objects["probability"] >= _PROBABLY).sum())
     _caption(
         panel,
         (
-            (f"{sizes.circles_normal} normal circles", GREEN),
-            (f"{sizes.circles_rebel} rebel circles, {sizes.edges_rebel} edges", LIGHT_RED),
+            (f"{count} object{'s' * (count > 1)}" if count else "", LIGHT_BLUE),
+            (f"{met} to be met" if met else "", ORANGE),
+            (f"{len(is_rebel) - is_rebel.sum()} normal circles", GREEN),  # as many as are drawn, and told to others
+            (f"{is_rebel.sum()} rebel circles, {sizes.edges_rebel} edges", LIGHT_RED),
             (f"{sizes.chains} chains", WHITE),
             (", ".join(scene.notes), YELLOW),
         ),
     )
+
+
+def _colour(thing: np.void) -> Colour:
+    return ORANGE if thing["probability"] >= _PROBABLY else LIGHT_BLUE
+
+
+def _box(panel: Picture, thing: np.void) -> None:
+    """Two px and whole for what is seen, else one px and dashed; dark beside the line, for a bright picture."""
+    half = np.array((thing["width"], thing["height"]), np.float64) / 2
+    middle = np.array((thing["x"], thing["y"]), np.float64)
+    if not (np.isfinite(half) & np.isfinite(middle)).all():
+        return
+    beyond = _DASH_PX + _GAP_PX  # of the picture: a side out there is not to be seen
+    rows, columns = panel.shape[:2]
+    limits = np.array((columns, rows)) + beyond
+    (left, top), (right, bottom) = (np.clip(corner, -beyond, limits) for corner in (middle - half, middle + half))
+    corners = np.array([(left, top), (right, top), (right, bottom), (left, bottom)])
+    if thing["state"] == ObjectState.SEEN:
+        _outlines(panel, corners[None], BLACK, 4)
+        _outlines(panel, corners[None], _colour(thing), 2)
+        return
+    dashes = np.concatenate([_dashes(start, end) for start, end in zip(corners, np.roll(corners, -1, 0), strict=True)])
+    _outlines(panel, dashes, BLACK, 3)
+    _outlines(panel, dashes, _colour(thing))
+
+
+def _dashes(start: npt.NDArray[np.float64], end: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """(n, 2, 2) px: pieces of a line."""
+    length_px = float(np.hypot(*(end - start)))
+    along = np.arange(0.0, max(length_px, 1.0), _DASH_PX + _GAP_PX)
+    shares = np.stack((along, np.minimum(along + _DASH_PX, length_px)), axis=1) / max(length_px, 1.0)
+    return start + shares[..., None] * (end - start)
+
+
+def _object_label(thing: np.void) -> str:
+    kind = ObjectClass(thing["class_id"])
+    name = "object" if kind is ObjectClass.UNKNOWN else kind.name.lower().replace("_", " ")
+    if not np.isfinite(thing["ttc"]):
+        return name
+    spread = f" ±{thing['ttc_sigma']:.1f}" if np.isfinite(thing["ttc_sigma"]) else ""
+    return f"{name} {thing['ttc']:.1f}{spread} s"
 
 
 def _hatch(panel: Picture, parts: tuple[npt.NDArray[np.float32], ...]) -> None:
@@ -160,20 +211,30 @@ _Box = tuple[int, int, int, int]
 """Left, top, right, bottom, px."""
 
 
-def _beside(panel: Picture, text: str, circle: np.void, taken: list[_Box]) -> None:
-    """Write beside the circle, inside the picture, where no other label stands if there is such a place."""
-    place = [float(circle[name]) for name in ("x", "y", "radius")]
-    if not np.less(np.abs(place), _FARTHEST_PX).all():
+def _beside(
+    panel: Picture,
+    text: str,
+    around: tuple[float, float, float, float],
+    taken: list[_Box],
+    colour: Colour,
+    *,
+    needed: bool = True,
+) -> None:
+    """Write beside what has its middle and half its extent at ``around`` (x, y, across, down; px).
+
+    Inside the picture, and where no other label stands; where there is no such place, only what is ``needed``.
+    """
+    if not np.less(np.abs(around), _FARTHEST_PX).all():
         return
-    x, y, radius = map(round, place)
+    x, y, across, down = map(round, map(float, around))
     letters = lettering(text)
     height, width = letters.shape
     gap = 2
     places = (
-        (x - width // 2, y - radius - gap - height),
-        (x - width // 2, y + radius + gap),
-        (x + radius + gap, y - height // 2),
-        (x - radius - gap - width, y - height // 2),
+        (x - width // 2, y - down - gap - height),
+        (x - width // 2, y + down + gap),
+        (x + across + gap, y - height // 2),
+        (x - across - gap - width, y - height // 2),
         (x - width // 2, y - height // 2),
     )
     rows, columns = panel.shape[:2]
@@ -182,9 +243,12 @@ def _beside(panel: Picture, text: str, circle: np.void, taken: list[_Box]) -> No
         inner_left = max(min(left, columns - width - 2), 2)
         inner_top = max(min(top, rows - _STRIP_PX - height), 2)
         boxes.append((inner_left, inner_top, inner_left + width, inner_top + height))
-    box = next((box for box in boxes if not any(_overlap(box, other) for other in taken)), boxes[0])
+    free = [box for box in boxes if not any(_overlap(box, other) for other in taken)]
+    if not free and not needed:
+        return
+    box = (free or boxes)[0]
     taken.append(box)
-    _write(panel, letters, box[:2], LIGHT_RED)
+    _write(panel, letters, box[:2], colour)
 
 
 def _overlap(a: _Box, b: _Box) -> bool:
@@ -218,37 +282,3 @@ def _caption(panel: Picture, parts: tuple[tuple[str, Colour], ...]) -> None:
         fitted = np.asarray(cv2.resize(letters, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         _write(panel, fitted, (x, rows - (_STRIP_PX + height) // 2), colour)
         x += width + gap
-
-
-class VideoSink:
-    """An MP4 video of pictures of ``size`` (width, height) px at ``frames_per_s``.
-
-    The codec wants even sizes: an odd last row is cut. Raises ``UsageError`` when the name does not end in
-    ``.mp4``, ``SinkError`` when the file cannot be written.
-    """
-
-    def __init__(self, path: Path, frames_per_s: float, size: tuple[int, int]) -> None:
-        check_output(path, SUFFIXES)
-        self.path = path
-        # Two decimals: the container's time base cannot hold more.
-        self._writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), round(frames_per_s, 2), size)
-        self._frames = 0
-        if not self._writer.isOpened():
-            raise self._failure()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(self, failed: type[BaseException] | None, *_: TracebackType | BaseException | None) -> None:
-        self._writer.release()
-        # The writer keeps silent about a full disk; the index at the end of the file tells.
-        if failed is None and self._frames and not cv2.VideoCapture(str(self.path)).isOpened():
-            raise self._failure()
-
-    def _failure(self) -> SinkError:
-        return SinkError(f"{self.path}: the video cannot be written; name another file or free the disk")
-
-    def write(self, picture: Picture) -> None:
-        """Append one picture."""
-        self._writer.write(picture)
-        self._frames += 1

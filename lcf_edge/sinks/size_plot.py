@@ -1,14 +1,17 @@
 """The paper's last figure: rows in use of each table, frame by frame, against a map of everything."""
 
 import importlib.util
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from drivers.samples import Frame
 from lcf_edge.errors import UsageError
-from lcf_edge.records import Sizes
+from lcf_edge.messages import PipelineScene, Sizes, View
 from lcf_edge.sinks import cannot_write, check_output
+from lcf_edge.sinks.sink import Sink
 
 SUFFIXES = (".png", ".svg", ".pdf")
 
@@ -21,16 +24,19 @@ _TABLES = {
     "circles_normal": "normal circles $C_n$",
     "circles_rebel": "rebel circles $C_r$",
     "psi": r"regions $\psi$",
+    "objects": "objects",
 }
-_COLOURS = ("#b8860b", "#1f77b4", "#d62728", "#8c564b", "#2ca02c", "#17becf", "#e377c2", "#7f7f7f")
+_COLOURS = ("#b8860b", "#1f77b4", "#d62728", "#8c564b", "#2ca02c", "#17becf", "#e377c2", "#7f7f7f", "#9467bd")
 
 
-class SizePlot:
-    """Collects the sizes of the tables and draws them.
+class SizePlot(Sink):
+    """Collects the sizes of the tables and draws them in the end.
 
     Raises ``UsageError`` when Matplotlib is missing or the name has no known suffix, ``SinkError`` when the
     file cannot be written: at once, not after a long replay.
     """
+
+    name = "plot"
 
     def __init__(self, path: Path) -> None:
         if importlib.util.find_spec("matplotlib") is None:
@@ -39,12 +45,14 @@ class SizePlot:
         self.path = path
         self._sizes: list[Sizes] = []
 
-    def add(self, sizes: Sizes) -> None:
-        """One frame."""
-        self._sizes.append(sizes)
+    def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:  # noqa: ARG002
+        """Keep the sizes of one frame."""
+        self._sizes.append(scene.sizes)
 
-    def save(self) -> None:
-        """Draw and write the picture; 1400×800 px as PNG. Raises ``SinkError``."""
+    def close(self) -> None:
+        """Draw and write the picture, if there were frames; 1400×800 px as PNG. Raises ``SinkError``."""
+        if not self._sizes:
+            return
         # Here, so that only a plot pays for Matplotlib's memory.
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
         from matplotlib.figure import Figure  # noqa: PLC0415

@@ -8,12 +8,12 @@ while a session is open.
 
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.scene import SCENE_ENCODING, ScenePublisher, scene_key
-from lcf_edge.zenoh_link.session import LARGEST_MESSAGE_BYTES, close_session, open_session, opened_session
+from lcf_edge.zenoh_link.session import MAX_MESSAGE_BYTES, close_session, open_session, opened_session
 from lcf_edge.zenoh_link.subscription import Scenes, scenes
 
 __all__ = [
     "ATTACHMENT",
-    "LARGEST_MESSAGE_BYTES",
+    "MAX_MESSAGE_BYTES",
     "SCENE_ENCODING",
     "ScenePublisher",
     "Scenes",

@@ -8,21 +8,10 @@ import json
 from typing import Any
 
 from lcf_edge.config import Publish, Zenoh
+from lcf_edge.zenoh_link.topics import STANDARD
 
-LARGEST_MESSAGE_BYTES = 2**14
+MAX_MESSAGE_BYTES = 2**14
 """What comes in larger in parts is dropped before it is put together: a speed takes less than 1 kB."""
-
-_EVERY_MESSAGE = [
-    "put",
-    "delete",
-    "declare_subscriber",
-    "query",
-    "reply",
-    "declare_queryable",
-    "liveliness_token",
-    "declare_liveliness_subscriber",
-    "liveliness_query",
-]
 
 
 def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
@@ -31,31 +20,35 @@ def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
     A daemon that connects to routers, is one, or speaks to ROS 2 routes for others as well, by keys that it cannot
     know: there are no rules then.
     """
-    wanted = {"transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES)}
+    wanted = {"transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES)}
     if options.mode == "peer" and not options.connect and not options.config_file and not publish.ros2:
         wanted["access_control"] = json.dumps(access_control(publish.prefix))
     return wanted
 
 
 def access_control(prefix: str) -> dict[str, Any]:
-    """Zenoh's rules for everybody: reading, asking, and the speed."""
+    """Zenoh's rules for everybody: reading, asking, and the speed; what others declare is not passed on."""
 
-    def taken_in(name: str, messages: list[str], *keys: str) -> dict[str, Any]:
-        return {"id": name, "permission": "allow", "flows": ["ingress"], "messages": messages, "key_exprs": list(keys)}
+    def rule(name: str, flow: str, messages: list[str], *keys: str) -> dict[str, Any]:
+        return {"id": name, "permission": "allow", "flows": [flow], "messages": messages, "key_exprs": list(keys)}
 
-    out = {
-        "id": "out",
-        "permission": "allow",
-        "flows": ["egress"],
-        "messages": _EVERY_MESSAGE,
-        "key_exprs": ["**", f"{prefix}/@alive/*"],  # ** leaves out names that begin with @
-    }
+    published = [f"{prefix}/scene", f"{prefix}/preview/compressed", f"{prefix}/diagnostics"]
+    published += [topic.key(prefix) for topic in STANDARD]
+    alive = f"{prefix}/@alive/*"
     rules = [
-        out,
-        taken_in("subscribed to", ["declare_subscriber"], "**"),
-        taken_in("asked", ["query"], "**"),
-        taken_in("asked whether alive", ["declare_liveliness_subscriber", "liveliness_query"], f"{prefix}/@alive/**"),
-        taken_in("speed", ["put"], f"{prefix}/speed"),
+        rule("published", "egress", ["put"], *published),
+        rule("answers", "egress", ["declare_queryable", "reply"], f"{prefix}/query/*"),
+        rule("alive", "egress", ["liveliness_token"], alive),
+        rule("speed wanted", "egress", ["declare_subscriber"], f"{prefix}/speed"),
+        rule("subscribed to", "ingress", ["declare_subscriber"], "**"),
+        rule("asked", "ingress", ["query"], "**"),
+        rule(
+            "asked whether alive",
+            "ingress",
+            ["declare_liveliness_subscriber", "liveliness_query"],
+            f"{prefix}/@alive/**",
+        ),
+        rule("speed", "ingress", ["put"], f"{prefix}/speed"),
     ]
     return {
         "enabled": True,

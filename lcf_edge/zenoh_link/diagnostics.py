@@ -7,8 +7,9 @@ import zenoh
 from lcf_edge import config
 from lcf_edge.cdr import encode_diagnostics
 from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.zenoh_link.publisher import MessagePublisher, Topic
+from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
+from lcf_edge.zenoh_link.topics import Topic
 
 DIAGNOSTICS = Topic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray", zenoh.Priority.DATA_LOW)
 

@@ -6,15 +6,16 @@ import zenoh
 
 from lcf_edge import config
 from lcf_edge.cdr import encode_compressed_image
-from lcf_edge.zenoh_link.publisher import MessagePublisher, Topic
+from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
-from lcf_edge.zenoh_link.session import LARGEST_MESSAGE_BYTES
+from lcf_edge.zenoh_link.session import MAX_MESSAGE_BYTES
+from lcf_edge.zenoh_link.topics import Topic
 
 PREVIEW = Topic(
     "preview/compressed",
     "sensor_msgs/msg/CompressedImage",
     zenoh.Priority.BACKGROUND,
-    largest_bytes=LARGEST_MESSAGE_BYTES,
+    largest_bytes=MAX_MESSAGE_BYTES,
 )
 
 

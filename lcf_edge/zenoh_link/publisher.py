@@ -5,48 +5,21 @@ import threading
 import time
 from collections import Counter
 from contextlib import ExitStack
-from dataclasses import dataclass
 from typing import Any
 
 import zenoh
 
 from lcf_edge import config
-from lcf_edge.cdr import CdrError
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.ros2 import Endpoint, Ros2Node, gid_of
 from lcf_edge.zenoh_link.session import reason
+from lcf_edge.zenoh_link.topics import Topic
 
 ATTACHMENT = struct.Struct("<qqB16s")
 """Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
 
 LATEST_NS = 2**63 - 1
 """The last moment, in April 2262, that an attachment can tell; a clock that is beyond it stands still there."""
-
-
-@dataclass(frozen=True, slots=True)
-class Topic:
-    """What is published under a prefix, and how."""
-
-    name: str  # "scene"
-    message: str  # "lcf_msgs/msg/Scene"
-    priority: zenoh.Priority
-    express: bool = False
-    largest_bytes: int = 2**17  # of what is taken for one; a scene has some 60 a circle
-
-    def key(self, prefix: str) -> str:
-        """The key of its samples."""
-        return f"{prefix}/{self.name}"
-
-    @property
-    def encoding(self) -> str:
-        """The encoding of its samples."""
-        return f"application/cdr;{self.message}"
-
-    def payload(self, sample: zenoh.Sample) -> bytes:
-        """Of one that came. Raises ``CdrError`` for what is larger than any of this topic."""
-        if len(sample.payload) > self.largest_bytes:
-            raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
-        return sample.payload.to_bytes()
 
 
 class MessagePublisher:
@@ -65,7 +38,7 @@ class MessagePublisher:
             raise PublishError(f"publish.prefix: {publish.prefix!r}: a key to publish on has no wildcards")
         endpoints = [Endpoint(self.key, gid_of(f"{session.zid()}/{self.key}"))]
         if ros2 is not None:
-            endpoints.append(ros2.declare("MP", self.key, topic.message))
+            endpoints.append(ros2.declare("MP", self.key, topic.message, is_lasting=topic.is_lasting))
         self._gid = endpoints[-1].gid
         try:
             self._publishers = [

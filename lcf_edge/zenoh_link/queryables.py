@@ -19,11 +19,13 @@ class Queryables:
     """Answers queries for each name, in a thread of its own: who asks and does not listen holds up nobody else.
 
     ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``, ``overtaken`` (by newer ones while
-    they waited).
+    they waited), ``unknown`` (no name was meant).
     """
 
+    COUNTED = frozenset(("answered", "refused", "failed", "overtaken", "unknown"))
+
     def __init__(self, session: zenoh.Session, prefix: str, answers: Mapping[str, Answer]) -> None:
-        self.counts: Counter[str] = Counter(answered=0, refused=0, failed=0, overtaken=0)
+        self.counts: Counter[str] = Counter(dict.fromkeys(self.COUNTED, 0))
         self._answers = {zenoh.KeyExpr(f"{prefix}/query/{name}"): answer for name, answer in answers.items()}
         self._waiting: deque[zenoh.Query] = deque()
         self._changed = threading.Condition()
@@ -46,8 +48,8 @@ class Queryables:
     def _take(self, query: zenoh.Query) -> None:
         with self._changed:
             if len(self._waiting) == CAPACITY:
-                self._waiting.popleft()  # its end tells who asked that no answer comes
                 self.counts["overtaken"] += 1
+                self._waiting.popleft()  # its end tells who asked that no answer comes
             self._waiting.append(query)
             self._changed.notify()
 
@@ -63,9 +65,10 @@ class Queryables:
 
     def _answer(self, query: zenoh.Query) -> None:
         """Its end, with that of the last name for it, tells who asked that no more answers come."""
-        for key, answer in self._answers.items():
-            if query.key_expr.intersects(key):
-                self.counts[_reply(query, key, answer())] += 1
+        meant = {key: answer for key, answer in self._answers.items() if query.key_expr.intersects(key)}
+        for key, answer in meant.items():
+            self.counts[_reply(query, key, answer())] += 1
+        self.counts["unknown"] += not meant
 
 
 def _reply(query: zenoh.Query, key: zenoh.KeyExpr, answer: tuple[bytes, str] | str) -> str:

@@ -5,10 +5,11 @@ import zenoh
 from lcf_edge import config
 from lcf_edge.cdr import encode_scene
 from lcf_edge.errors import PublishError
-from lcf_edge.records import Scene
-from lcf_edge.zenoh_link.publisher import MessagePublisher, Topic
+from lcf_edge.messages import Scene
+from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
 from lcf_edge.zenoh_link.session import reason
+from lcf_edge.zenoh_link.topics import Topic
 
 SCENE = Topic("scene", "lcf_msgs/msg/Scene", zenoh.Priority.REAL_TIME, express=True)
 SCENE_ENCODING = SCENE.encoding
@@ -46,7 +47,7 @@ class ScenePublisher:
         return self.counts["sent"]
 
     def put(self, scene: Scene) -> int:
-        """Send one scene; answers with the bytes of its payload. Raises ``CdrError``."""
+        """Send one scene. Return the bytes of its payload. Raises ``CdrError``."""
         self.latest = encode_scene(scene, self._frame_id)
         self._publisher.put(self.latest)
         return len(self.latest)

@@ -1,7 +1,8 @@
 """The definition of the scene, with all that it is made of, as ``ros2msg`` (the notation of MCAP and rosbag2)."""
 
-from importlib.resources import files
+from pathlib import Path
 
+MESSAGES = Path(__file__).parents[1] / "msg"
 SCHEMA_ENCODING = "text/plain;ros2msg"
 
 _STANDARD = {
@@ -12,11 +13,11 @@ _STANDARD = {
 
 def scene_schema() -> str:
     """``Scene.msg``, and behind it each message that it names."""
-    ours = {f"lcf_msgs/{name}": _definition(name) for name in ("Circle", "PsiRegion")}
+    ours = {f"lcf_msgs/{name}": _definition(name) for name in ("Circle", "PsiRegion", "Object")}
     parts = [_definition("Scene")]
     parts += [f"MSG: {name}\n{text}" for name, text in {**ours, **_STANDARD}.items()]
     return ("=" * 80 + "\n").join(parts)
 
 
 def _definition(name: str) -> str:
-    return (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8")
+    return (MESSAGES / f"{name}.msg").read_text(encoding="utf-8")

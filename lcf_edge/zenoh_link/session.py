@@ -13,20 +13,24 @@ from contextlib import contextmanager, suppress
 import zenoh
 
 from lcf_edge import config
+from lcf_edge.config.endpoint import fault
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link import admission
 
 CLOSING_S = 1.0  # a frozen peer would hold up the closing for 10 s
 
-LARGEST_MESSAGE_BYTES = 2**20
+MAX_MESSAGE_BYTES = 2**20
 """What comes in larger is dropped before it is put together; nothing that is published is this large."""
+
+MAX_SESSIONS = 32
+"""With others; each takes some 160 kB. Zenoh tells nobody whom it refuses."""
 
 _UNLESS_THE_FILE_SAYS = {
     "scouting/multicast/enabled": "false",
     "scouting/delay": "0",  # ms; nobody is scouted, so nobody is waited for
     "transport/shared_memory/enabled": "false",
-    "transport/link/rx/max_message_size": str(LARGEST_MESSAGE_BYTES),
-    "transport/unicast/max_sessions": "32",  # each takes some 160 kB
+    "transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES),
+    "transport/unicast/max_sessions": str(MAX_SESSIONS),
     "transport/unicast/accept_timeout": "2000",  # ms; who connects and says nothing takes one of 100 places
 }
 
@@ -80,7 +84,7 @@ def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Confi
         settings = zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
     except zenoh.ZError as error:
         raise PublishError(
-            f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); mend it, or name another"
+            f"{options.config_file}: no valid Zenoh configuration ({reason(error)}); fix it, or name another"
         ) from error
     untouched = zenoh.Config()
     for key, value in {**_UNLESS_THE_FILE_SAYS, **admitted}.items():
@@ -89,13 +93,17 @@ def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Confi
     settings.insert_json5("scouting/gossip/enabled", json.dumps(options.gossip))
     settings.insert_json5("mode", json.dumps(options.mode))
     for name, endpoints in (("connect", options.connect), ("listen", options.listen)):
+        for wrong in filter(None, map(fault, endpoints)):  # Zenoh would try to connect to it for ever
+            raise PublishError(f"zenoh.{name}: {wrong}")
         key = f"{name}/endpoints"
         if endpoints or settings.get_json(key) == untouched.get_json(key):  # else Zenoh listens on all interfaces
             try:
                 settings.insert_json5(key, json.dumps(endpoints))
             except zenoh.ZError as error:
-                wrong = f"zenoh.{name}: {', '.join(endpoints)}: no endpoint, which is protocol/address"
-                raise PublishError(f"{wrong}; write for example tcp/127.0.0.1:7447") from error
+                shown = ", ".join(endpoint.partition("#")[0] for endpoint in endpoints)
+                raise PublishError(
+                    f"zenoh.{name}: {shown}: what follows ? or # cannot be read; write key=value"
+                ) from error
     return settings
 
 

@@ -1,7 +1,7 @@
 """The vehicle's own odometry, as it arrives on ``<prefix>/speed``: checked, or refused and counted.
 
 A sample is a ``nav_msgs/msg/Odometry`` or a ``geometry_msgs/msg/TwistStamped``; the speed is the twist's linear x,
-the yaw rate its angular z. The sender's clock must agree with ours to within ``LARGEST_AHEAD_S``.
+the yaw rate its angular z. The sender's clock must agree with ours to within ``MAX_AHEAD_S``.
 """
 
 import threading
@@ -14,17 +14,17 @@ from typing import Any
 
 import zenoh
 
-from drivers.records import SpeedSample
+from drivers.samples import SpeedSample
 from lcf_edge.cdr import CdrError, decode_velocity
 from lcf_edge.config import Publish
 from lcf_edge.zenoh_link.ros2 import Ros2Node, dds_type
 
 CAPACITY = 256
-LARGEST_BYTES = 4096
-LARGEST_SPEED_MPS = 70.0
-LARGEST_YAW_RATE_RADPS = 40.0
-LARGEST_AGE_S = 0.5
-LARGEST_AHEAD_S = 0.1
+MAX_BYTES = 4096
+MAX_SPEED_MPS = 70.0
+MAX_YAW_RATE_RADPS = 40.0
+MAX_AGE_S = 0.5
+MAX_AHEAD_S = 0.1
 
 REFUSALS = ("too large", "malformed", "wrong type", "not finite", "out of range", "stale", "from the future")
 
@@ -87,7 +87,7 @@ class SpeedInput:
 
     def _read(self, sample: zenoh.Sample) -> SpeedSample:
         """Raises ``RefusedError``."""
-        if len(sample.payload) > LARGEST_BYTES:
+        if len(sample.payload) > MAX_BYTES:
             raise RefusedError("too large")
         try:
             kind, twist = decode_velocity(sample.payload.to_bytes())
@@ -98,12 +98,12 @@ class SpeedInput:
         speed_mps, yaw_rate_radps = twist.linear[0], twist.angular[2]
         if not isfinite(speed_mps) or isinf(yaw_rate_radps):
             raise RefusedError("not finite")
-        if abs(speed_mps) > LARGEST_SPEED_MPS or abs(yaw_rate_radps) > LARGEST_YAW_RATE_RADPS:
+        if abs(speed_mps) > MAX_SPEED_MPS or abs(yaw_rate_radps) > MAX_YAW_RATE_RADPS:
             raise RefusedError("out of range")
         age_s = (self._now_ns() - twist.header.stamp_ns) / 1e9
-        if age_s > LARGEST_AGE_S:
+        if age_s > MAX_AGE_S:
             raise RefusedError("stale")
-        if age_s < -LARGEST_AHEAD_S:
+        if age_s < -MAX_AHEAD_S:
             raise RefusedError("from the future")
         return SpeedSample(twist.header.stamp_ns, speed_mps, yaw_rate_radps)
 

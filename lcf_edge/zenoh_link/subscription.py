@@ -8,7 +8,7 @@ import zenoh
 from lcf_edge import config
 from lcf_edge.cdr import CdrError, decode_scene
 from lcf_edge.errors import PublishError
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 

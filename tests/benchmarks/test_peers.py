@@ -15,11 +15,11 @@ from benchmarks.peers.ego import SLOTS, Ego
 from benchmarks.peers.orb import _nearest
 from benchmarks.peers.residual import Residual, Tracks, residual
 from benchmarks.playing import config_of, play_drive
-from hil_mocks import scenes
 from lcf_edge.config import Camera, Config, Vehicle
 from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
-from lcf_edge.records import CIRCLE, Cause
+from lcf_edge.messages import CIRCLE, Cause
+from lcf_edge.rendered import scenes
 
 LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
 CONFIG = Config(camera=Camera(height_m=0.5), vehicle=Vehicle(half_width_m=0.6, horizon_s=4.0))

@@ -12,8 +12,8 @@ from benchmarks.methods import NAMES
 from benchmarks.playing import config_of, play_drive, play_recording
 from benchmarks.report import Table
 from benchmarks.speed import config_for
-from hil_mocks import scenes
 from lcf_edge.config import load, to_toml
+from lcf_edge.rendered import scenes
 
 DRIVE = scenes.make("crossing", 1, seconds=0.5, width=320, height=240, focal_px=250.0)
 

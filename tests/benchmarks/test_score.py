@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks.score import Score, pool, score
-from hil_mocks.truth import ObjectTruth, Truth
-from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Shape, Sizes
+from lcf_edge.messages import CIRCLE, PSI_REGION, Kind, PipelineScene, Shape, Sizes
+from lcf_edge.rendered.truth import ObjectTruth, Truth
 
 STEP_NS = 100_000_000  # 10 pictures a second
 BOX = (100.0, 100.0, 40.0, 80.0)
@@ -30,7 +30,9 @@ def scene(seq, *circles, psi=(), corners=0, omitted=0):
         for name, value in (further[0] if further else {}).items():
             row[name] = value
     regions = np.array(list(psi), PSI_REGION) if psi else np.zeros(0, PSI_REGION)
-    return Scene(seq * STEP_NS, seq, 640, 480, 2.0, table, regions, Sizes(corners=corners, omitted=omitted))
+    return PipelineScene(
+        seq * STEP_NS, seq, 640, 480, 2.0, table, regions, sizes=Sizes(corners=corners, omitted=omitted)
+    )
 
 
 def run(circles_of, things_of, count=20, **options):

@@ -46,6 +46,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     place = tmp_path_factory.mktemp("place")
     demo = (sys.executable, "-m", "lcf_edge", "demo", "--out", "demo-out", "--seconds", "2")
     subprocess.run(demo, cwd=place, check=True, capture_output=True)
+    (place / "samples").symlink_to(ROOT / "samples")
     (place / "drive").symlink_to(place / "demo-out/recording")
     (place / "pictures").symlink_to(place / "drive/mav0/cam0/data")
     files = sorted((place / "pictures").iterdir())[::4]

@@ -11,15 +11,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 from lcf_edge.config import Publish, Zenoh, load
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, ObjectClass, Scene
 from lcf_edge.pipeline import run
-from lcf_edge.recordings import open_recording
-from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene
+from lcf_edge.recording.read import open_recording
 from lcf_edge.zenoh_link import ScenePublisher, open_session
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
+PYTHON = ".venv/bin/python "  # where the documents are typed
 USUAL_ENDPOINT = "tcp/127.0.0.1:7447"
 PATIENCE_S = 60.0
 
@@ -44,9 +45,7 @@ def test_the_commands_run(place: Path, monkeypatch: pytest.MonkeyPatch, endpoint
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
-@pytest.mark.parametrize(
-    "command", [command for command in COMMANDS if not command.startswith(("lcf-edge ", "python "))]
-)
+@pytest.mark.parametrize("command", [command for command in COMMANDS if not command.startswith(("lcf-edge ", PYTHON))])
 def test_what_else_is_typed_is_a_target_of_make(command: str) -> None:
     make, target, *variables = shlex.split(command)
     done = subprocess.run([make, "--dry-run", target, *variables], cwd=ROOT, check=True, capture_output=True, text=True)
@@ -55,7 +54,14 @@ def test_what_else_is_typed_is_a_target_of_make(command: str) -> None:
     assert all(variable.partition("=")[2] in done.stdout for variable in variables)
 
 
-@pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith("python ")])
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith(f"{PYTHON}docs/")])
+def test_a_script_of_the_documents_runs(place: Path, command: str) -> None:
+    _, script, *arguments = shlex.split(command)
+    subprocess.run((sys.executable, ROOT / script, *arguments), cwd=place, check=True, timeout=300)
+    assert (place / arguments[-1]).stat().st_size > 0
+
+
+@pytest.mark.parametrize("command", [command for command in COMMANDS if command.startswith(f"{PYTHON}-m ")])
 def test_a_driver_by_hand_understands_it_and_says_in_one_line_what_is_missing(command: str) -> None:
     _, *arguments = shlex.split(command)
     done = subprocess.run(
@@ -63,6 +69,23 @@ def test_a_driver_by_hand_understands_it_and_says_in_one_line_what_is_missing(co
     )
     assert done.returncode in {0, 1}  # 2 would be wrong usage
     assert len(done.stderr.splitlines()) == done.returncode
+
+
+def test_every_driver_by_hand_is_called_with_the_python_that_has_it() -> None:
+    lines = [line for document in DOCUMENTS for line in (ROOT / document).read_text(encoding="utf-8").splitlines()]
+    typed = [line for line in lines if "python -m drivers." in line]
+    assert len(typed) > 6
+    assert all(re.match(r"(LIBCAMERA_\S+ )?(\.venv|/opt/lcf-edge)/bin/python ", line) for line in typed)
+
+
+def test_the_page_comes_through_ssh_in_one_way() -> None:
+    """With a terminal: the page ends with its connection."""
+    texts = [(ROOT / document).read_text(encoding="utf-8") for document in DOCUMENTS]
+    typed = [line for text in texts for line in text.splitlines() if line.startswith("ssh ") and line.endswith(" view")]
+    assert len(typed) > 1
+    assert {re.sub(r"\S+@\S+", "USER@HOST", line) for line in typed} == {
+        "ssh -t -L 8088:127.0.0.1:8088 USER@HOST lcf-edge view"
+    }
 
 
 def first_line(code: str, endpoint: str, publish: Callable[[ScenePublisher], object]) -> str:
@@ -100,7 +123,8 @@ def test_the_subscriber_tells_what_the_demo_finds(blocks: Blocks, place: Path, e
 def test_a_subscriber_needs_no_more_than_numpy_and_zenoh(blocks: Blocks, endpoint: str) -> None:
     code = "\n".join(blocks("docs/wire-format.md", "python"))
     assert "lcf_edge" not in code
-    circles = np.zeros(2, CIRCLE)
-    circles["kind"], circles["x"] = (0, 1), (1.5, 2.5)
-    scene = Scene(1_700_000_000_000_000_001, 7, 640, 480, 1.5, circles, np.zeros(1, PSI_REGION))
-    assert first_line(code, endpoint, lambda publisher: publisher.put(scene)) == "7 [(0, 2.5, 0., 0.)]\n"
+    objects = np.zeros(1, OBJECT)
+    objects["class_id"], objects["ttc"], objects["ttc_sigma"] = ObjectClass.CROSSING, 2.5, 0.25
+    circles, psi = np.zeros(2, CIRCLE), np.zeros(1, PSI_REGION)
+    scene = Scene(1_700_000_000_000_000_001, 7, 640, 480, 1.5, circles, psi, objects=objects)
+    assert first_line(code, endpoint, lambda publisher: publisher.put(scene)) == "7 [(2, 0., 2.5, 0.25)]\n"

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.cdr import encode_scene
-from lcf_edge.command_line import main
-from lcf_edge.records import CIRCLE, PSI_REGION, Kind, Scene, Shape
+from lcf_edge.cli.command_line import main
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, ObjectClass, ObjectState, PipelineScene, Shape
 from lcf_edge.sinks.results import encode_line
 from lcf_edge.zenoh_link import ATTACHMENT, SCENE_ENCODING
 
@@ -25,14 +25,15 @@ Blocks = Callable[[str, str], list[str]]
 Rows = Callable[[str, str], list[list[str]]]
 
 
-def scene(circles: int, regions: int) -> Scene:
+def scene(circles: int, regions: int, objects: int) -> PipelineScene:
     """Numbers that differ from field to field and from row to row."""
     random = np.random.default_rng(1)
-    tables = np.zeros(circles, CIRCLE), np.zeros(regions, PSI_REGION)
+    tables = np.zeros(circles, CIRCLE), np.zeros(regions, PSI_REGION), np.zeros(objects, OBJECT)
     for table in tables:
         for name in table.dtype.names or ():
             table[name] = random.integers(1, 200, len(table))
-    return Scene(1_700_000_000_123_456_789, 41, 640, 480, 1.5, *tables)
+    rows, psi, things = tables
+    return PipelineScene(1_700_000_000_123_456_789, 41, 640, 480, 1.5, rows, psi, objects=things)
 
 
 def paths(value: Any, prefix: str = "") -> Iterator[str]:
@@ -45,7 +46,8 @@ def paths(value: Any, prefix: str = "") -> Iterator[str]:
 
 
 def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
-    known = scene(1, 2)
+    known = scene(1, 2, 1)
+    known.objects["class_id"], known.objects["state"] = ObjectClass.CROSSING, ObjectState.SEEN
     known.circles["kind"], known.circles["cause"] = Kind.REBEL, 1
     known.psi["shape"] = Shape.CIRCLE, Shape.RECTANGLE
     written = set(paths(json.loads(encode_line(known))))
@@ -58,7 +60,7 @@ def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
 def test_notes_of_a_result_line(rows: Rows) -> None:
     sources = "".join(
         (ROOT / "lcf_edge" / name).read_text(encoding="utf-8")
-        for name in ("ego_motion.py", "picture_quality.py", "pipeline.py")
+        for name in ("ego_motion/estimator.py", "corners/picture_quality.py", "pipeline.py")
     )
     noted = set(re.findall(r'notes\.append\("([^"]+)"\)', sources))
     table = rows("docs/replay.md", "### Notes")
@@ -78,14 +80,17 @@ def test_the_wire_format_is_decoded_as_written(frame_id: str, n: int) -> None:
     text = (ROOT / "docs/wire-format.md").read_text(encoding="utf-8")
     names: dict[str, Any] = {}
     exec(re.findall(r"```python\n(.*?)```", text, re.S)[0], names)
-    sent = scene(n, 3 - n)
-    stamp_ns, seq, size, speed, circles, psi = names["decode"](encode_scene(sent, frame_id))
+    sent = scene(n, 3 - n, n % 3)
+    payload = encode_scene(sent, frame_id)
+    stamp_ns, seq, size, speed, circles, psi, objects = names["decode"](payload)
     assert (stamp_ns, seq, size, speed) == (sent.stamp_ns, sent.seq, (640, 480), 1.5)
-    for got, wanted in ((circles, sent.circles), (psi, sent.psi)):
+    for got, wanted in ((circles, sent.circles), (psi, sent.psi), (objects, sent.objects)):
         assert all(np.array_equal(got[name], wanted[name]) for name in wanted.dtype.names or ())
+    *_, psi, objects = names["decode"](payload[: -4 - sent.objects.nbytes])
+    assert (len(psi), len(objects)) == (len(sent.psi), 0), "one of before objects"
 
 
-@pytest.mark.parametrize(("message", "dtype"), [("Circle", CIRCLE), ("PsiRegion", PSI_REGION)])
+@pytest.mark.parametrize(("message", "dtype"), [("Circle", CIRCLE), ("PsiRegion", PSI_REGION), ("Object", OBJECT)])
 def test_messages_are_the_records(text: Text, message: str, dtype: np.dtype[np.void]) -> None:
     heading = re.search(rf"# lcf_msgs/msg/{message}, (\d+) bytes\n((?:\w+ \w+.*\n)+)", text("docs/wire-format.md"))
     assert heading

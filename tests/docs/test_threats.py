@@ -3,10 +3,13 @@
 import re
 from pathlib import Path
 
+from lcf_edge.daemon import memory, peers
 from lcf_edge.gate import gate
-from lcf_edge.view import doorkeeper, server
-from lcf_edge.zenoh_link.admission import LARGEST_MESSAGE_BYTES, access_control
-from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS
+from lcf_edge.monitor.web import doorkeeper, server
+from lcf_edge.recording.read.pictures import _BYTES_A_PIXEL, _DECODER_BYTES
+from lcf_edge.zenoh_link.admission import MAX_MESSAGE_BYTES, access_control
+from lcf_edge.zenoh_link.queryables import Queryables
+from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, MAX_SESSIONS
 
 ROOT = Path(__file__).parents[2]
 DOCUMENT = " ".join((ROOT / "docs/network.md").read_text(encoding="utf-8").split())
@@ -14,8 +17,8 @@ GATE_UNIT = (ROOT / "systemd/lcf-edge-gate.service").read_text(encoding="utf-8")
 
 
 def test_the_bounds_of_the_gate() -> None:
-    assert f"{gate.MOST_STRANGERS} places, the oldest gives way; {gate.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
-    assert f"{gate.MOST_OF_ONE} connections of one name, {gate.MOST_PARTIES} of all" in DOCUMENT
+    assert f"{gate.MAX_STRANGERS} places, the oldest gives way; {gate.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
+    assert f"{gate.MAX_OF_ONE_NAME} connections of one name, {gate.MAX_PARTIES} of all" in DOCUMENT
     assert "MemoryMax=96M" in GATE_UNIT
     assert "CPUQuota=50%" in GATE_UNIT
 
@@ -24,12 +27,30 @@ def test_the_bounds_of_the_daemon() -> None:
     sessions = _UNLESS_THE_FILE_SAYS["transport/unicast/max_sessions"]
     waiting_s = int(_UNLESS_THE_FILE_SAYS["transport/unicast/accept_timeout"]) / 1000
     assert f"{sessions} sessions; 100 connections that are not yet sessions, {waiting_s:g} s each" in DOCUMENT
-    assert f"messages of {LARGEST_MESSAGE_BYTES // 1024} KiB" in DOCUMENT
+    assert f"messages of {MAX_MESSAGE_BYTES // 1024} KiB" in DOCUMENT
+
+
+def test_what_is_done_about_memory_that_peers_fill() -> None:
+    assert f"Above {memory.SHED_AT * 100:g} % of `memory.budget_mib`" in DOCUMENT
+    assert f"at least {peers.CUT_AT_MIB:g} MiB was filled" in DOCUMENT
+    assert peers.CHECK_S == 1 / 20
+    assert "twenty times a second" in DOCUMENT
+    assert f"sessions beyond {MAX_SESSIONS}" in DOCUMENT
+
+
+def test_the_bound_of_videos() -> None:
+    assert f"{_DECODER_BYTES // 2**20} MiB and {_BYTES_A_PIXEL} bytes for each pixel of the first picture" in DOCUMENT
+
+
+def test_every_loss_that_is_counted_is_told() -> None:
+    counts = {"scene failed", "scene unfit", "bytes received", "sessions", "connections cut", "renewals"}
+    queries = Queryables.COUNTED - {"answered"}
+    assert [one for one in counts | {f"query {one}" for one in queries} if f"`{one}`" not in DOCUMENT] == []
 
 
 def test_the_bounds_of_the_page() -> None:
-    most, within_s = doorkeeper.MOST_CONNECTIONS, doorkeeper.REQUEST_WITHIN_S
-    assert f"{most} connections, {within_s:g} s to a request, {server.MOST_BROWSERS} browsers" in DOCUMENT
+    most, within_s = doorkeeper.MAX_CONNECTIONS, doorkeeper.REQUEST_WITHIN_S
+    assert f"{most} connections, {within_s:g} s to a request, {server.MAX_BROWSERS} browsers" in DOCUMENT
 
 
 def test_what_a_local_program_may_do() -> None:

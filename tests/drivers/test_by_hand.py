@@ -7,7 +7,7 @@ import pytest
 
 from drivers.by_hand import describe_imu, watch
 from drivers.errors import DeviceLostError, DeviceMissingError
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.virtual_clock import VirtualClock
 
 

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivers.device import FIRST_PAUSE_S, LONGEST_HOPELESS_PAUSE_S, LONGEST_PAUSE_S, Device, KeptOpen
+from drivers.device import FIRST_PAUSE_S, MAX_HOPELESS_PAUSE_S, MAX_PAUSE_S, Device, KeptOpen
 from drivers.errors import DeviceForbiddenError, DeviceLostError, DeviceMissingError, DriverError
 from hil_mocks.virtual_clock import VirtualClock
 
@@ -95,7 +95,7 @@ def pauses_s(error: DriverError, attempts: int) -> list[float]:
 
 
 @pytest.mark.parametrize(
-    ("error", "longest_s"), [(MISSING, LONGEST_PAUSE_S), (FORBIDDEN, LONGEST_HOPELESS_PAUSE_S)], ids=["hope", "none"]
+    ("error", "longest_s"), [(MISSING, MAX_PAUSE_S), (FORBIDDEN, MAX_HOPELESS_PAUSE_S)], ids=["hope", "none"]
 )
 def test_pauses_grow_to_a_limit(error: DriverError, longest_s: float) -> None:
     pauses = pauses_s(error, 12)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.sample_clock import BLOCKS, SampleClock
+from drivers.sample_clock import BLOCKS, MAX_AHEAD_NS, SampleClock
 
 Times = npt.NDArray[np.float64]
 START_S = 1000.0
@@ -222,6 +222,18 @@ def test_stamps_increase_whatever_is_told(calls: list[tuple[int, int, int]]) -> 
         for stamp_ns in clock.stamps_ns(arrival_ns, count, lost):
             assert last_ns is None or stamp_ns > last_ns
             last_ns = stamp_ns
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.lists(st.tuples(st.integers(0, 10**8), st.lists(st.integers(1, 10**6), max_size=20)), max_size=60))
+def test_no_stamp_runs_away_from_its_arrival_whatever_the_device_tells(calls: list[tuple[int, list[int]]]) -> None:
+    clock = SampleClock(1e6)
+    arrival_ns = made = 0
+    for pause_ns, steps in calls:
+        arrival_ns += pause_ns
+        made += len(steps)
+        for stamp_ns in clock.stamps_of_steps_ns(arrival_ns, steps):
+            assert stamp_ns <= arrival_ns + MAX_AHEAD_NS + made
 
 
 def test_memory_does_not_grow() -> None:

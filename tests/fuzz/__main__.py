@@ -56,7 +56,7 @@ def say(text: str) -> None:
 
 
 def main() -> int:
-    """Run; answers with the exit status."""
+    """Run. Return the exit status."""
     parser = argparse.ArgumentParser(prog="python -m tests.fuzz", description=__doc__)
     parser.add_argument("parsers", nargs="*", metavar="PARSER", help=f"of {', '.join(TARGETS)}; default: all")
     parser.add_argument("--seconds", type=float, default=10.0, help="for each parser (default: 10)")

@@ -112,7 +112,7 @@ def shrunk(take: Take, data: bytes, name: str) -> bytes:
 
 
 def kept(folder: Path, data: bytes) -> str:
-    """Write an input that is a finding; answers with the name of its file."""
+    """Write an input that is a finding. Return the name of its file."""
     path = folder / hashlib.sha256(data).hexdigest()[:12]
     folder.mkdir(parents=True, exist_ok=True)
     path.write_bytes(data)

@@ -4,7 +4,7 @@ import random
 import struct
 from collections.abc import Callable, Sequence
 
-LARGEST_BYTES = 2**16
+MAX_BYTES = 2**16
 CORPUS_BYTES = 2**22
 
 _NUMBERS = (0, 1, 2, 0x7F, 0x80, 0xFF, 0x7FFF, 0x8000, 0xFFFF, 2**24, 2**31 - 1, 2**31, 2**32 - 1, 2**63 - 1, 2**64 - 1)
@@ -37,7 +37,7 @@ class Mutator:
         data = bytearray(self._random.choice(self._corpus))
         for _ in range(self._random.choice((1, 1, 2, 3, 5, 10))):
             self._random.choice(_CHANGES)(self, data)
-        return bytes(data[:LARGEST_BYTES])
+        return bytes(data[:MAX_BYTES])
 
     def _place(self, data: bytearray) -> int:
         return self._random.randint(0, len(data))

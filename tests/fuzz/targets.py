@@ -14,8 +14,9 @@ import threading
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import AbstractContextManager, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,26 +29,27 @@ from mcap.writer import CompressionType, Writer
 
 from drivers.camera.jpeg import jpeg_header
 from drivers.camera.luminance import FrameError, luminance
-from drivers.imu.serial_protocols import PROTOCOLS
-from drivers.records import Frame, ImuSample
-from hil_mocks.serial_imu import ENCODERS, mtdata2
+from drivers.imu.registry import protocols
+from drivers.sample_clock import MAX_AHEAD_NS, SampleClock
+from drivers.samples import Frame, ImuSample
+from hil_mocks.serial_imu import ENCODERS, mtdata2, shtp_packet
 from lcf_edge import cdr
 from lcf_edge.config import Config, Publish, load, to_toml
+from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
-from lcf_edge.live.history import History
-from lcf_edge.live.monitor import Monitor
-from lcf_edge.live.source import Source
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
+from lcf_edge.monitor.live.history import History
+from lcf_edge.monitor.live.monitor import Monitor
+from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.web.doorkeeper import Doorkeeper
+from lcf_edge.monitor.web.guard import Guard
+from lcf_edge.monitor.web.server import Server
+from lcf_edge.monitor.web.update import Audience
 from lcf_edge.pipeline import Pipeline, run
-from lcf_edge.recorded_config import IN_RECORDING
-from lcf_edge.recordings import open_recording
-from lcf_edge.recordings.decoding import PictureError, decode_picture
-from lcf_edge.recordings.sensor_yaml import SensorYaml
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene
-from lcf_edge.view.doorkeeper import Doorkeeper
-from lcf_edge.view.guard import Guard
-from lcf_edge.view.server import Server
-from lcf_edge.view.update import Audience
+from lcf_edge.recording.read import open_recording
+from lcf_edge.recording.read.decoding import PictureError, decode_picture
+from lcf_edge.recording.read.sensor_yaml import SensorYaml
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.session import opened_session
 from lcf_edge.zenoh_link.speed_input import RefusedError, SpeedInput
@@ -92,9 +94,9 @@ def a_picture(width: int = WIDTH, height: int = HEIGHT) -> np.ndarray[Any, np.dt
 
 
 def a_scene() -> Scene:
-    """Some circles and regions with plausible numbers."""
+    """Some circles, regions and objects with plausible numbers."""
     circles, psi = np.ones(3, CIRCLE), np.ones(2, PSI_REGION)
-    return Scene(STAMP_NS, 7, 640, 480, 1.5, circles, psi)
+    return Scene(STAMP_NS, 7, 640, 480, 1.5, circles, psi, objects=np.ones(2, OBJECT))
 
 
 def an_info() -> cdr.CameraInfo:
@@ -131,6 +133,7 @@ def messages() -> Sequence[bytes]:
         cdr.encode_imu(STAMP_NS, "imu", (0.1, 0.2, 0.3), (0.0, -9.8, 0.0)),
         cdr.encode_twist_stamped(STAMP_NS, "base", 1.5, 0.1),
         cdr.encode_camera_info(an_info()),
+        cdr.encode_scene(replace(a_scene(), objects=np.empty(0, OBJECT)), "camera")[:-4],  # as older versions sent it
     )
 
 
@@ -165,7 +168,11 @@ def messages_of_ros(_: Path) -> Iterator[Take]:
     yield take
 
 
-@target(lambda: [message + MARK + ATTACHMENT.pack(1, STAMP_NS, 16, bytes(16)) for message in messages()[:3]])
+@target(
+    lambda: [
+        message + MARK + ATTACHMENT.pack(1, STAMP_NS, 16, bytes(16)) for message in (*messages()[:3], messages()[-1])
+    ]
+)
 def what_viewers_receive(_: Path) -> Iterator[Take]:
     """Scenes, diagnostics, previews and their attachments, up to the text for the page."""
     monitor = Monitor(Source("tcp/127.0.0.1:9"), history=History())
@@ -210,7 +217,7 @@ def serial_streams() -> Sequence[bytes]:
     return [b"".join(map(encoder(), samples)) for encoder in ENCODERS.values()]
 
 
-@target(serial_streams, (b"\xaa\xaa", b"\xfa\xff\x36", b"\x55\x51", b"*00\r\n", b","))
+@target(serial_streams, (b"\xaa\xaa", b"\xfa\xff\x36", b"\x55\x51", b"\x55\x61", b"\x7e\x01", b"*00\r\n", b","))
 def serial_protocols(_: Path) -> Iterator[Take]:
     """Every parser: the bytes as they are, and as the content of whole frames."""
 
@@ -220,17 +227,40 @@ def serial_protocols(_: Path) -> Iterator[Take]:
         for block in blocks:
             body, wit = b"\xaa\xaa" + block, bytes((0x55, 0x51 + block[0] % 2)) + block[:8]
             parts += [body + bytes([sum(block) & 0xFF]), wit + bytes([sum(wit) & 0xFF])]
+            parts += [b"\x55\x61" + block + bytes(2), shtp_packet(block[0] % 6, block[1], block)]
         return b"".join(parts)
 
     def take(data: bytes) -> str:
         became = []
-        for name, protocol in PROTOCOLS.items():
+        for name, protocol in protocols().items():
             for stream in (data, framed(data)):
                 parser = protocol.parser()
                 readings = [r for at in range(0, len(stream), 97) for r in parser.feed(stream[at : at + 97])]
                 assert all(np.isfinite((*reading.gyro, *reading.accel)).all() for reading in readings), name
                 became.append(f"{name}{min(len(readings), 3)}{sorted(parser.counts)}")
         return " ".join(became)
+
+    yield take
+
+
+def arrivals() -> Sequence[bytes]:
+    """Pauses between samples, us, and what the device's own clock tells of them, ticks."""
+    return [struct.pack("<II", 5000, 5000) * 40, struct.pack("<IIII", 0, 1, 40_000, 900_000) * 20]
+
+
+@target(arrivals, (b"\xff" * 4, b"\0" * 4, b"\1\0\0\0"))
+def imu_clocks(_: Path) -> Iterator[Take]:
+    """Stamps of samples whose device has a clock of its own: they increase, and do not run away."""
+
+    def take(data: bytes) -> str:
+        clock, arrival_ns, last_ns = SampleClock(1e6), STAMP_NS, -STAMP_NS
+        steps = [max(ticks, 1) for ticks in struct.unpack(f"<{len(data) // 4}I", data[: len(data) // 4 * 4])]
+        for count, (pause_us, ticks) in enumerate(pairwise(steps)):
+            arrival_ns += pause_us * 1000
+            (stamp_ns,) = clock.stamps_of_steps_ns(arrival_ns, [ticks])
+            assert last_ns < stamp_ns <= arrival_ns + MAX_AHEAD_NS + count
+            last_ns = stamp_ns
+        return f"{clock.rate_hz:.0e}"
 
     yield take
 
@@ -258,7 +288,7 @@ def configurations(folder: Path) -> Iterator[Take]:
             assert load(again) == config
             assert all(line.isprintable() for line in text.split("\n"))
             if config.memory.budget_mib < 200:
-                from lcf_edge.commands.config import report  # noqa: PLC0415  # as `lcf-edge config` does
+                from lcf_edge.cli.config import report  # noqa: PLC0415  # as `lcf-edge config` does
 
                 report(config)
         except ConfigError as error:
@@ -377,7 +407,21 @@ def mcap_files() -> Sequence[bytes]:
     return [mcap_file(topics, form, b"[camera]\nfps = 10\n") for form in forms] + [mcap_file(topics[1:])]
 
 
-@target(mcap_files, (b"\x89MCAP0\r\n", b"\xff" * 8, b"zstd", b"lz4", b"\x05", b"\x06", b"sensor_msgs/msg/Image"))
+@target(
+    mcap_files,
+    (
+        b"\x89MCAP0\r\n",
+        b"\xff" * 8,
+        b"zstd",
+        b"lz4",
+        b"\x05",
+        b"\x06",
+        b"\x08",
+        b"\x0b",
+        b"\x0e",
+        b"sensor_msgs/msg/Image",
+    ),
+)
 def mcap(folder: Path) -> Iterator[Take]:
     """A whole replay, and the configuration inside."""
     path = folder / "drive.mcap"
@@ -491,6 +535,7 @@ def requests() -> Sequence[bytes]:
         b"POST /updates HTTP/1.1\r\nHost: [::1]\r\nContent-Length: 3\r\n\r\nabc",
         UPGRADE + asked,
         UPGRADE + b"\x88\x82\0\0\0\0\x03\xe8" + asked,
+        UPGRADE + b"\x01\x81\0\0\0\0n" + b"\x80\x83\0\0\0\0ext" + b"\x89\x81\0\0\0\0p",
     )
 
 

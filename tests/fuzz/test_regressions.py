@@ -9,12 +9,12 @@ import pytest
 
 from tests.fuzz import __main__ as command
 from tests.fuzz.hunt import alarmed, hunt, peak_mib, strict, tried
-from tests.fuzz.mutation import CORPUS_BYTES, LARGEST_BYTES, Mutator
+from tests.fuzz.mutation import CORPUS_BYTES, MAX_BYTES, Mutator
 from tests.fuzz.targets import TARGETS, Take
 
 REGRESSIONS = Path(__file__).with_name("regressions")
 INPUTS = sorted(path.relative_to(REGRESSIONS) for path in REGRESSIONS.glob("*/*"))
-LARGEST_REGRESSION_BYTES = 16_384
+MAX_REGRESSION_BYTES = 16_384
 
 
 @pytest.mark.parametrize("name", TARGETS)
@@ -34,7 +34,7 @@ def test_what_once_broke_a_parser_does_not_again(path: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize("path", INPUTS, ids=str)
 def test_a_regression_is_small_and_belongs_to_a_parser(path: Path) -> None:
     assert path.parts[0] in TARGETS
-    assert (REGRESSIONS / path).stat().st_size <= LARGEST_REGRESSION_BYTES
+    assert (REGRESSIONS / path).stat().st_size <= MAX_REGRESSION_BYTES
 
 
 class Planted:
@@ -78,9 +78,9 @@ def mutator() -> Mutator:
 def test_inputs_are_bounded_and_so_is_what_they_are_made_of(mutator: Mutator) -> None:
     for _ in range(2000):
         data = mutator.draw()
-        assert len(data) <= LARGEST_BYTES
-        mutator.keep(data + bytes(LARGEST_BYTES))
-    assert mutator.size <= CORPUS_BYTES // LARGEST_BYTES + 1
+        assert len(data) <= MAX_BYTES
+        mutator.keep(data + bytes(MAX_BYTES))
+    assert mutator.size <= CORPUS_BYTES // MAX_BYTES + 1
 
 
 def test_the_same_seed_draws_the_same_inputs(mutator: Mutator) -> None:

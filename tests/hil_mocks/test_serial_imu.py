@@ -12,7 +12,7 @@ import serial
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.serial_imu import (
     CsvEncoder,
     SerialImuStandIn,

@@ -10,13 +10,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.errors import DeviceLostError, DeviceMissingError
-from drivers.records import Frame
-from hil_mocks import scenes
+from drivers.samples import Frame
 from hil_mocks.soak import stand_ins
 from hil_mocks.soak.__main__ import main, soak
 from hil_mocks.soak.figures import Balance, Life, complaints, lines, slope
 from hil_mocks.soak.stand_ins import FastCamera, FastImu, FastSpeed, Feed, save
 from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.rendered import scenes
 
 
 @pytest.fixture(scope="module")

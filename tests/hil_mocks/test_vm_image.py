@@ -9,6 +9,9 @@ from pathlib import Path
 import pytest
 
 from hil_mocks.vm import image
+from hil_mocks.vm.machine import BOARDS
+from release.debian import MACHINES
+from release.foreign_pip import locked_for
 
 ROOT = Path(__file__).parents[2]
 
@@ -23,6 +26,20 @@ def test_what_is_missing_is_one_line_with_the_remedy(monkeypatch: pytest.MonkeyP
         assert image.missing() == ""
 
 
+def test_64_bit_arm_wants_its_own_tools(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("shutil.which", lambda _: None)
+    wanted = image.missing("aarch64").partition("apt-get install ")[2].rstrip(")")
+    for package in ("qemu-system-arm", "qemu-user-static", "binfmt-support", "arch-test", "gcc-aarch64-linux-gnu"):
+        assert package in wanted.split()
+    assert "qemu-system-arm" not in image.missing()
+    assert set(BOARDS) == set(image.MORE_TOOLS) == set(MACHINES)
+
+
+def test_the_packages_of_a_processor_are_its_own() -> None:
+    assert "linux-image-amd64" in image._packages(image.DEBIAN_12)
+    assert {"linux-image-arm64", "linux-headers-arm64"} <= set(image._packages(image.DEBIAN_13_ON_ARM))
+
+
 @pytest.mark.parametrize(("where_possible", "status"), [("", 1), ("1", 0)])
 def test_where_it_cannot_be_it_says_so_and_does_not_pretend(tmp_path: Path, where_possible: str, status: int) -> None:
     environment = os.environ | {"PATH": str(tmp_path), "LCF_EDGE_HIL_WHERE_POSSIBLE": where_possible}
@@ -32,6 +49,17 @@ def test_where_it_cannot_be_it_says_so_and_does_not_pretend(tmp_path: Path, wher
     (line,) = [line for line in (done.stdout + done.stderr).splitlines() if "hil:" in line]
     assert "apt-get install e2fsprogs mmdebstrap openssl qemu-system-x86" in line
     assert "passed" not in done.stdout
+
+
+def test_the_lock_is_read_for_the_guests_python_and_not_for_this_one() -> None:
+    lock = "one==1 \\\n    --hash=sha256:1\ntwo==2 ; python_full_version < '3.12' \\\n    --hash=sha256:2\n"
+    lock += (
+        "two==3 ; python_full_version >= '3.12' \\\n    --hash=sha256:3\nfour==4 ; sys_platform == 'win32' --hash=4\n"
+    )
+    kept = [line.split() for line in locked_for(lock, "3.11").splitlines()]
+    assert kept == [["one==1", "--hash=sha256:1"], ["two==2", "--hash=sha256:2"]]
+    kept = [line.split() for line in locked_for(lock, "3.13").splitlines()]
+    assert kept == [["one==1", "--hash=sha256:1"], ["two==3", "--hash=sha256:3"]]
 
 
 def test_the_digest_is_that_of_names_and_contents(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -18,7 +18,7 @@ import pytest
 from mcap.writer import Writer
 from rosbags.typesys import Stores, get_typestore
 
-from drivers.records import Frame, ImuSample
+from drivers.samples import Frame, ImuSample
 
 Grey = npt.NDArray[np.uint8]
 Lines = list[dict[str, Any]]
@@ -323,14 +323,14 @@ def test_broken_intrinsics(replay: Callable[..., Replayed], drive: Drive) -> Non
     sensor_yaml.write_text(SENSOR_YAML.replace("250.0, 159.5", "nan, 159.5"))
     done = replay(drive.root)
     assert (done.status, done.lines) == (1, None)
-    assert f"{sensor_yaml}: intrinsics: 4 numbers are needed; mend or remove the file" in done.error
+    assert f"{sensor_yaml}: intrinsics: 4 numbers are needed; fix or remove the file" in done.error
 
 
 # MCAP
 
 
 def mcap_file(path: Path, items: list[Any]) -> list[int]:
-    """Pictures as ``ros2 bag record`` writes them; answers with the size of the file after each."""
+    """Pictures as ``ros2 bag record`` writes them. Return the size of the file after each."""
     ros = get_typestore(Stores.ROS2_HUMBLE)
     kind = "sensor_msgs/msg/Image"
     sizes = []
@@ -385,7 +385,7 @@ def test_all_of_it_in_one_recording(replay: Callable[..., Replayed], drive: Driv
     drive.picture(8).unlink()
     drive.change("imu0", 5, "garbage")
     drive.change("odom0", 5, "1,nan,0")
-    video = tmp_path / "overlay.mp4"
+    video = tmp_path / "overlay.webm"
     done = replay(drive.root, "--video", video)
     assert (done.status, done.sequence) == (0, without(1, 3, 8))
     assert sum(done.skipped.values()) == 5

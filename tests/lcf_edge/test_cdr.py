@@ -2,6 +2,7 @@
 
 import struct
 from collections.abc import Callable
+from enum import IntEnum
 from importlib.resources import files
 from typing import Any
 
@@ -10,10 +11,11 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
 from lcf_edge import cdr
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Cause, Kind, ObjectClass, ObjectState, Scene, Shape
 
 DECODERS: dict[str, Callable[[bytes], Any]] = {
     "sensor_msgs/msg/Image": cdr.decode_image,
@@ -158,23 +160,31 @@ def test_camera_without_distortion_has_an_empty_sequence(
     assert (info.d, info.k) == ((), tuple(map(float, range(9))))
 
 
-def scene(circles: int, psi: int) -> Scene:
+def scene(circles: int, psi: int, objects: int = 2) -> Scene:
     rng = np.random.default_rng(7)
-    return Scene(STAMP_NS, 17, 640, 480, 1.5, _filled(CIRCLE, circles, rng), _filled(PSI_REGION, psi, rng))
+    tables = (_filled(dtype, rows, rng) for dtype, rows in ((CIRCLE, circles), (PSI_REGION, psi)))
+    return Scene(STAMP_NS, 17, 640, 480, 1.5, *tables, objects=_filled(OBJECT, objects, rng))
+
+
+def without_objects(payload: bytes) -> bytes:
+    """The same as it was sent before there were objects."""
+    return payload[: -4 - OBJECT.itemsize * len(cdr.decode_scene(payload).objects)]
 
 
 def _filled(dtype: np.dtype[np.void], rows: int, rng: np.random.Generator) -> npt.NDArray[np.void]:
     """Records with random fields; what lies between the fields is not zero."""
     records = np.frombuffer(bytes([0xAA]) * dtype.itemsize * rows, dtype).copy()
     for name in dtype.names or ():
-        records[name] = rng.integers(1, {"kind": 2, "cause": 4}.get(name, 100), rows)
+        records[name] = rng.integers(1, {"kind": 2, "cause": 4, "class_id": 6, "state": 3}.get(name, 100), rows)
     return records
 
 
 @pytest.mark.parametrize("frame_id", FRAME_IDS)
-@pytest.mark.parametrize(("circles", "psi"), [(0, 0), (1, 0), (0, 1), (3, 2)])
-def test_scene_is_read_by_another_implementation(ros: Typestore, frame_id: str, circles: int, psi: int) -> None:
-    sent = scene(circles, psi)
+@pytest.mark.parametrize(("circles", "psi", "objects"), [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (3, 2, 2)])
+def test_scene_is_read_by_another_implementation(
+    ros: Typestore, frame_id: str, circles: int, psi: int, objects: int
+) -> None:
+    sent = scene(circles, psi, objects)
     payload = cdr.encode_scene(sent, frame_id)
     got: Any = ros.deserialize_cdr(payload, "lcf_msgs/msg/Scene")
     assert (got.header.stamp.sec * 10**9 + got.header.stamp.nanosec, got.header.frame_id) == (
@@ -182,7 +192,7 @@ def test_scene_is_read_by_another_implementation(ros: Typestore, frame_id: str, 
         frame_id,
     )
     assert (got.frame_seq, got.image_width, got.image_height, got.vehicle_speed) == (17, 640, 480, 1.5)
-    for rows, records in ((got.circles, sent.circles), (got.psi, sent.psi)):
+    for rows, records in ((got.circles, sent.circles), (got.psi, sent.psi), (got.objects, sent.objects)):
         assert [tuple(getattr(row, name) for name in records.dtype.names) for row in rows] == records.tolist()
     assert bytes(ros.serialize_cdr(got, "lcf_msgs/msg/Scene")) == payload, "also the padding"
 
@@ -198,6 +208,62 @@ def test_scene_written_by_another_implementation_is_read(ros: Typestore, little_
     assert (got.stamp_ns, got.seq, got.image_width, got.image_height) == (STAMP_NS, 17, 640, 480)
     assert got.circles.tolist() == sent.circles.tolist()
     assert got.psi.tolist() == sent.psi.tolist()
+    assert got.objects.tolist() == sent.objects.tolist()
+
+
+def records(dtype: np.dtype[np.void], **largest: int) -> st.SearchStrategy[npt.NDArray[np.void]]:
+    """Any rows whose floats are of a message, and whose ids are up to those of ``largest``."""
+
+    def row(words: bytes) -> npt.NDArray[np.void]:
+        rows = np.frombuffer(words, dtype).copy()
+        for name in dtype.names or ():
+            if name in largest:
+                rows[name] %= largest[name] + 1
+            elif rows.dtype[name] == np.float32:
+                bits = rows[name].view(np.uint32)
+                bits[np.isnan(bits.view(np.float32))] |= 0x00400000  # a quiet one
+        return rows
+
+    return (
+        st.integers(0, 4)
+        .flatmap(lambda n: st.binary(min_size=n * dtype.itemsize, max_size=n * dtype.itemsize))
+        .map(row)
+    )
+
+
+@given(
+    circles=records(CIRCLE, kind=1, cause=3),
+    psi=records(PSI_REGION),
+    objects=records(OBJECT, class_id=5, state=2),
+    frame_id=st.sampled_from(FRAME_IDS),
+)
+def test_any_scene_is_read_as_it_was_written(
+    circles: npt.NDArray[np.void], psi: npt.NDArray[np.void], objects: npt.NDArray[np.void], frame_id: str
+) -> None:
+    payload = cdr.encode_scene(Scene(STAMP_NS, 17, 640, 480, 1.5, circles, psi, objects=objects), frame_id)
+    got = cdr.decode_scene(payload)
+    assert got.circles.tobytes() == circles.tobytes()
+    assert got.objects.tobytes() == objects.tobytes()
+    assert all(got.psi[name].tobytes() == psi[name].tobytes() for name in PSI_REGION.names or ())
+    old = cdr.decode_scene(without_objects(payload))
+    assert (old.circles.tobytes(), len(old.psi), len(old.objects)) == (circles.tobytes(), len(psi), 0)
+    assert cdr.encode_scene(got, frame_id) == payload
+
+
+def test_a_reader_of_before_objects_finds_its_part_unchanged() -> None:
+    sent = scene(3, 2)
+    payload = cdr.encode_scene(sent, "camera")
+    assert payload.startswith(without_objects(payload))
+    ours = ("Circle", "PsiRegion", "Scene")
+    definitions = {name: (files("lcf_edge") / "msg" / f"{name}.msg").read_text(encoding="utf-8") for name in ours}
+    assert definitions["Scene"].endswith("PsiRegion[] psi\nObject[] objects\n")
+    definitions["Scene"] = definitions["Scene"].removesuffix("Object[] objects\n")
+    before = get_typestore(Stores.ROS2_HUMBLE)
+    for name, text in definitions.items():
+        before.register(get_types_from_msg(text, f"lcf_msgs/msg/{name}"))
+    got: Any = before.deserialize_cdr(without_objects(payload), "lcf_msgs/msg/Scene")
+    assert [circle.id for circle in got.circles] == sent.circles["id"].tolist()
+    assert bytes(before.serialize_cdr(got, "lcf_msgs/msg/Scene")) == without_objects(payload)
 
 
 def test_scene_is_read_without_a_copy() -> None:
@@ -208,12 +274,25 @@ def test_scene_is_read_without_a_copy() -> None:
     assert got.circles["id"][1] == 4242
     assert not got.circles.flags.writeable
     assert not got.psi.flags.writeable
+    assert not got.objects.flags.writeable
 
 
-def test_constants_of_the_message_definitions_are_those_of_the_records() -> None:
-    text = (files("lcf_edge") / "msg" / "Circle.msg").read_text(encoding="utf-8")
-    names = [line.split()[1] for line in text.splitlines() if line.strip() and line[0] != "#" and "=" not in line]
-    assert tuple(names) == CIRCLE.names
+@pytest.mark.parametrize(
+    ("message", "dtype", "constants"),
+    [
+        ("Circle", CIRCLE, [*Kind, *Cause]),
+        ("PsiRegion", PSI_REGION, [*Shape]),
+        ("Object", OBJECT, [*ObjectClass, *ObjectState]),
+    ],
+)
+def test_fields_and_constants_of_the_message_definitions_are_those_of_the_records(
+    message: str, dtype: np.dtype[np.void], constants: list[IntEnum]
+) -> None:
+    text = (files("lcf_edge") / "msg" / f"{message}.msg").read_text(encoding="utf-8")
+    said = [line.partition("#")[0].split() for line in text.splitlines() if line.partition("#")[0].strip()]
+    assert tuple(words[1] for words in said if "=" not in words) == dtype.names
+    told = [(words[1], int(words[3])) for words in said if "=" in words]
+    assert told == [(constant.name, constant.value) for constant in constants]
 
 
 @pytest.mark.parametrize(
@@ -252,26 +331,43 @@ def test_a_damaged_message_is_a_message_or_a_cdr_error(
 @pytest.mark.parametrize("kind", DECODERS)
 def test_a_message_cut_short_is_an_error(ros: Typestore, samples: Callable[[str], dict[str, Any]], kind: str) -> None:
     if kind.startswith(("lcf_msgs", "std_msgs")):
-        payload, needed = cdr.encode_scene(scene(2, 2), "camera"), {"lcf_msgs/msg/Scene": 0}.get(kind)
+        payload = without_objects(cdr.encode_scene(scene(2, 2), "camera"))
     else:
-        payload, needed = bytes(ros.serialize_cdr(samples("camera")[kind], kind)), None
+        payload = bytes(ros.serialize_cdr(samples("camera")[kind], kind))
     ends = [n for n in range(len(payload)) if not with_error(DECODERS[kind], payload[:n])]
     assert ends == list(range(len(ends))), "every shorter payload is refused, up to the last field that is read"
     assert len(ends) >= 20
-    if needed == 0:
-        assert len(ends) == len(payload)
 
 
-@pytest.mark.parametrize(("field", "value"), [("kind", 2), ("cause", 4), ("cause", 255)])
-def test_a_circle_of_an_unknown_kind_is_refused(field: str, value: int) -> None:
+def test_a_scene_cut_short_is_an_error_but_for_one_that_ends_before_the_objects() -> None:
+    payload = cdr.encode_scene(scene(2, 2), "camera")
+    whole = [n for n in range(len(payload)) if with_error(cdr.decode_scene, payload[:n])]
+    assert whole == [len(without_objects(payload))]
+
+
+@pytest.mark.parametrize(
+    ("rows", "field", "value", "name"),
+    [
+        ("circles", "kind", 2, "kind of a circle"),
+        ("circles", "cause", 4, "cause of a circle"),
+        ("circles", "cause", 255, "cause of a circle"),
+        ("objects", "class_id", 6, "class of an object"),
+        ("objects", "class_id", 255, "class of an object"),
+        ("objects", "state", 3, "state of an object"),
+    ],
+)
+def test_a_circle_or_object_of_an_unknown_kind_is_refused(rows: str, field: str, value: int, name: str) -> None:
     sent = scene(3, 2)
-    sent.circles[field][1] = value
-    with pytest.raises(cdr.CdrError, match=f"the {field} of a circle"):
+    getattr(sent, rows)[field][1] = value
+    with pytest.raises(cdr.CdrError, match=f"the {name}"):
         cdr.decode_scene(cdr.encode_scene(sent, "camera"))
 
 
 @pytest.mark.parametrize("bits", [0x7F800001, 0x7FBFFFFF, 0xFFA00000])
-@pytest.mark.parametrize(("rows", "field"), [("circles", "x"), ("circles", "lateral"), ("psi", "trust")])
+@pytest.mark.parametrize(
+    ("rows", "field"),
+    [("circles", "x"), ("circles", "lateral"), ("psi", "trust"), ("objects", "x"), ("objects", "unseen")],
+)
 def test_a_signalling_nan_is_refused_for_numpy_would_complain_of_it(rows: str, field: str, bits: int) -> None:
     sent = scene(3, 2)
     getattr(sent, rows)[field].view(np.uint32)[1] = bits
@@ -285,6 +381,19 @@ def test_numbers_that_are_none_otherwise_are_taken() -> None:
     sent.circles["lateral"].view(np.uint32)[:] = (0x7FFFFFFF, 0xFFC00001, 0x00000001)
     got = cdr.decode_scene(cdr.encode_scene(sent, "camera"))
     np.testing.assert_array_equal(got.circles["range"], sent.circles["range"])
+
+
+@pytest.mark.parametrize("table", ["circles", "psi", "objects"])
+def test_a_count_beyond_what_is_left_is_refused_in_each_table(table: str) -> None:
+    sent = scene(1, 1, 1)
+    payload = bytearray(cdr.encode_scene(sent, "camera"))
+    sizes = {"objects": OBJECT.itemsize, "psi": PSI_REGION.itemsize, "circles": CIRCLE.itemsize}
+    behind = [*sizes][: [*sizes].index(table) + 1]
+    place = len(payload) - sum(sizes[name] + 4 for name in behind)
+    assert payload[place : place + 4] == struct.pack("<I", 1)
+    payload[place : place + 4] = struct.pack("<I", 0xFFFFFFFF)
+    with pytest.raises(cdr.CdrError, match="are left"):
+        cdr.decode_scene(payload)
 
 
 def test_a_count_beyond_the_payload_takes_no_memory() -> None:

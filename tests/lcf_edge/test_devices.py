@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import get_args
 
@@ -9,13 +10,16 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.camera import find, libcamera
+from drivers.camera.luminance import PIXEL_FORMATS
 from drivers.errors import DeviceMissingError, DriverError
-from drivers.records import Frame, ImuSample, SpeedSample
+from drivers.imu.registry import DRIVERS, names
+from drivers.samples import Frame, ImuSample, SpeedSample
+from hil_mocks.libcamera_device import World, command
 from hil_mocks.virtual_clock import VirtualClock
 from lcf_edge.config import Config, ImuDriver, load
-from lcf_edge.devices import SERIAL, open_camera, open_imu, open_speed
-
-I2C = ("mpu6050", "mpu6500", "mpu9250", "icm20948", "lsm6ds3", "lsm6dso", "lsm6dso32", "bmi160", "bmi270", "bno055")
+from lcf_edge.config.config import PixelFormat
+from lcf_edge.devices import open_camera, open_imu, open_speed
 
 
 def write_recording(folder: Path, *, imu: bool = True) -> Path:
@@ -51,6 +55,30 @@ def test_a_recording_stands_in_for_camera_imu_and_odometry(tmp_path: Path) -> No
         device.close()
 
 
+@pytest.mark.parametrize(
+    ("driver", "only_libcamera_can", "through_libcamera"),
+    [("libcamera", False, True), ("auto", True, True), ("auto", False, False), ("v4l2", True, False)],
+)
+def test_a_camera_that_only_libcamera_can_run_is_run_by_it(
+    monkeypatch: pytest.MonkeyPatch, driver: str, only_libcamera_can: bool, through_libcamera: bool
+) -> None:
+    monkeypatch.setattr(find, "is_libcameras", lambda _: only_libcamera_can)
+    monkeypatch.setattr(libcamera, "COMMAND", command(World()))
+    config = configured(f"camera.driver={driver}", "camera.device=imx219", "camera.width=64", "camera.height=48")
+    if through_libcamera:
+        with closing(open_camera(config)) as camera:
+            while not (frames := camera.read()):
+                pass
+        assert frames[0].image.shape == (48, 64)
+    else:
+        with pytest.raises(DeviceMissingError, match=r"^imx219: no camera of that name"):
+            open_camera(config)
+
+
+def test_every_format_that_can_be_read_can_be_configured() -> None:
+    assert set(get_args(PixelFormat)) == {"auto", *PIXEL_FORMATS}
+
+
 def test_the_imu_may_have_a_recording_of_its_own(tmp_path: Path) -> None:
     silent, whole = write_recording(tmp_path / "silent", imu=False), write_recording(tmp_path / "whole")
     clock = VirtualClock()
@@ -74,13 +102,13 @@ def test_the_cameras_keys_reach_its_driver() -> None:
         open_camera(configured("camera.device=/dev/v4l/by-id/no-such-camera"))
 
 
-@pytest.mark.parametrize("driver", I2C)
+@pytest.mark.parametrize("driver", names("i2c"))
 def test_chips_are_looked_for_on_their_bus(driver: str) -> None:
     with pytest.raises(DriverError, match=r"i2c-255"):
         open_imu(configured(f"imu.driver={driver}", "imu.bus=255"))
 
 
-@pytest.mark.parametrize("driver", sorted(SERIAL))
+@pytest.mark.parametrize("driver", names("serial"))
 def test_serial_imus_are_looked_for_at_their_port(driver: str) -> None:
     with pytest.raises(DeviceMissingError, match="no-such-port"):
         open_imu(configured(f"imu.driver={driver}", "imu.port=/dev/no-such-port"))
@@ -91,8 +119,13 @@ def test_the_kernels_own_driver_is_looked_for_by_name() -> None:
         open_imu(configured("imu.driver=iio", "imu.device=no-such-chip"))
 
 
-def test_every_driver_of_the_configuration_is_tested_here() -> None:
-    assert {"none", "recording", "iio", *SERIAL, *I2C} == set(get_args(ImuDriver))
+def test_the_configuration_knows_the_drivers_of_the_registry() -> None:
+    assert get_args(ImuDriver) == ("none", *DRIVERS, "recording")
+
+
+@pytest.mark.parametrize("driver", DRIVERS)
+def test_every_driver_of_the_registry_is_there(driver: str) -> None:
+    DRIVERS[driver].load()
 
 
 def test_only_what_is_used_is_loaded() -> None:
@@ -101,4 +134,4 @@ def test_only_what_is_used_is_loaded() -> None:
         "print([name for name in sys.modules if name.startswith(('hil_mocks.', 'drivers.imu.', 'drivers.camera.'))])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=60)
-    assert done.stdout.strip() == "[]"
+    assert done.stdout.strip() == "['drivers.imu.registry']"

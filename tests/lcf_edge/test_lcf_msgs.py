@@ -1,13 +1,17 @@
 """The ROS 2 package has the messages that go out, and says what it needs to be built."""
 
 import re
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from pathlib import Path
+from typing import Any
 
 from lcf_edge import __version__
 from lcf_edge.zenoh_link.schema import scene_schema
 
 ROOT = Path(__file__).parents[2]
+USUAL_ENDPOINT = "tcp/127.0.0.1:7447"
 OURS, PACKAGE = ROOT / "lcf_edge" / "msg", ROOT / "ros2" / "lcf_msgs"
 MESSAGES = {path.name: path.read_bytes() for path in OURS.glob("*.msg")}
 
@@ -37,3 +41,18 @@ def test_the_package_names_what_it_depends_on() -> None:
 def test_the_schema_that_is_told_is_made_of_the_same_messages() -> None:
     schema = scene_schema()
     assert all(text.decode() in schema for text in MESSAGES.values())
+
+
+def test_classes_can_be_made_of_what_a_daemon_tells_without_ros_and_without_this_package(rover: Any) -> None:
+    document = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
+    (code,) = (code for code in re.findall(r"```python\n(.*?)```", document, re.DOTALL) if "rosbags" in code)
+    assert "lcf_edge" not in code
+    assert USUAL_ENDPOINT in code
+    command = (sys.executable, "-u", "-c", code.replace(USUAL_ENDPOINT, rover.endpoint))
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as subscriber:
+        try:
+            assert subscriber.stdout
+            line = subscriber.stdout.readline()
+        finally:
+            subscriber.kill()
+    assert re.fullmatch(r"\d+: class 1, contact in 0\.8 ± 0\.1 s\n", line)

@@ -4,7 +4,7 @@ import gc
 import sys
 import tracemalloc
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import fields, replace
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,14 +14,14 @@ import pytest
 from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
-from drivers.records import Frame, ImuSample, SpeedSample
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Camera, Config, Filter, Memory, Vehicle
 from lcf_edge.errors import ConfigError
 from lcf_edge.lens import Lens
-from lcf_edge.pipeline import Outcome, Pipeline, run
-from lcf_edge.recordings import Recording
-from lcf_edge.recordings.recording import Picture
-from lcf_edge.records import Kind, Scene, Sizes
+from lcf_edge.messages import Kind, Scene, Sizes, View
+from lcf_edge.pipeline import Pipeline, run
+from lcf_edge.recording.read import Recording
+from lcf_edge.recording.read.recording import Picture
 
 Grey = npt.NDArray[np.uint8]
 Item = Frame | ImuSample | SpeedSample
@@ -47,15 +47,23 @@ SMALL = Memory(
 )
 
 
-def outcomes(items: Iterable[Item], config: Config = DEFAULTS, lens: Lens = PINHOLE) -> list[Outcome]:
+@dataclass(frozen=True)
+class Step:
+    """What came of one frame."""
+
+    scene: Scene
+    view: View
+
+
+def outcomes(items: Iterable[Item], config: Config = DEFAULTS, lens: Lens = PINHOLE) -> list[Step]:
     pipeline = Pipeline(config, lens)
     return list(processed(pipeline, items))
 
 
-def processed(pipeline: Pipeline, items: Iterable[Item]) -> Iterator[Outcome]:
+def processed(pipeline: Pipeline, items: Iterable[Item]) -> Iterator[Step]:
     for item in items:
         if isinstance(item, Frame):
-            yield Outcome(pipeline.process(item), pipeline.view())
+            yield Step(pipeline.process(item), pipeline.view())
         else:
             pipeline.add(item)
 
@@ -71,7 +79,7 @@ def capacities(memory: Memory) -> Sizes:
     return Sizes(**{name: getattr(memory, name) for name in names}, omitted=memory.corners)
 
 
-def check(outcome: Outcome, config: Config, lens: Lens) -> None:
+def check(outcome: Step, config: Config, lens: Lens) -> None:
     """What holds of every outcome, whatever came in."""
     scene, view = outcome.scene, outcome.view
     sizes, most = scene.sizes, capacities(config.memory)
@@ -136,6 +144,21 @@ class Recorded(Recording):
                 yield Picture(item.stamp_ns, str(item.seq), lambda image=image: image)
             else:
                 yield item
+
+
+def test_a_picture_can_be_looked_at_before_its_samples_have_come(approach: Approach) -> None:
+    drive = list(approach())
+    pipeline, samples, scenes = Pipeline(DEFAULTS, PINHOLE), [], []
+    for item in drive:
+        if isinstance(item, Frame):
+            look = pipeline.look(item)
+            for sample in samples:
+                pipeline.add(sample)
+            samples.clear()
+            scenes.append(pipeline.follow(look))
+        else:
+            samples.append(item)
+    assert [told(scene) for scene in scenes] == [told(each.scene) for each in outcomes(drive)]
 
 
 @pytest.mark.parametrize("lens", [PINHOLE, LENSES["barrel"]], ids=["pinhole", "barrel"])
@@ -413,4 +436,4 @@ def test_whatever_comes_in_the_outcome_is_in_order(
         pipeline.add(ImuSample(stamp_ns, (rates[0], rates[1], rates[2]), (0.0, -9.81, 0.0)))
         pipeline.add(SpeedSample(stamp_ns, rates[0], rates[1]))
         scene = pipeline.process(Frame(stamp_ns, seq, image))
-        check(Outcome(scene, pipeline.view()), config, LENSES[lens])
+        check(Step(scene, pipeline.view()), config, LENSES[lens])

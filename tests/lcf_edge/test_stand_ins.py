@@ -15,23 +15,23 @@ import pytest
 from drivers.camera.v4l2 import V4l2Camera
 from drivers.device import Device
 from drivers.imu.iio import Iio
-from drivers.imu.serial_protocols import PROTOCOLS
-from drivers.records import Frame, ImuSample, SpeedSample
-from hil_mocks import scenes
-from hil_mocks.drives import START_NS
+from drivers.imu.registry import has_interface
+from drivers.samples import Frame, ImuSample, SpeedSample
 from hil_mocks.i2c import CHIPS, SimulatedBus, replay
 from hil_mocks.i2c.bmi import Bmi270
 from hil_mocks.i2c.motion import Vector
 from hil_mocks.serial_imu import ENCODERS, SerialImuStandIn
 from hil_mocks.v4l2_device import MockCamera, MockKernel
 from hil_mocks.virtual_clock import VirtualClock
-from lcf_edge.commands.findings import findings, trusted_rebels
+from lcf_edge.cli.findings import findings, trusted_rebels
 from lcf_edge.config import Config, ImuDriver, load
 from lcf_edge.devices import open_camera, open_imu
-from lcf_edge.ego_motion import EgoMotionEstimator
+from lcf_edge.ego_motion.estimator import EgoMotionEstimator
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
-from lcf_edge.recordings import open_recording
+from lcf_edge.recording.read import open_recording
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.drives import START_NS
 
 SHAKES = (
     scenes.Shake("yaw", 0.04, 1.3, 0.0),
@@ -72,7 +72,7 @@ class Vehicle:
 
 @dataclass
 class Bench:
-    """Puts stand-ins below the drivers; answers with the settings that lead to them."""
+    """Puts stand-ins below the drivers. Return the settings that lead to them."""
 
     vehicle: Vehicle
     folder: Path
@@ -85,27 +85,35 @@ class Bench:
             return [], lambda imu: imu.read()
         if driver == "iio":
             return self._iio()
-        return self._serial(driver) if driver in PROTOCOLS else self._i2c(driver)
+        return self._serial(driver) if has_interface(driver, "serial") else self._i2c(driver)
 
     def _i2c(self, driver: str) -> tuple[list[str], Read]:
         clock = self.vehicle.clock
         begin_ns = clock.monotonic_ns()
         chip = CHIPS[driver](lambda time_s: self.vehicle.felt(begin_ns + time_s * 1e9), clock, rate_error=0.01)
-        wire = SimulatedBus(clock, {chip.address: chip}, speed_hz=400_000)
+        wire = SimulatedBus(clock, chip.places, speed_hz=400_000)
         self.monkeypatch.setattr("drivers.imu.i2c_bus.smbus2.SMBus", lambda: wire)
         (self.folder / "firmware").write_bytes(Bmi270.firmware)
         return [f"imu.firmware={self.folder / 'firmware'}"], lambda imu: imu.read()
 
     def _serial(self, driver: str) -> tuple[list[str], Read]:
-        rate_hz, begin_ns = RATE_HZ.get(driver, scenes.IMU_HZ), self.vehicle.clock.monotonic_ns()
-        samples = self.vehicle.samples(begin_ns, rate_hz)
-        stand_in = SerialImuStandIn(ENCODERS[driver](), samples, self.folder / "port")
+        rate_hz, begin_ns = RATE_HZ.get(driver, scenes.IMU_HZ), 0
+
+        def samples() -> Iterator[ImuSample]:
+            """Two are there at the first look; what is asked of some IMUs when they are opened takes its time."""
+            nonlocal begin_ns
+            begin_ns = self.vehicle.clock.monotonic_ns() - round(1e9 / rate_hz)
+            yield from self.vehicle.samples(begin_ns, rate_hz)
+
+        stand_in = SerialImuStandIn(ENCODERS[driver](), samples(), self.folder / "port")
         self.later(stand_in.close)
 
         missing = -(driver in FIRST_IS_NONE)
 
         def read(imu: Device[ImuSample]) -> Iterator[ImuSample]:
             nonlocal missing
+            if not begin_ns:
+                missing += stand_in.send()
             due = int((self.vehicle.clock.monotonic_ns() - begin_ns) / 1e9 * rate_hz) + 1
             missing += stand_in.send(due - stand_in.sent)
             while missing > 0:  # the terminal hands them on when it gets to it

@@ -11,10 +11,11 @@ import pytest
 
 from release import wheels
 from release.debian import MACHINES, ReleaseError, run
+from release.manual import COMPLETIONS, MANUAL
 from release.trial import extension_kb, results
 
 ROOT = Path(__file__).parents[2]
-PACKAGES = ("lcf_edge", "drivers", "hil_mocks")
+PACKAGES = ("lcf_edge", "drivers")
 
 
 def files() -> set[str]:
@@ -34,13 +35,14 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_source_package_is_whole(source: Path) -> None:
     others = {"setup.py", "pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "LICENSE", "docs/install.md"}
-    others |= {"tests/conftest.py", "benchmarks/run.py", "release/wheels.py", "systemd/lcf-edge.service"}
+    others |= {"tests/conftest.py", "hil_mocks/serial_imu.py", "benchmarks/run.py", "release/wheels.py"}
+    others |= {"systemd/lcf-edge.service"}
     packed = {str(path.relative_to(source)) for path in source.rglob("*")}
     assert (files() | others) - packed == set()
     assert [name for name in packed if name.endswith((".so", ".pyc"))] == []
 
 
-def test_a_wheel_holds_every_file_of_the_packages_but_the_extensions_own_c(source: Path) -> None:
+def test_a_wheel_holds_every_file_of_the_packages_but_the_extensions_own_c_and_nothing_else(source: Path) -> None:
     options = ("--quiet", "--no-build-isolation", "--no-deps", "--wheel-dir", str(source / "built"))
     run(
         *(sys.executable, "-m", "pip", "wheel", *options, "."),
@@ -50,7 +52,10 @@ def test_a_wheel_holds_every_file_of_the_packages_but_the_extensions_own_c(sourc
     (wheel,) = (source / "built").iterdir()
     with zipfile.ZipFile(wheel) as archive:
         packed = {name for name in archive.namelist() if ".dist-info/" not in name}
+    shared = {name for name in packed if ".data/data/share/" in name}
+    packed -= shared
     assert packed == files() - {"lcf_edge/_compiled.c"}
+    assert {name.partition("/data/share/")[2] for name in shared} == {MANUAL, *COMPLETIONS.values()}
     assert wheel.name.endswith("-py3-none-any.whl")  # nothing was compiled, and it says so
 
 

@@ -9,18 +9,21 @@ from pathlib import Path
 import pytest
 
 from lcf_edge.config import Config, load
+from release.manual import COMPLETIONS, MANUAL
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "systemd"
 CONFIGURATION = "etc/lcf-edge/config.toml"
 INSTALLED = {
     "etc/systemd/system/lcf-edge.service": "lcf-edge.service",
+    "etc/systemd/system/lcf-edge@.service": "lcf-edge@.service",
     "etc/systemd/system/lcf-edge-gate.service": "lcf-edge-gate.service",
     "etc/udev/rules.d/70-lcf-edge.rules": "70-lcf-edge.rules",
     "etc/sysusers.d/lcf-edge.conf": "lcf-edge.sysusers",
     "etc/modules-load.d/lcf-edge.conf": "lcf-edge.modules",
     CONFIGURATION: "config.toml",
 }
+SHARED = {f"usr/local/share/{path}": ROOT / "share" / path for path in (MANUAL, *COMPLETIONS.values())}
 
 pytestmark = pytest.mark.skipif(shutil.which("make") is None, reason="no make here")
 
@@ -45,8 +48,9 @@ def image(tmp_path: Path) -> Path:
 
 
 def test_every_file_comes_to_its_place_whatever_the_umask(image: Path) -> None:
-    assert files(image) == {place: (SHIPPED / name).read_bytes() for place, name in INSTALLED.items()}
-    assert {stat.S_IMODE((image / place).stat().st_mode) for place in INSTALLED} == {0o644}
+    paths = {place: SHIPPED / name for place, name in INSTALLED.items()} | SHARED
+    assert files(image) == {place: path.read_bytes() for place, path in paths.items()}
+    assert {stat.S_IMODE((image / place).stat().st_mode) for place in paths} == {0o644}
     assert stat.S_IMODE((image / "etc/lcf-edge").stat().st_mode) == 0o755
 
 
@@ -75,9 +79,14 @@ def test_uninstall_leaves_configuration_and_recordings(image: Path) -> None:
 
 
 def test_purge_leaves_nothing(image: Path) -> None:
-    drop_in = image / "etc/systemd/system/lcf-edge.service.d/override.conf"
-    drop_in.parent.mkdir()
-    drop_in.touch()
+    for unit in ("lcf-edge", "lcf-edge@", "lcf-edge@front", "lcf-edge-gate"):
+        drop_in = image / f"etc/systemd/system/{unit}.service.d/override.conf"
+        drop_in.parent.mkdir()
+        drop_in.touch()
+    recorded = image / "var/lib/private/lcf-edge-front/drive.mcap"
+    recorded.parent.mkdir()
+    recorded.touch()
+    (image / "etc/lcf-edge/front.toml").touch()
     make("uninstall", "PURGE=1", f"DESTDIR={image}")
     assert files(image) == {}
     assert not (image / "var/lib/lcf-edge").is_symlink()

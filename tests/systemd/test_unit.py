@@ -12,21 +12,31 @@ from lcf_edge.config import Config
 from lcf_edge.daemon.descriptors import RESERVED
 from lcf_edge.daemon.loop import FRAME_WAIT_S
 from lcf_edge.daemon.service import ENDS_WITHIN_S, TICK_S
-from lcf_edge.gate.gate import MOST_PARTIES, MOST_STRANGERS
+from lcf_edge.gate.gate import MAX_PARTIES, MAX_STRANGERS
 from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, CLOSING_S
 
 SHIPPED = Path(__file__).parents[2] / "systemd"
 UNIT = SHIPPED / "lcf-edge.service"
+INSTANCES_UNIT = SHIPPED / "lcf-edge@.service"
 GATE_UNIT = SHIPPED / "lcf-edge-gate.service"
-LARGEST_EXPOSURE = 2.0
-KERNEL_NAMES = {
-    "videodev": "video4linux",
-    "i2c-dev": "i2c",
-    "industrialio": "iio",
-    "usbserial": "ttyUSB",
-    "cdc-acm": "ttyACM",
+MAX_EXPOSURE = 2.0
+OF_AN_INSTANCE = {  # what it has in place of the plain unit's
+    "Description": "Line-Circle filter, %i: camera and IMU in, objects and circles out over Zenoh",
+    "After": r"network.target var-lib-private-lcf\x2dedge\x2d%i.mount",
+    "ExecStart": "/opt/lcf-edge/bin/lcf-edge run -c /etc/lcf-edge/%i.toml",
+    "SyslogIdentifier": "lcf-edge@%i",
+    "WorkingDirectory": "%S/lcf-edge-%i",
+    "User": "lcf-edge-%i",  # systemd would take one for all, by the name before the @
+    "StateDirectory": "lcf-edge-%i",
 }
-BUILT_IN = {"ttyAMA", "ttyS"}  # of the processor's own ports: the kernel always has their driver
+KERNEL_NAMES = {
+    "videodev": {"video4linux", "media"},  # the latter by the module mc, which it needs
+    "i2c-dev": {"i2c"},
+    "industrialio": {"iio"},
+    "usbserial": {"ttyUSB"},
+    "cdc-acm": {"ttyACM"},
+}
+BUILT_IN = {"ttyAMA", "ttyS", "dma_heap"}  # the processor's own ports, and memory: no module where there is one
 
 needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
 
@@ -43,29 +53,36 @@ def words(name: str) -> set[str]:
     return {word for value in settings()[name] for word in value.split()}
 
 
+def as_started(unit: Path) -> str:
+    """The name of a unit that runs; of a template there are only instances."""
+    return unit.name.replace("@.", "@front.")
+
+
 @needs_systemd
-@pytest.mark.parametrize("shipped", [UNIT, GATE_UNIT], ids=lambda path: path.name)
+@pytest.mark.parametrize("shipped", [UNIT, INSTANCES_UNIT, GATE_UNIT], ids=lambda path: path.name)
 def test_systemd_finds_no_fault_but_the_program_that_is_not_here(tmp_path: Path, shipped: Path) -> None:
-    unit = tmp_path / shipped.name
+    unit = tmp_path / as_started(shipped)
     unit.write_text(
         shipped.read_text(encoding="utf-8").replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8"
     )
     done = subprocess.run(("systemd-analyze", "verify", unit), check=False, capture_output=True, text=True)
-    told = [line for line in done.stderr.splitlines() if shipped.name in line]
+    told = [line for line in done.stderr.splitlines() if unit.name in line]
     assert told == []
 
 
 @needs_systemd
-@pytest.mark.parametrize("unit", [UNIT, GATE_UNIT], ids=lambda path: path.name)
-def test_little_is_exposed(unit: Path) -> None:
+@pytest.mark.parametrize("unit", [UNIT, INSTANCES_UNIT, GATE_UNIT], ids=lambda path: path.name)
+def test_little_is_exposed(tmp_path: Path, unit: Path) -> None:
+    started = tmp_path / as_started(unit)
+    started.write_bytes(unit.read_bytes())
     done = subprocess.run(
         (
             "systemd-analyze",
             "security",
             "--offline=true",
-            f"--threshold={LARGEST_EXPOSURE * 10:.0f}",
+            f"--threshold={MAX_EXPOSURE * 10:.0f}",
             "--no-pager",
-            unit,
+            started,
         ),
         check=False,
         capture_output=True,
@@ -74,9 +91,19 @@ def test_little_is_exposed(unit: Path) -> None:
     if "unrecognized option" in done.stderr:
         pytest.skip("this systemd-analyze has no --offline")
     assert done.returncode == 0, done.stdout.splitlines()[-1:]
-    exposure = re.search(r"exposure level for [\w.-]+: ([\d.]+)", done.stdout)
+    exposure = re.search(r"exposure level for [\w.@-]+: ([\d.]+)", done.stdout)
     assert exposure
-    assert float(exposure[1]) <= LARGEST_EXPOSURE
+    assert float(exposure[1]) <= MAX_EXPOSURE
+
+
+def test_an_instance_is_the_plain_unit_but_for_what_two_cannot_share() -> None:
+    def lines(unit: Path) -> list[str]:
+        told = unit.read_text(encoding="utf-8").split("[Unit]")[1].splitlines()
+        return [line for line in told if line.partition("=")[0] not in OF_AN_INSTANCE]
+
+    assert lines(INSTANCES_UNIT) == lines(UNIT)
+    own = dict(re.findall(r"^(\w+)=(.*)$", INSTANCES_UNIT.read_text(encoding="utf-8"), re.M))
+    assert {name: own[name] for name in OF_AN_INSTANCE} == OF_AN_INSTANCE
 
 
 def test_no_setting_is_given_twice_by_mistake() -> None:
@@ -122,7 +149,7 @@ def test_every_kind_of_device_is_known_to_the_kernel_before_the_start() -> None:
     lines = (SHIPPED / "lcf-edge.modules").read_text(encoding="utf-8").splitlines()
     modules = {line for line in lines if not line.startswith("#")}
     allowed = {word.removeprefix("char-") for word in words("DeviceAllow") if word != "rw"}
-    assert {KERNEL_NAMES[module] for module in modules} == allowed - BUILT_IN
+    assert set().union(*(KERNEL_NAMES[module] for module in modules)) == allowed - BUILT_IN
 
 
 def test_the_rules_name_no_group_that_the_unit_has_not() -> None:
@@ -145,7 +172,7 @@ def test_a_reload_needs_no_program_that_a_minimal_system_lacks() -> None:
 
 def test_the_gate_may_open_what_its_bounds_need_and_no_more() -> None:
     unit = dict(re.findall(r"^(\w+)=(.*)$", GATE_UNIT.read_text(encoding="utf-8"), re.M))
-    assert MOST_STRANGERS + 2 * MOST_PARTIES + 32 <= int(unit["LimitNOFILE"]) <= 256
+    assert MAX_STRANGERS + 2 * MAX_PARTIES + 32 <= int(unit["LimitNOFILE"]) <= 256
 
 
 def test_the_daemon_may_open_what_its_sessions_need() -> None:

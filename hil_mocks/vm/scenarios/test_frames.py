@@ -13,15 +13,15 @@ import numpy.typing as npt
 import pytest
 from mcap.reader import make_reader
 
-from drivers.records import Frame
-from hil_mocks import scenes
+from drivers.samples import Frame
 from hil_mocks.vm.daemon import LISTENS, Daemon
 from hil_mocks.vm.machine import Machine
 from lcf_edge.cdr import decode_scene
 from lcf_edge.config import load
+from lcf_edge.messages import Scene
 from lcf_edge.pipeline import run
-from lcf_edge.recordings import open_recording
-from lcf_edge.records import Scene
+from lcf_edge.recording.read import open_recording
+from lcf_edge.rendered import scenes
 
 FPS = 24.0  # a rate that HDMI has
 WIDTH, HEIGHT, FOCAL_PX = 320, 180, 250.0
@@ -47,9 +47,9 @@ when = "always"
 format = "png"
 free_mib = 16.0
 """
-LEAST_PICTURES = 20
+MIN_PICTURES = 20
 SAME_PX = 0.5
-LEAST_SAME = 0.9  # of the circles; processors round differently
+MIN_SHARE_OF_SAME = 0.9  # of the circles; processors round differently
 
 Grey = npt.NDArray[np.uint8]
 
@@ -102,7 +102,7 @@ def test_pictures_come_unchanged_and_in_order(recorded: Path, fed: list[Grey]) -
     numbers = {image.tobytes(): number for number, image in enumerate(fed)}
     found = [numbers.get(frame.image.tobytes()) for frame in pictures(recorded)]
     known = [number for number in found if number is not None]
-    assert len(set(known)) >= LEAST_PICTURES
+    assert len(set(known)) >= MIN_PICTURES
     assert known == sorted(known)
     first, last = found.index(known[0]), len(found) - found[::-1].index(known[-1])
     assert None not in found[first:last]
@@ -113,11 +113,11 @@ def test_the_daemon_finds_what_a_plain_replay_finds(recorded: Path) -> None:
     replayed = {frame.stamp_ns: outcome.scene for frame, outcome in run(open_recording(recorded, config), config)}
     with recorded.open("rb") as file:
         told = [decode_scene(message.data) for _, _, message in make_reader(file).iter_messages(["/lcf/scene"])]
-    assert len(told) >= LEAST_PICTURES
+    assert len(told) >= MIN_PICTURES
     assert {scene.stamp_ns for scene in told} <= replayed.keys()
     same, circles = map(sum, zip(*(found_again(scene, replayed[scene.stamp_ns]) for scene in told), strict=True))
     assert circles > len(told)
-    assert same / circles >= LEAST_SAME
+    assert same / circles >= MIN_SHARE_OF_SAME
 
 
 def found_again(scene: Scene, other: Scene) -> tuple[int, int]:

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from hil_mocks import scenes
-from hil_mocks.vm.daemon import USUAL, Daemon, Subscriber, write_lines
+from hil_mocks.vm.daemon import DEFAULT_SETTINGS, Daemon, Subscriber, write_lines
 from hil_mocks.vm.machine import Machine
+from lcf_edge.rendered import scenes
 
 I2C = '\n[imu]\ndriver = "bno055"\nbus = {bus}\n'
 SERIAL = '\n[imu]\ndriver = "csv"\nport = "/dev/lcf-edge/imu"\nbaud = 115200\n'
@@ -16,7 +16,7 @@ CHIP = "systemd-run --quiet --collect --unit=bno055 /opt/lcf-edge/bin/python -m 
 SPOIL = "import sys, smbus2; smbus2.SMBus(int(sys.argv[1])).write_i2c_block_data(0x28, 0, [0] * 32)"
 WITHOUT_IDENTITY = f"/opt/lcf-edge/bin/python -c '{SPOIL}'"
 LINES_HZ = 100
-LEAST_HZ = 10  # an emulated processor may not keep up
+MIN_HZ = 10  # an emulated processor may not keep up
 
 
 @pytest.fixture(scope="module")
@@ -76,15 +76,15 @@ def wait_for_rate(subscriber: Subscriber, least_hz: float, most_hz: float) -> No
 
 
 def test_a_living_chip_on_the_i2c_bus_is_read(daemon: Daemon, subscriber: Subscriber, bus: int) -> None:
-    daemon.start(USUAL + I2C.format(bus=bus))
+    daemon.start(DEFAULT_SETTINGS + I2C.format(bus=bus))
     subscriber.wait_for_status("imu", "delivers")
-    wait_for_rate(subscriber, LEAST_HZ, 110)
+    wait_for_rate(subscriber, MIN_HZ, 110)
     subscriber.wait_for_scenes()
-    assert "no inertial samples" not in subscriber.message("pipeline")
+    subscriber.wait_for(lambda: "no inertial samples" not in subscriber.message("pipeline"), "inertial samples in use")
 
 
 def test_a_bus_that_goes_is_used_again(daemon: Daemon, subscriber: Subscriber, bus: int) -> None:
-    daemon.start(USUAL + I2C.format(bus=bus))
+    daemon.start(DEFAULT_SETTINGS + I2C.format(bus=bus))
     subscriber.wait_for_status("imu", "delivers")
     # Whoever has the bus open holds its module: the chip's own registers are what can be taken away.
     daemon.machine.run(f"systemctl stop bno055; {WITHOUT_IDENTITY} {bus}")
@@ -97,7 +97,7 @@ def test_a_bus_that_goes_is_used_again(daemon: Daemon, subscriber: Subscriber, b
 
 def test_a_serial_imu_is_read(daemon: Daemon, subscriber: Subscriber, serial_imu: SerialImu) -> None:
     assert serial_imu.is_alive()
-    daemon.start(USUAL + SERIAL)
+    daemon.start(DEFAULT_SETTINGS + SERIAL)
     subscriber.wait_for_status("imu", "delivers")
     wait_for_rate(subscriber, 0.8 * LINES_HZ, 1.2 * LINES_HZ)
     serial_imu.garbled = True
@@ -110,7 +110,7 @@ def test_a_serial_port_that_is_unplugged_is_used_again(
     daemon: Daemon, subscriber: Subscriber, serial_imu: SerialImu
 ) -> None:
     assert serial_imu.is_alive()
-    daemon.start(USUAL + SERIAL)
+    daemon.start(DEFAULT_SETTINGS + SERIAL)
     subscriber.wait_for_status("imu", "delivers")
     port = daemon.machine.run("basename $(dirname $(grep -l 'QEMU USB SERIAL' /sys/bus/usb/devices/*/product))")
     daemon.machine.run(f"echo {port} > /sys/bus/usb/drivers/usb/unbind")

@@ -35,7 +35,7 @@ def zenoh_file(path: Path, **tls: object) -> str:
 
 @pytest.fixture(scope="module")
 def secured(machine: Machine, daemon: Daemon) -> Path:
-    """The daemon listens for certified peers only; answers the folder with their certificates."""
+    """The daemon listens for certified peers only. Return the folder with their certificates."""
     folder = machine.share / "tls"
     folder.mkdir()
     for name, authority in (("ca", "ca"), ("rover", "ca"), ("planner", "ca"), ("other", "other"), ("thief", "other")):

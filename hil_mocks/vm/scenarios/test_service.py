@@ -2,24 +2,24 @@
 
 import pytest
 
-from hil_mocks.vm.daemon import UNIT, USUAL, Daemon, Subscriber
+from hil_mocks.vm.daemon import DEFAULT_SETTINGS, PATIENCE_S, UNIT, Daemon, Subscriber
 from hil_mocks.vm.machine import Machine
 
 STOPS_S = 2.0
-LARGEST_EXPOSURE = 1.5  # of systemd-analyze
+MAX_EXPOSURE = 1.5  # of systemd-analyze
 
 
 @pytest.fixture
 def started(daemon: Daemon) -> Daemon:
     """Running, with frames."""
     if daemon.show("ActiveState") != "active":
-        daemon.start(USUAL)
+        daemon.start(DEFAULT_SETTINGS)
     daemon.subscriber.wait_for_scenes()
     return daemon
 
 
 def test_it_is_ready_when_frames_come_and_tells_its_status(daemon: Daemon, subscriber: Subscriber) -> None:
-    daemon.start(USUAL)
+    daemon.start(DEFAULT_SETTINGS)
     assert daemon.show("ActiveState") == "active"
     daemon.machine.wait_until(f"systemctl show {UNIT} -p StatusText | grep -E '[1-9].* frames/s, .* circles'")
     subscriber.wait_for_scenes()
@@ -41,7 +41,7 @@ def test_it_is_a_user_of_its_own_without_rights(started: Daemon) -> None:
 
 def test_it_is_little_exposed(machine: Machine) -> None:
     told = machine.run(f"systemd-analyze security {UNIT} --no-pager | tail -1")
-    assert float(told.split(": ")[1].split()[0]) <= LARGEST_EXPOSURE
+    assert float(told.split(": ")[1].split()[0]) <= MAX_EXPOSURE
 
 
 def test_it_sees_a_file_system_that_cannot_be_written_but_for_its_own_folder(started: Daemon) -> None:
@@ -66,7 +66,7 @@ def test_killed_it_comes_back(started: Daemon) -> None:
 
 
 def test_a_reload_is_over_when_systemctl_returns(started: Daemon, begun_s: float) -> None:
-    started.configure("log.level = 'info'\n" + USUAL.replace("[camera]", "[camera]\nheight_m = 0.7"))
+    started.configure("log.level = 'info'\n" + DEFAULT_SETTINGS.replace("[camera]", "[camera]\nheight_m = 0.7"))
     started.machine.run(f"systemctl reload {UNIT}")
     assert "reload: changed camera.height_m" in started.machine.journal(begun_s)
     pid = started.pid
@@ -83,7 +83,7 @@ def test_it_stops_in_order_within_two_seconds(started: Daemon, begun_s: float) -
 
 
 def test_a_configuration_that_cannot_work_is_not_tried_again(daemon: Daemon, begun_s: float) -> None:
-    daemon.configure(USUAL + "nonsense = 1\n")
+    daemon.configure(DEFAULT_SETTINGS + "nonsense = 1\n")
     assert daemon.machine.tried(f"systemctl start {UNIT}").status != 0
     assert (daemon.show("ExecMainStatus"), daemon.show("ActiveState"), daemon.restarts) == ("2", "failed", 0)
     assert "unknown key zenoh.nonsense" in daemon.machine.journal(begun_s)
@@ -92,15 +92,18 @@ def test_a_configuration_that_cannot_work_is_not_tried_again(daemon: Daemon, beg
 def test_over_its_memory_it_is_killed_and_comes_back(started: Daemon, begun_s: float) -> None:
     restarts = started.restarts
     started.machine.run(f"systemctl set-property --runtime {UNIT} MemoryMax=30M")
-    started.machine.wait_until(f"test $(systemctl show {UNIT} --property=NRestarts --value) -gt {restarts}")
-    started.machine.run(f"systemctl set-property --runtime {UNIT} MemoryMax=128M")
+    try:
+        restarted = f"test $(systemctl show {UNIT} --property=NRestarts --value) -gt {restarts}"
+        started.machine.wait_until(restarted, PATIENCE_S)
+    finally:
+        started.machine.run(f"systemctl set-property --runtime {UNIT} MemoryMax=144M")
     started.wait_for_restart(restarts)
     assert "oom-kill" in started.machine.journal(begun_s)
     started.subscriber.wait_for_scenes()
 
 
 def test_it_starts_from_a_root_that_is_read_only(daemon: Daemon) -> None:
-    daemon.start(USUAL)
+    daemon.start(DEFAULT_SETTINGS)
     daemon.stop()
     daemon.machine.run("mount -o remount,ro /")
     try:

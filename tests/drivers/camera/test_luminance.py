@@ -11,7 +11,9 @@ from hil_mocks.v4l2_device import encode, picture
 
 WIDTH, HEIGHT = 64, 48
 IMAGE = picture(7, WIDTH, HEIGHT)
-RAW = tuple(name for name in PIXEL_FORMATS if name != "MJPG")
+BAYER = PIXEL_FORMATS[PIXEL_FORMATS.index("MJPG") + 1 :]
+SEPARATE = ("NM12", "NM21", "NM16", "NM61", "YM12", "YM21")  # luminance has a buffer of its own
+RAW = tuple(name for name in PIXEL_FORMATS if name not in {"MJPG", *BAYER})
 JPEG = encode(IMAGE, "MJPG")
 
 
@@ -23,10 +25,45 @@ def read(pixel_format: str, data: bytes, padding: int = 0) -> np.ndarray:
 @pytest.mark.parametrize("padding", [0, 32])
 @pytest.mark.parametrize("pixel_format", RAW)
 def test_raw_formats_give_their_luminance_to_the_bit(pixel_format: str, padding: int) -> None:
-    image = read(pixel_format, encode(IMAGE, pixel_format, padding), padding)
+    data = encode(IMAGE, pixel_format, padding)
+    image = read(pixel_format, data, padding)
     assert np.array_equal(image, IMAGE)
-    assert image.flags.owndata
+    assert not np.shares_memory(image, np.frombuffer(data, np.uint8))  # the buffer will be filled again
     assert image.flags.c_contiguous
+
+
+@pytest.mark.parametrize("padding", [0, 32])
+@pytest.mark.parametrize("pixel_format", BAYER)
+def test_raw_pictures_of_a_sensor_with_colours_give_weighted_sums(pixel_format: str, padding: int) -> None:
+    """Grey stays grey, and red, green and blue weigh as in ITU-R BT.601."""
+    grey = np.full((HEIGHT, WIDTH), 120, np.uint8)
+    assert np.abs(read(pixel_format, encode(grey, pixel_format, padding), padding) - 120.0).max() <= 1
+    first_row = {"B": "BGGR", "G": "GBRG", "g": "GRBG", "R": "RGGB"}
+    named = {"BA81": "BGGR", "BYR2": "BGGR", "BA10": "GRBG", "BA12": "GRBG", "GR16": "GRBG", "GRBG": "GRBG"}
+    pattern = named.get(pixel_format) or first_row[pixel_format[1 if pixel_format[0] == "p" else 0]]
+    for colour, weight in (("R", 0.299), ("G", 0.587), ("B", 0.114)):
+        tile = np.array([200 * (filtered == colour) for filtered in pattern], np.uint8).reshape(2, 2)
+        seen = read(pixel_format, encode(np.tile(tile, (HEIGHT // 2, WIDTH // 2)), pixel_format, padding), padding)
+        assert np.abs(seen[4:-4, 4:-4] - 200 * weight).max() <= 2
+
+
+@pytest.mark.parametrize("pixel_format", [name for name in RAW if name not in SEPARATE and "P" not in name[1:]])
+def test_a_picture_may_be_of_any_width(pixel_format: str) -> None:
+    image = IMAGE[:, :50]
+    data = memoryview(encode(image, pixel_format))
+    assert np.array_equal(luminance(pixel_format, data, 50, HEIGHT, least_stride(pixel_format, 50)), image)
+
+
+@pytest.mark.parametrize("reduction", [2, 4, 8])
+def test_a_jpeg_of_a_larger_picture_is_decoded_to_the_smaller_one(reduction: int) -> None:
+    """As if the large one were decoded and its pixels then averaged."""
+    rows, columns = np.mgrid[: HEIGHT * reduction, : WIDTH * reduction] / reduction
+    large = (128 + 60 * np.sin(rows / 4) * np.cos(columns / 5)).astype(np.uint8)
+    seen = luminance("MJPG", memoryview(encode(large, "MJPG")), WIDTH, HEIGHT, 0, reduction)
+    averaged = cv2.resize(large, (WIDTH, HEIGHT), interpolation=cv2.INTER_AREA)
+    assert np.abs(seen.astype(int) - averaged).mean() < 2
+    with pytest.raises(FrameError, match="wrong size"):
+        luminance("MJPG", memoryview(JPEG), WIDTH, HEIGHT, 0, reduction)
 
 
 def test_a_jpeg_of_colours_gives_its_luminance() -> None:

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from drivers.camera import v4l2_ioctl as v4l2
-from drivers.camera.find import cameras
-from drivers.camera.v4l2 import BUFFERS, LONGEST_WAIT_S, V4l2Camera, main
+from drivers.camera.find import cameras, is_libcameras
+from drivers.camera.v4l2 import BUFFERS, MAX_WAIT_S, V4l2Camera, main
 from drivers.device import KeptOpen
 from drivers.errors import (
     DeviceBusyError,
@@ -24,7 +24,7 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
-from drivers.records import Frame
+from drivers.samples import Frame
 from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel, picture
 from hil_mocks.virtual_clock import VirtualClock
 
@@ -151,7 +151,7 @@ class TestPictures:
         camera = open_camera()
         began_ns = clock.monotonic_ns()
         assert camera.read() == []
-        assert clock.monotonic_ns() - began_ns <= LONGEST_WAIT_S * 1e9
+        assert clock.monotonic_ns() - began_ns <= MAX_WAIT_S * 1e9
 
     def test_everything_is_given_back(self, open_camera: Open, kernel: MockKernel) -> None:
         camera = open_camera()
@@ -169,6 +169,43 @@ class TestPictures:
         setattr(webcam, fault, errno.EIO)
         with pytest.raises(DeviceLostError):
             open_camera()
+        assert kernel.open_files == 0
+        assert all(memory.closed for memory in kernel.mapped)
+
+
+class TestMultiPlanar:
+    """A device whose pictures may lie in several memories, as on many systems on a chip."""
+
+    @pytest.fixture
+    def webcam(self) -> MockCamera:
+        modes = {name: {(640, 480): (30.0,)} for name in ("NM12", "RG10", "YUYV")}
+        return MockCamera(modes=modes, caps=v4l2.CAP_VIDEO_CAPTURE_MPLANE | v4l2.CAP_STREAMING)
+
+    @pytest.mark.parametrize("data_offset", [0, 64])
+    @pytest.mark.parametrize("padding", [0, 32])
+    def test_luminance_is_the_first_plane(
+        self, open_camera: Open, webcam: MockCamera, padding: int, data_offset: int
+    ) -> None:
+        webcam.row_padding, webcam.data_offset = padding, data_offset
+        camera = open_camera()
+        assert camera.mode.pixel_format == "NM12"
+        for number, frame in enumerate(take(camera, 6)):
+            assert np.array_equal(frame.image, picture(number, 640, 480))
+
+    def test_formats_in_one_memory_are_read_as_well(self, open_camera: Open) -> None:
+        frame = take(open_camera(pixel_format="YUYV"), 1)[0]
+        assert np.array_equal(frame.image, picture(0, 640, 480))
+
+    def test_half_a_picture_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
+        webcam.short = 1
+        camera = open_camera()
+        assert take(camera, 1)[0].seq == 1
+        assert counted(camera) == {"short": 1}
+
+    def test_everything_is_given_back(self, open_camera: Open, kernel: MockKernel) -> None:
+        camera = open_camera()
+        take(camera, 2)
+        camera.close()
         assert kernel.open_files == 0
         assert all(memory.closed for memory in kernel.mapped)
 
@@ -324,6 +361,27 @@ class TestSettings:
     def test_automatic_takes_jpegs_where_only_they_are_fast_enough(self, open_camera: Open) -> None:
         assert open_camera(width=1280, height=720, fps=30).mode.pixel_format == "MJPG"
 
+    def test_raw_pictures_come_last(self, open_camera: Open, webcam: MockCamera) -> None:
+        webcam.modes = {name: {(640, 480): (30.0,)} for name in ("RGGB", "MJPG", "Y12")}
+        assert open_camera().mode.pixel_format == "Y12"
+        del webcam.modes["Y12"]
+        assert open_camera().mode.pixel_format == "MJPG"
+
+    @pytest.mark.parametrize(("size", "reduction"), [((1280, 960), 2), ((2560, 1920), 4)])
+    def test_a_larger_jpeg_is_made_smaller_where_nothing_fits(
+        self, open_camera: Open, webcam: MockCamera, size: tuple[int, int], reduction: int
+    ) -> None:
+        webcam.modes = {"YUYV": {size: (5.0,)}, "MJPG": {size: (30.0,)}}
+        camera = open_camera(width=640, height=480)
+        assert (camera.mode.pixel_format, camera.mode.reduction) == ("MJPG", reduction)
+        image = take(camera, 1)[0].image
+        assert np.abs(image.astype(int) - picture(0, 640, 480)).max() < 8
+
+    def test_a_jpeg_that_is_no_multiple_is_not_bent_to_fit(self, open_camera: Open, webcam: MockCamera) -> None:
+        webcam.modes = {"MJPG": {(1280, 720): (30.0,)}}
+        with pytest.raises(UnsupportedSettingError, match=r"offered: MJPG: 1280x720 \(30/s\)"):
+            open_camera(width=640, height=480)
+
     @pytest.mark.parametrize(
         ("settings", "told"),
         [
@@ -432,11 +490,6 @@ class TestNames:
         with pytest.raises(WrongDeviceError, match=r"/dev/video0: gives no pictures .*/dev/video1 \(Mock Webcam\)"):
             open_camera("/dev/video0")
 
-    def test_a_multiplanar_camera_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
-        webcam.caps = v4l2.CAP_VIDEO_CAPTURE_MPLANE | v4l2.CAP_STREAMING
-        with pytest.raises(WrongDeviceError, match="multi-planar"):
-            open_camera()
-
     @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
     @pytest.mark.parametrize("name", [PATH, "rp1-cfe"])
     def test_a_ribbon_cable_camera_is_told_at_once_with_the_remedy(
@@ -448,10 +501,31 @@ class TestNames:
         kept.read()
         assert isinstance(kept.error, WrongDeviceError)
         assert str(kept.error) == (
-            f"{name}: gives pictures only through libcamera, as ribbon-cable cameras do, which is not supported;"
-            " use a USB camera (docs/raspberry-pi.md); no other camera is plugged in"
+            f"{name}: gives pictures only through libcamera, as ribbon-cable cameras do;"
+            ' set camera.driver = "libcamera" (docs/raspberry-pi.md); no other camera is plugged in'
         )
         assert not kept.error.retry
+        assert kernel.open_files == 0
+
+    @pytest.mark.parametrize("driver", ["bcm2835-isp", "pispbe"])
+    def test_a_signal_processor_that_does_not_tell_is_known_by_its_driver(
+        self, open_camera: Open, webcam: MockCamera, driver: str
+    ) -> None:
+        webcam.driver = driver
+        with pytest.raises(WrongDeviceError, match="only through libcamera"):
+            open_camera()
+
+    @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
+    def test_libcamera_is_meant_by_its_nodes_and_by_names_that_no_v4l2_camera_has(
+        self, kernel: MockKernel, interface: int
+    ) -> None:
+        meant = partial(is_libcameras, kernel=kernel)
+        kernel.plug("/dev/video14", MockCamera(driver="bcm2835-isp"))  # is there without a camera as well
+        assert meant("/dev/video14")
+        assert not any(map(meant, (PATH, BY_ID, "Mock Webcam", "imx219", "/dev/video1")))
+        kernel.plug("/dev/video1", ribbon_camera(interface))
+        assert all(map(meant, ("/dev/video1", "imx219", "/base/soc/i2c0mux/i2c@1/imx219@10")))
+        assert not any(map(meant, (PATH, BY_ID, "mock webcam", "/dev/video2")))
         assert kernel.open_files == 0
 
     def test_a_ribbon_cable_camera_is_not_offered_but_the_usb_camera_beside_it(
@@ -538,7 +612,7 @@ class TestFaults:
         (frame,) = take(camera, 1)
         webcam.stalled = True
         assert isinstance(fail(camera), DeviceStalledError)
-        assert 1.0 < (clock.monotonic_ns() - frame.stamp_ns) / 1e9 < 1.0 + 2 * LONGEST_WAIT_S
+        assert 1.0 < (clock.monotonic_ns() - frame.stamp_ns) / 1e9 < 1.0 + 2 * MAX_WAIT_S
 
     def test_a_slow_camera_may_take_its_ten_intervals(
         self, open_camera: Open, webcam: MockCamera, clock: VirtualClock
@@ -548,7 +622,7 @@ class TestFaults:
         frame = next(frame for _ in range(4) for frame in camera.read())
         webcam.stalled = True
         assert isinstance(fail(camera), DeviceStalledError)
-        assert 5.0 < (clock.monotonic_ns() - frame.stamp_ns) / 1e9 < 6.0 + LONGEST_WAIT_S
+        assert 5.0 < (clock.monotonic_ns() - frame.stamp_ns) / 1e9 < 6.0 + MAX_WAIT_S
 
     @pytest.mark.parametrize("name", [BY_ID, "Mock Webcam"])
     def test_back_under_another_number(
@@ -634,6 +708,16 @@ class TestByHand:
         assert (first, second) == ("/dev/video0: Mock Webcam", "/dev/video2: Other")
         assert offered.startswith("  YUYV: 640x480 (30, 15/s), 320x240 (30, 15/s)")
         assert (grey, others) == ("  GREY: 64x48 (9/s)", "  not read: H264")
+
+    def test_without_a_camera_the_list_is_a_line_that_says_so(
+        self, clock: VirtualClock, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+    ) -> None:
+        monkeypatch.setattr("drivers.camera.v4l2.cameras", lambda: cameras(MockKernel(clock)))
+        assert main(["--list"]) == 1
+        output = capsys.readouterr()
+        assert output.out == ""
+        assert output.err.startswith("no camera that can be opened; lcf-edge doctor tells why; ")
+        assert output.err.count("\n") == 1
 
     def test_wrong_usage(self, capsys: pytest.CaptureFixture[str]) -> None:
         with pytest.raises(SystemExit, match="2"):

@@ -27,6 +27,10 @@ SIZES = {
     v4l2.StreamParm: 204,
     v4l2.RequestBuffers: 20,
     v4l2.Buffer: 88,
+    v4l2.PlanesBuffer: 88,
+    v4l2.PlanesFormat: 208,
+    v4l2.PlaneFormat: 20,
+    v4l2.Plane: 64,
     v4l2.ControlQuery: 68,
     v4l2.MenuQuery: 44,
     v4l2.Control: 8,
@@ -66,13 +70,20 @@ def test_requests_have_the_kernels_numbers(name: str, number: int) -> None:
 def test_the_fields_of_a_buffer_lie_where_the_kernel_puts_them() -> None:
     assert {name: getattr(v4l2.Buffer, name).offset for name in BUFFER_OFFSETS} == BUFFER_OFFSETS
     assert v4l2.Format.width.offset == 8
+    assert v4l2.PlanesFormat.planes.offset == 8 + 20
+    assert v4l2.PlanesFormat.num_planes.offset == 8 + 180
+    assert v4l2.PlanesBuffer.planes.offset == 64
+    assert v4l2.PlanesBuffer.length.offset == 72
+    assert (v4l2.Plane.offset.offset, v4l2.Plane.data_offset.offset) == (8, 16)
     assert v4l2.StreamParm.numerator.offset == 12
 
 
 def test_a_pixel_format_is_its_letters_and_prints_whatever_it_holds() -> None:
     assert v4l2.fourcc("YUYV") == 0x56595559
-    assert v4l2.letters(0x56595559) == "YUYV"
-    assert v4l2.letters(0x00FF0A20) == " ???"
+    assert v4l2.fourcc_text(0x56595559) == "YUYV"
+    assert v4l2.fourcc_text(v4l2.fourcc("Y10")) == "Y10"
+    assert v4l2.fourcc("Y10") == 0x20303159
+    assert v4l2.fourcc_text(0x00FF0A20) == " ???"
 
 
 def test_a_cards_name_is_printable_text() -> None:

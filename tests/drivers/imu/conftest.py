@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from drivers.imu.i2c_bus import I2cBus
 from drivers.imu.i2c_chips import chip_on
 from drivers.imu.i2c_imu import I2cImu
 from drivers.imu.settings import ImuSettings
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.i2c import CHIPS, Motion, SimulatedBus, SimulatedChip
 from hil_mocks.i2c.bmi import Bmi270
 from hil_mocks.virtual_clock import VirtualClock
@@ -44,12 +44,13 @@ class Rig:
     def __post_init__(self) -> None:
         self.clock = VirtualClock()
         self.chip: SimulatedChip = CHIPS[self.driver](self.motion, self.clock, self.rate_error)
-        self.wire = SimulatedBus(self.clock, {self.chip.address: self.chip})
+        self.wire = SimulatedBus(self.clock, self.chip.places)
         self.began_ns = self.clock.monotonic_ns()
 
     def open(self) -> I2cImu:
         bus = I2cBus(1, self.wire, self.clock)
-        return chip_on(bus, self.driver, self.address, self.settings, self.firmware, self.clock)
+        settings = replace(self.settings, firmware=self.firmware)
+        return chip_on(bus, self.driver, self.address, settings, self.clock)
 
     @cached_property
     def device(self) -> I2cImu:

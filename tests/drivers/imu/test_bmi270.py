@@ -22,7 +22,7 @@ def test_a_missing_file_is_told(rig: RigMaker, tmp_path: Path) -> None:
         bench.open()
     assert str(told.value) == (
         f"{tmp_path}/nothing.fw: cannot be read (No such file or directory);"
-        " put Bosch's bmi270-init-data.fw there (docs/imus.md tells how to make it) or set imu.firmware"
+        " put Bosch's bmi270-init-data.fw there (see docs/imus.md) or set imu.firmware"
     )
     assert not told.value.retry
     assert bench.wire.closed

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.imu.bno08x_rvc import LONGEST_SPAN, RvcParser, decode
-from drivers.records import ImuSample
+from drivers.imu.bno08x_rvc import MAX_SPAN, RvcParser, decode
+from drivers.samples import ImuSample
 from hil_mocks.serial_imu import RvcEncoder
 
 EXAMPLE = bytes.fromhex("AAAA DE 0100 92FF 2508 8DFE ECFF D103 000000 E7")  # of the data sheet, section 1.3.5.2
@@ -85,10 +85,10 @@ def test_missing_frames_are_known_by_the_index() -> None:
 def test_over_a_long_gap_there_is_no_rate() -> None:
     parser = RvcParser()
 
-    assert parser.feed(frame(0) + frame(LONGEST_SPAN + 1, yaw=90)) == []
-    (after,) = parser.feed(frame(LONGEST_SPAN + 2, yaw=90))
+    assert parser.feed(frame(0) + frame(MAX_SPAN + 1, yaw=90)) == []
+    (after,) = parser.feed(frame(MAX_SPAN + 2, yaw=90))
     assert after.gyro == (0.0, 0.0, 0.0)
-    assert after.lost == LONGEST_SPAN + 1
+    assert after.lost == MAX_SPAN + 1
 
 
 def test_a_frame_that_comes_twice_counts_once() -> None:

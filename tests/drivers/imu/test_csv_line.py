@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.imu.csv_line import LONGEST_LINE_BYTES, CsvParser
+from drivers.imu.csv_line import MAX_LINE_BYTES, CsvParser
 from drivers.imu.serial_frames import Reading
 
 DOCUMENT = Path(__file__).parents[3] / "docs" / "serial-imu.md"
@@ -74,7 +74,7 @@ def test_the_examples_of_the_document_are_read() -> None:
         "0,0,0,0,0,9.8*00",
         "0,0,0,0,0,9.8*3",
         "0,0,0,0,0,1e999",
-        "0" * (LONGEST_LINE_BYTES + 1),
+        "0" * (MAX_LINE_BYTES + 1),
     ],
 )
 def test_any_other_line_is_refused_and_counts_as_a_lost_sample(line: str) -> None:

@@ -19,25 +19,42 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
+from drivers.imu.fifo_imu import FifoImu
 from drivers.imu.i2c_bus import TransferError
-from drivers.imu.i2c_chips import CHIPS
+from drivers.imu.i2c_imu import I2cImu
+from drivers.imu.registry import chips
 from drivers.imu.settings import ImuSettings
 from hil_mocks.i2c import CHIPS as MODELS
 
 RigMaker = Callable[..., Any]
+CHIPS = [driver for driver, chip in chips().items() if issubclass(chip, I2cImu)]  # those with registers
 every_chip = pytest.mark.parametrize("driver", CHIPS)
-FIFO_CHIPS = [driver for driver in CHIPS if driver != "bno055"]
-ST = ("lsm6ds3", "lsm6dso", "lsm6dso32")
+FIFO_CHIPS = [driver for driver, chip in chips().items() if issubclass(chip, FifoImu)]
+ST = ("lsm6ds3", "lsm6dso", "lsm6dso32", "ism330dhcx")
 every_fifo_chip = pytest.mark.parametrize("driver", FIFO_CHIPS)
 
 FIFO_REGISTER = {
-    **dict.fromkeys(("mpu6050", "mpu6500", "mpu9250"), 0x74),
+    **dict.fromkeys(("mpu6050", "mpu6500", "mpu9250", "icm20602"), 0x74),
     "icm20948": 0x72,
+    "icm42688": 0x30,
+    "lsm9ds1": 0x18,
     "lsm6ds3": 0x3E,
     "lsm6dso": 0x78,
     "lsm6dso32": 0x78,
+    "ism330dhcx": 0x78,
+    "bmi088": 0x3F,
     "bmi160": 0x24,
     "bmi270": 0x26,
+}
+
+GYRO_SCALE = {  # the register of the gyro's range, of those that are not like the MPU-6050
+    "icm20948": 0x2001,
+    "icm42688": 0x4F,
+    **dict.fromkeys(ST, 0x11),
+    "lsm9ds1": 0x10,
+    "bmi088": 0x0F,
+    "bmi160": 0x43,
+    "bmi270": 0x43,
 }
 
 
@@ -155,14 +172,16 @@ def test_nobody_at_the_address_is_told_with_who_else_is_there(rig: RigMaker, dri
 def test_an_empty_bus_is_told(rig: RigMaker) -> None:
     bench = rig()
     bench.wire.chips.clear()
-    with pytest.raises(DeviceMissingError, match=r"no such chip at 0x68 .*; nobody answers on this bus; check wiring"):
+    with pytest.raises(
+        DeviceMissingError, match=r"no such chip at 0x68 .*; no device answers on this bus; check wiring"
+    ):
         bench.open()
 
 
 @every_chip
 def test_another_chip_at_the_address_is_told(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
-    other = rig("lsm6ds3" if driver != "lsm6ds3" else "lsm6dso").chip
+    other = rig("mpu6050" if bench.chip.address == 0x6A else "lsm6ds3").chip
     bench.wire.chips = {bench.chip.address: other}
     with pytest.raises(WrongDeviceError, match=r"says 0x.., a .* says 0x.*; set imu.driver or imu.address"):
         bench.open()
@@ -192,7 +211,7 @@ def test_a_chip_that_does_not_keep_a_setting_is_told(
     rig: RigMaker, driver: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = rig(driver)
-    scale = {"icm20948": 0x2001, "bmi160": 0x43, "bmi270": 0x43, **dict.fromkeys(ST, 0x11)}.get(driver, 0x1B)
+    scale = GYRO_SCALE.get(driver, 0x1B)
     honest = bench.chip._burst
 
     def counterfeit(register: int, length: int) -> bytes:
@@ -249,7 +268,17 @@ def test_a_chip_that_reset_itself_is_set_up_again(rig: RigMaker, driver: str) ->
 def test_settings_that_slipped_are_seen_within_half_a_second(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
     bench.read_for(1)
-    for register in (0x1B, 0x2001, 0x43, 0x11, 0x3B):  # the gyro's range or unit, of whichever chip
+    for register in (
+        0x1B,
+        0x2001,
+        0x43,
+        0x11,
+        0x10,
+        0x4F,
+        0x04,
+        0x0F,
+        0x3B,
+    ):  # of the gyro, of whichever chip
         bench.chip.registers[register] ^= 0x02 if driver != "mpu6050" else 0x08
     bench.read_for(0.6)
     assert bench.device.counts["chip_reset"] == 1
@@ -273,7 +302,7 @@ def test_a_late_wake_up_loses_nothing(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
     bench.read_for(2)
     seen = bench.device.read()
-    bench.clock.sleep_s(0.15)
+    bench.clock.sleep_s(min(0.15, 0.75 * bench.device.fifo_bytes / bench.device.word_bytes / bench.device.rate_hz))
     samples = seen + bench.read_for(0.5)
     period_s = 1 / bench.device.rate_hz
     gaps = [(later.stamp_ns - earlier.stamp_ns) / 1e9 for earlier, later in pairwise(samples)]
@@ -345,7 +374,7 @@ def test_a_vehicle_that_drives_off_is_not_judged_before_it_rests(rig: RigMaker, 
         bench.read_for(2)
 
 
-@pytest.mark.parametrize("driver", ["lsm6dso", "lsm6dso32"])
+@pytest.mark.parametrize("driver", ["lsm6dso", "lsm6dso32", "ism330dhcx"])
 def test_lsm6dso_speaks_i2c_alone(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
     assert bench.chip.listens_to_i3c

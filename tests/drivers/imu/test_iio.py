@@ -23,7 +23,7 @@ from drivers.errors import (
 )
 from drivers.imu import iio
 from drivers.imu.iio import Iio
-from drivers.imu.iio_sysfs import told
+from drivers.imu.iio_sysfs import driver_error
 from drivers.imu.settings import ImuSettings
 from hil_mocks.virtual_clock import VirtualClock
 
@@ -231,7 +231,7 @@ def test_polled_values_that_cannot_be_read_are_counted_then_given_up(tree: Tree)
     ],
 )
 def test_what_the_kernel_says_becomes_a_typed_error(number: int, error: type[Exception]) -> None:
-    said = told(OSError(number, os.strerror(number)), Path("/sys/x"))
+    said = driver_error(OSError(number, os.strerror(number)), Path("/sys/x"))
     assert type(said) is error
     assert "\n" not in str(said)
 

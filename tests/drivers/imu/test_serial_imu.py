@@ -21,12 +21,12 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
-from drivers.imu import bno08x_rvc, csv_line, witmotion, xsens
-from drivers.imu.serial_imu import LONGEST_NOISE_BYTES, SerialImu
+from drivers.imu import bno08x_rvc, bno08x_uart, csv_line, witmotion, witmotion_ble, xsens
+from drivers.imu.registry import protocols
+from drivers.imu.serial_imu import MAX_NOISE_BYTES, SerialImu, open_port
 from drivers.imu.serial_port import ports
-from drivers.imu.serial_protocols import PROTOCOLS, open_port
 from drivers.imu.settings import ImuSettings
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.serial_imu import (
     ENCODERS,
     CsvEncoder,
@@ -45,9 +45,10 @@ from hil_mocks.serial_imu import (
 )
 
 RATE_HZ = 100.0
-MOST_READS = 40  # each ends after 0.1 s at the latest
+MAX_READS = 40  # each ends after 0.1 s at the latest
 
 Plug = Callable[..., SerialImuStandIn]
+PROTOCOLS = protocols()
 names = pytest.mark.parametrize("name", sorted(PROTOCOLS))
 
 
@@ -97,7 +98,7 @@ def opened(name: str, stand_in: SerialImuStandIn, clock: TurnedClock | None = No
 def read(device: Device[ImuSample] | KeptOpen[ImuSample], count: int) -> list[ImuSample]:
     """Read until so many samples have come."""
     samples: list[ImuSample] = []
-    for _ in range(MOST_READS):
+    for _ in range(MAX_READS):
         samples += device.read()
         if len(samples) >= count:
             break
@@ -263,7 +264,7 @@ def test_a_wrong_baud_rate_is_recognised(plug: Plug, name: str, baud: int) -> No
     device = opened(name, stand_in, baud=baud)
 
     def all_that_is_heard() -> None:
-        for _ in range(LONGEST_NOISE_BYTES):  # one byte at least in each read
+        for _ in range(MAX_NOISE_BYTES):  # one byte at least in each read
             stand_in.send(5)
             device.read()
 
@@ -286,7 +287,7 @@ def test_an_imu_that_does_not_send_what_is_needed_is_told_so(plug: Plug, name: s
     device = opened(name, stand_in)
 
     def all_that_is_heard() -> None:
-        for _ in range(LONGEST_NOISE_BYTES):
+        for _ in range(MAX_NOISE_BYTES):
             stand_in.send_bytes(frame * 20)
             device.read()
 
@@ -423,10 +424,13 @@ def test_closing_twice_is_no_matter(plug: Plug, name: str) -> None:
 
 
 def test_the_usual_baud_rate_is_the_one_the_makers_ship_or_recommend() -> None:
-    assert {name: protocol.bauds[0] for name, protocol in PROTOCOLS.items()} == dict.fromkeys(PROTOCOLS, 115200)
+    assert {name: protocol.bauds[0] for name, protocol in PROTOCOLS.items()} == {
+        **dict.fromkeys(PROTOCOLS, 115200),
+        "bno08x_uart": 3_000_000,
+    }
 
 
-@pytest.mark.parametrize("module", [witmotion, bno08x_rvc, xsens, csv_line])
+@pytest.mark.parametrize("module", [witmotion, witmotion_ble, bno08x_rvc, bno08x_uart, xsens, csv_line])
 def test_run_by_hand(
     plug: Plug, module: ModuleType, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

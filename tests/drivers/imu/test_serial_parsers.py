@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from drivers.imu.registry import protocols
 from drivers.imu.serial_frames import Parser, Reading
-from drivers.imu.serial_protocols import PROTOCOLS
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.serial_imu import ENCODERS, Encoder, cut_short, flipped_bits, garbage
 
-LARGEST_HELD_BYTES = 2100
+MAX_HELD_BYTES = 2100
 
+PROTOCOLS = protocols()
+UNCHECKED = ("witmotion_ble", "bno08x_uart")  # no checksum: a wrong bit among the values is not noticed
 names = pytest.mark.parametrize("name", sorted(PROTOCOLS))
 
 
@@ -67,7 +69,7 @@ def test_any_bytes_give_the_same_readings_however_they_are_split(
 
     assert fed(whole, data) == fed(pieces, data, splits)
     assert whole.counts == pieces.counts
-    assert held_bytes(whole) == held_bytes(pieces) <= LARGEST_HELD_BYTES
+    assert held_bytes(whole) == held_bytes(pieces) <= MAX_HELD_BYTES
 
 
 @names
@@ -75,9 +77,9 @@ def test_memory_is_bounded_by_the_longest_frame(name: str) -> None:
     parser = PROTOCOLS[name].parser()
     for seed in range(50):
         parser.feed(np.random.default_rng(seed).bytes(2000))
-        assert held_bytes(parser) <= LARGEST_HELD_BYTES
+        assert held_bytes(parser) <= MAX_HELD_BYTES
     parser.feed(b"7" * 100_000)
-    assert held_bytes(parser) <= LARGEST_HELD_BYTES
+    assert held_bytes(parser) <= MAX_HELD_BYTES
 
 
 @names
@@ -102,7 +104,8 @@ def test_a_damaged_sample_costs_itself_and_no_more_than_two_others(name: str, fa
         readings = fed(parser, opening(name) + b"".join(samples))
 
         assert len(readings) >= 20 - 3
-        assert sum(parser.counts.values()) > 0
+        if name not in UNCHECKED:
+            assert sum(parser.counts.values()) > 0
 
 
 @names

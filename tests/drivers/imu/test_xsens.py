@@ -6,7 +6,7 @@ import struct
 import pytest
 
 from drivers.imu.xsens import XsensParser
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from hil_mocks.serial_imu import XsensEncoder, mtdata2
 
 GYRO = struct.pack(">3f", 0.5, -0.25, 2.0)

@@ -11,13 +11,13 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from drivers.records import Frame, ImuSample
-from hil_mocks.trajectory import rotation as attitudes
-from lcf_edge.calibrate.board import Board, Sighting
+from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.image_rotation import Turn
+from lcf_edge.calibrate.target import Sighting, Target
 from lcf_edge.calibrate.views import Views
 from lcf_edge.lens import Lens
+from lcf_edge.rendered.trajectory import rotation as attitudes
 
 Floats = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
@@ -53,7 +53,7 @@ class Given:
 class Studio:
     """Pictures of a board through a lens, anti-aliased, with noise."""
 
-    board: Board
+    board: Target
     lens: Lens
     noise: float = 2.0
 

@@ -11,7 +11,6 @@ from hypothesis import given as each
 from hypothesis import settings
 from hypothesis import strategies as st
 
-from hil_mocks import scenes
 from lcf_edge.calibrate.alignment import align
 from lcf_edge.calibrate.axes import axes_result, snapped
 from lcf_edge.calibrate.by_camera import axes_of, calibrate_by_camera
@@ -22,6 +21,7 @@ from lcf_edge.calibrate.rotations import EXACT, angle_rad, best_rotation, in_wor
 from lcf_edge.calibrate.time_offset import calibrate_time
 from lcf_edge.config import Config, Imu
 from lcf_edge.lens import Lens
+from lcf_edge.rendered import scenes
 
 Floats = npt.NDArray[np.float64]
 Make = Callable[..., Any]

@@ -8,16 +8,16 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.records import Frame
-from lcf_edge.calibrate.board import Board
+from drivers.samples import Frame
 from lcf_edge.calibrate.camera import calibrate_camera, solve
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
+from lcf_edge.calibrate.target import Target
 from lcf_edge.calibrate.views import Views
 from lcf_edge.config import Camera
 from lcf_edge.lens import Lens
 
-CHECKERBOARD, CHARUCO = Board.parse("checkerboard:9x6:25mm"), Board.parse("charuco:8x6:30mm")
+CHECKERBOARD, CHARUCO = Target.parse("checkerboard:9x6:25mm"), Target.parse("charuco:8x6:30mm")
 WEBCAM = Lens(640, 480, 520.0, 518.0, 322.3, 236.1, "radial-tangential", (-0.28, 0.09, 0.0008, -0.0006))
 FISHEYE = Lens(640, 480, 380.0, 381.0, 318.3, 243.1, "equidistant", (-0.02, 0.005, -0.003, 0.0005))
 
@@ -35,7 +35,7 @@ def found(given: Make, guide: Guide, views: list[Frame]) -> Result:
 
 
 def calibrated(
-    given: Make, frames: list[Frame], board: Board, guide: Guide, model: str = "radial-tangential"
+    given: Make, frames: list[Frame], board: Target, guide: Guide, model: str = "radial-tangential"
 ) -> Result:
     source = replace(given(frames), film=False)
     return calibrate_camera(source, board, model, 20, guide)  # type: ignore[arg-type]
@@ -84,7 +84,7 @@ def test_views_that_tell_no_lens_are_refused(studio: Make, told: str, views: dic
 
 
 def test_views_of_the_middle_alone_are_refused(studio: Make) -> None:
-    views = studio(Board.parse("checkerboard:5x4:25mm"), WEBCAM).sightings(9, spread=0.6)
+    views = studio(Target.parse("checkerboard:5x4:25mm"), WEBCAM).sightings(9, spread=0.6)
     for view in views.kept:
         view.corners[:] = view.corners.mean(axis=0) + 0.3 * (view.corners - view.corners.mean(axis=0))
     with pytest.raises(CalibrationError, match=r"corners were seen in \d+% of the picture"):
@@ -102,7 +102,7 @@ def test_too_few_views_are_refused_with_what_was_wrong_with_the_others(
 
 def test_another_board_than_was_shown_is_not_taken_for_it(given: Make, guide: Guide, views: list[Frame]) -> None:
     with pytest.raises(CalibrationError, match=r"usable views of checkerboard:7x4:25mm.*check --board"):
-        calibrated(given, views[:2], Board.parse("checkerboard:7x4:25mm"), guide)
+        calibrated(given, views[:2], Target.parse("checkerboard:7x4:25mm"), guide)
 
 
 def test_a_board_in_motion_is_waited_for(views: list[Frame]) -> None:

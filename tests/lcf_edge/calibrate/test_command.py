@@ -16,9 +16,9 @@ import cv2
 import pytest
 
 from drivers.errors import DeviceMissingError
-from drivers.records import Frame, ImuSample
+from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.sources import LiveSource
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 from lcf_edge.config import load
 from lcf_edge.errors import ConfigError
 

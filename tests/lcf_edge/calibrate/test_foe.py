@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from drivers.records import Frame
-from hil_mocks import scenes
-from hil_mocks.scenes import Drive, Profile, Shake
+from drivers.samples import Frame
 from lcf_edge.calibrate.foe import calibrate_foe
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError
 from lcf_edge.calibrate.sources import RecordedSource
 from lcf_edge.config import Config
 from lcf_edge.lens import Lens
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.scenes import Drive, Profile, Shake
 
 Make = Callable[..., Any]
 

@@ -10,12 +10,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from hil_mocks import scenes
-from hil_mocks.drives import Drive
 from lcf_edge.calibrate.mask import Stillness, outlines, own_parts
 from lcf_edge.calibrate.result import CalibrationError
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 from lcf_edge.config import load
+from lcf_edge.rendered import scenes
+from lcf_edge.rendered.drives import Drive
 
 Grey = npt.NDArray[np.uint8]
 

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from drivers.records import ImuSample
+from drivers.samples import ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.motions import calibrate_motions, camera_from_vehicle
 from lcf_edge.calibrate.rest import calibrate_rest, measure

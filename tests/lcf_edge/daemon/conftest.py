@@ -8,11 +8,11 @@ from pathlib import Path
 
 import pytest
 
-from drivers.records import SpeedSample
-from hil_mocks import scenes
+from drivers.samples import SpeedSample
 from lcf_edge.config import Camera, Config, Imu, Memory
 from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
+from lcf_edge.rendered import scenes
 
 PATIENCE_S = 20.0
 
@@ -28,6 +28,9 @@ class KeptLink:
         self.speeds: list[tuple[int, SpeedSample]] = []
         self.looks = False
         self.closed = 0
+        self.charged_mib = 0.0
+        self.sessions = 0
+        self.most_sessions = 2
         self.config: Config | None = None
         self.held = threading.Event()
         self.held.set()
@@ -59,6 +62,16 @@ class KeptLink:
 
     def show_config(self, config: Config) -> None:
         self.config = config
+
+    def charge(self, grown_mib: float) -> None:
+        assert grown_mib >= 0
+
+    def cut(self, charge_mib: float) -> int:
+        assert charge_mib > 0
+        return 0
+
+    def renew(self) -> bool:
+        return True
 
     def close(self) -> None:
         self.closed += 1

@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.daemon.clock import STEP_NS, StoppableClock, SystemTime, utc
+from lcf_edge.daemon.clock import STEP_NS, StoppableClock, SystemTime
+from lcf_edge.dates import utc
 
 
 class Clocks:

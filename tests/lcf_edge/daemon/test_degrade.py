@@ -3,17 +3,17 @@
 import numpy as np
 import pytest
 
-from drivers.records import Frame
-from lcf_edge.config import Config, Filter
+from drivers.samples import Frame
+from lcf_edge.config import Config, Filter, Imu
 from lcf_edge.daemon.degrade import Degradation
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene, Sizes
+from lcf_edge.messages import CIRCLE, PSI_REGION, PipelineScene, Sizes
 
 MS = 1_000_000
 
 
-def scene(seq: int, *, corners: int = 500, speed_mps: float = 1.0, notes: tuple[str, ...] = ()) -> Scene:
+def scene(seq: int, *, corners: int = 500, speed_mps: float = 1.0, notes: tuple[str, ...] = ()) -> PipelineScene:
     none = np.zeros(0, CIRCLE), np.zeros(0, PSI_REGION)
-    return Scene(0, seq, 640, 480, speed_mps, *none, sizes=Sizes(corners=corners), notes=notes)
+    return PipelineScene(0, seq, 640, 480, speed_mps, *none, sizes=Sizes(corners=corners), notes=notes)
 
 
 def frame(stamp_ms: int, grey: int = 120) -> Frame:
@@ -92,3 +92,17 @@ def test_a_gyro_that_is_not_fully_believed_says_why(note: str, words: str) -> No
     assert degradation.notes[0].startswith(words)
     degradation.add(frame(50), scene(1))
     assert not degradation.notes
+
+
+@pytest.mark.parametrize("note", ["imu gap", "gyro stuck"])
+def test_nobody_is_sent_to_the_cable_of_a_recording(note: str) -> None:
+    def told(config: Config) -> str:
+        degradation = Degradation(config)
+        degradation.add(frame(0), scene(0, notes=(note,)))
+        (words,) = degradation.notes
+        return words
+
+    assert "check " in told(Config(imu=Imu(driver="mpu6050")))
+    of_a_recording = told(Config(imu=Imu(driver="recording", recording="drive")))
+    assert "recording" in of_a_recording
+    assert "check " not in of_a_recording

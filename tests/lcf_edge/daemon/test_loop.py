@@ -2,7 +2,7 @@
 
 import threading
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -11,15 +11,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from drivers.records import Frame, ImuSample, SpeedSample
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Camera, Config, Filter, Memory, Vehicle
 from lcf_edge.daemon.clock import StoppableClock, SystemTime
 from lcf_edge.daemon.loop import Loop, Mail
+from lcf_edge.daemon.outputs import Outputs
 from lcf_edge.daemon.preview import Previewer
+from lcf_edge.daemon.scenes import LinkedScenes
 from lcf_edge.errors import ConfigError
 from lcf_edge.pipeline import run
-from lcf_edge.recordings import open_recording
-from lcf_edge.zenoh_link import LARGEST_MESSAGE_BYTES
+from lcf_edge.recording.read import open_recording
+from lcf_edge.sinks.sink import Sink
+from lcf_edge.zenoh_link import MAX_MESSAGE_BYTES
 
 PATIENCE_S = 20.0
 
@@ -33,24 +36,26 @@ def mail() -> Mail:
 
 @pytest.fixture
 def start(link: Any, mail: Mail) -> Iterator[Start]:
-    """A running loop and its previewer."""
+    """A running loop with its scenes and previews."""
     clock = StoppableClock()
-    threads: list[Loop | Previewer] = []
+    started: list[tuple[Loop, Outputs]] = []
 
-    def begin(config: Config, system_time: SystemTime | None = None) -> Loop:
-        previewer = Previewer(link, clock)
-        loop = Loop(config, mail, link, previewer, clock, system_time or SystemTime(), lambda: None)
-        threads.extend((loop, previewer))
-        for thread in threads:
-            thread.start()
+    def begin(config: Config, system_time: SystemTime | None = None, more: Sequence[Sink] = ()) -> Loop:
+        outputs = Outputs([LinkedScenes(link), Previewer(link), *more])
+        loop = Loop(config, mail, link, outputs, clock, system_time or SystemTime(), lambda: None)
+        started.append((loop, outputs))
+        outputs.start()
+        loop.start()
         return loop
 
     yield begin
     clock.stop()
-    for thread in threads:
-        thread.wake()
-        thread.join(PATIENCE_S)
-        assert not thread.is_alive()
+    for loop, outputs in started:
+        loop.wake()
+        loop.join(PATIENCE_S)
+        assert not loop.is_alive()
+        outputs.close()
+        outputs.join(PATIENCE_S)
 
 
 @pytest.fixture
@@ -222,5 +227,5 @@ def test_a_preview_of_a_large_camera_fits_into_a_message(start: Start, mail: Mai
     mail.frames.put(Frame(time.monotonic_ns(), 0, noise(width=1920, height=1080)))
     link.wait_for(lambda: link.previews)
     ((jpeg, _),) = link.previews
-    assert len(jpeg) < LARGEST_MESSAGE_BYTES
+    assert len(jpeg) < MAX_MESSAGE_BYTES
     assert np.asarray(cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)).shape == (540, 1920, 3)

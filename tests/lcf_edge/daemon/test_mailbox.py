@@ -5,7 +5,7 @@ import threading
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.records import SpeedSample
+from drivers.samples import SpeedSample
 from lcf_edge.daemon.mailbox import Newest, SampleRing
 
 PATIENCE_S = 20.0

@@ -12,11 +12,11 @@ import pytest
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceForbiddenError
-from drivers.records import Frame
-from hil_mocks.playback import Faults, RecordedCamera, RecordedImu
+from drivers.samples import Frame
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock
 from lcf_edge.daemon.reader import Reader
+from lcf_edge.recording.playback import Faults, RecordedCamera, RecordedImu
 
 PATIENCE_S = 20.0
 

@@ -13,6 +13,8 @@ import pytest
 from mcap.exceptions import McapError
 from mcap.reader import NonSeekingReader
 from rosbags.highlevel import AnyReader
+from rosbags.interfaces import QosDurability
+from rosbags.rosbag2 import Reader
 
 from lcf_edge.config import load
 from lcf_edge.zenoh_link import scenes
@@ -67,6 +69,11 @@ def replayed(path: Path, *arguments: str | Path) -> str:
     return done.stdout.splitlines()[0]
 
 
+def messages_in(file: Path) -> int:
+    with AnyReader([file]) as reader:
+        return reader.message_count
+
+
 def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) -> None:
     file = tmp_path / "drive.mcap"
     status, out, said = ended(start(file, "--seconds", "1.5"))
@@ -83,6 +90,25 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
     assert load(file).camera.height_m == 0.77
     assert load(file).record.when == "never"  # run -c drive.mcap records nothing unasked
     assert replayed(file, "-c", file).split()[:2] == ["frames", f"{pictures},"]
+
+
+def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start, tmp_path: Path) -> None:
+    folder = tmp_path / "drive"
+    status, out, _ = ended(start(folder, "--seconds", "1.5", "--set", "record.file_s=0.6"))
+    assert status == 0
+    assert out.startswith(f"{folder}: ")
+    files = sorted(path.name for path in folder.glob("*.mcap"))
+    assert files[:2] == ["drive_0.mcap", "drive_1.mcap"]
+    with Reader(folder) as bag:  # reads what metadata.yaml names, and nothing else
+        counts = Counter(connection.topic for connection, _, _ in bag.messages())
+        told = {connection.topic: connection.msgcount for connection in bag.connections}
+        qualities = {connection.topic: connection.ext.offered_qos_profiles for connection in bag.connections}
+        assert bag.message_count == counts.total() == sum(messages_in(folder / name) for name in files)
+        assert bag.start_time < bag.end_time
+    assert {topic: count for topic, count in told.items() if count} == counts
+    (lasting,) = qualities["/tf_static"]
+    assert lasting.durability is QosDurability.TRANSIENT_LOCAL
+    assert replayed(folder).split()[1] == f"{counts['/lcf/scene']},"
 
 
 def test_it_publishes_too_and_a_signal_ends_it(start: Start, tmp_path: Path, endpoint: str) -> None:
@@ -129,6 +155,8 @@ def test_killed_it_leaves_all_but_the_last_second(start: Start, tmp_path: Path, 
         (("nowhere/drive.mcap",), 1, "nowhere/drive.mcap: cannot be written"),
         (("drive.mcap", "--seconds", "0"), 2, "0: write a number above 0"),
         (("drive.mcap", "--set", "record.total_mib=1"), 2, "record.total_mib: must be record.file_mib at least"),
+        (("drive", "--set", "record.total_mib=1"), 2, "record.total_mib: must be record.file_mib at least"),
+        (("nowhere/drive",), 1, "nowhere/drive: cannot be written"),
         (("drive.mcap", "--set", "record.buffer_mib=100"), 2, "lower record.buffer_mib, or raise it to"),
     ],
 )
@@ -146,7 +174,7 @@ def test_what_cannot_work_ends_in_one_line(
     code, out, said = ended(start(*arguments))
     assert (code, out, len(said)) == (status, "", 1)
     assert part in said[0]
-    assert [path.name for path in tmp_path.glob("*.mcap")] == ["there.mcap"]
+    assert [path.name for path in tmp_path.iterdir()] == ["there.mcap"]
     assert Path("there.mcap").read_text() == "precious"
 
 

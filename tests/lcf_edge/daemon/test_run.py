@@ -157,7 +157,7 @@ LATE = """
 import sys, time
 now_ns = time.time_ns
 time.time_ns = lambda: now_ns() + {years} * 31_556_952 * 10**9
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -177,7 +177,7 @@ def test_a_clock_that_no_message_can_tell_is_no_end(start: Start, manager: Any, 
 # A stand-in for strangers: whatever opens files in its process, and keeps them.
 CROWDED = """
 import os, resource, sys, threading
-from lcf_edge.command_line import main
+from lcf_edge.cli.command_line import main
 
 def crowd():
     while True:
@@ -200,7 +200,9 @@ def test_without_descriptors_it_lives_tells_and_reads_its_configuration(
     assert daemon.stderr
     said = iter(daemon.stderr.readline, "")
     assert next(line for line in said if "file descriptors" in line)
-    (tmp_path / "config.toml").write_text("[filter]\ntr_s = 3.5\n")
+    written = tmp_path / "config.new"
+    written.write_text("[filter]\ntr_s = 3.5\n")
+    written.replace(tmp_path / "config.toml")  # at once: half a file would be read, and change nothing
     assert next(line for line in said if "reload" in line) == "lcf-edge: reload: changed filter.tr_s\n"
     manager.until("STATUS=")
     daemon.send_signal(signal.SIGKILL)  # its crowd never ends

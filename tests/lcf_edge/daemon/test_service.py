@@ -10,7 +10,6 @@ import msgspec
 import pytest
 from mcap.reader import make_reader
 
-from hil_mocks.playback import RecordedCamera
 from lcf_edge.compilation import uncompiled
 from lcf_edge.config import Camera, Config, Imu, Memory, Record, Vehicle, load, to_toml
 from lcf_edge.daemon import health, loop, service
@@ -21,6 +20,7 @@ from lcf_edge.daemon.service import InternalError, Service
 from lcf_edge.diagnostics import Level
 from lcf_edge.errors import ConfigError
 from lcf_edge.pipeline import Pipeline
+from lcf_edge.recording.playback import RecordedCamera
 
 PATIENCE_S = 20.0
 TICK_S = 0.1
@@ -144,7 +144,7 @@ def test_every_frame_is_a_scene_or_counted(
             return seen[-1]
 
     seen: list[Any] = []
-    monkeypatch.setattr("hil_mocks.playback.RecordedCamera", Slow)
+    monkeypatch.setattr("lcf_edge.recording.playback.RecordedCamera", Slow)
     begun = runs.start(config)
     for _ in range(5):
         wanted = len(link.scenes) + 3
@@ -178,12 +178,23 @@ def test_diagnostics_tell_of_each_part(config: Config, runs: Runs, link: Any) ->
     assert {"jitter_ms", "age_s", "opened", "overtaken before the pipeline"} <= camera.values.keys()
     assert 0 < float(pipeline.values["latency_p50_ms"]) <= float(pipeline.values["latency_p99_ms"])
     assert pipeline.values["corners_fill"].endswith("/1500")
+    assert pipeline.values["objects_fill"].endswith("/24")
     assert pipeline.values["evicted"] == "0"
     assert 0 < float(pipeline.values["camera_pitch_sigma_rad"]) <= 0.06
     assert abs(float(pipeline.values["camera_pitch_rad"])) < 0.2
     assert abs(float(pipeline.values["camera_yaw_rad"])) < 0.2
     assert pipeline.values["filter"] == ("uncompiled" if uncompiled() else "compiled")
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
+
+
+def test_when_no_more_sessions_are_let_in_that_is_told(config: Config, runs: Runs, link: Any) -> None:
+    runs.start(config)
+    link.wait_for(lambda: link.statuses)
+    assert link.statuses["link"].level is Level.OK
+    link.sessions = 2
+    link.wait_for(lambda: link.statuses["link"].level is Level.WARN)
+    assert link.statuses["link"].message == "2 sessions: nobody else is let in"
+    assert link.statuses["link"].values["sessions"] == "2"
 
 
 def test_an_imu_that_is_away_widens_and_is_told(config: Config, runs: Runs, link: Any) -> None:
@@ -324,7 +335,7 @@ def test_a_file_that_is_emptied_changes_nothing(
 def test_a_file_of_the_machine_that_is_emptied_changes_nothing_but_one_that_never_was_is_not_missed(
     config: Config, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("lcf_edge.config.DEFAULT_PATH", tmp_path / "config.toml")
+    monkeypatch.setattr("lcf_edge.config.config.DEFAULT_PATH", tmp_path / "config.toml")
     assert load() == Config()
     for content in ("", None):
         with pytest.raises(ConfigError, match=r"config\.toml: (empty|cannot be read)"):
@@ -422,7 +433,7 @@ def test_a_camera_that_falls_silent_is_stale(
             frames = super().read()
             return [] if silent.is_set() else frames
 
-    monkeypatch.setattr("hil_mocks.playback.RecordedCamera", Mute)
+    monkeypatch.setattr("lcf_edge.recording.playback.RecordedCamera", Mute)
     runs.start(config)
     link.wait_for(lambda: len(link.scenes) > 3)
     silent.set()

@@ -25,8 +25,8 @@ def machine(tmp_path: Path, clock: VirtualClock) -> Machine:
         (tmp_path / folder).mkdir()
 
     def build(config: Config | None = None, **others: Any) -> Context:
-        places = {folder: tmp_path / folder for folder in ("dev", "sys", "proc")}
-        context = Context(config or Config(), **{"clock": clock, **places, **others})
+        places = {folder: tmp_path / folder for folder in ("dev", "sys", "proc", "installed")}
+        context = Context(config or Config(), **{"clock": clock, "program": "lcf-edge", **places, **others})
         context.__dict__["daemon"] = None  # as if asked already: nobody answered
         return context
 

@@ -2,6 +2,7 @@
 
 import errno
 import itertools
+import re
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -11,16 +12,17 @@ import numpy as np
 import pytest
 
 from drivers.camera import v4l2_ioctl as v4l2
+from drivers.camera.libcamera import LibcameraCamera
 from drivers.camera.v4l2 import V4l2Camera
-from drivers.clock import Clock
+from drivers.clock import SYSTEM_CLOCK, Clock
+from hil_mocks.libcamera_device import World, command
 from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel
 from hil_mocks.virtual_clock import VirtualClock
 from lcf_edge.config import Camera, Config
-from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor import camera
 from lcf_edge.doctor.daemon import Daemon
-from lcf_edge.doctor.finding import Context, Finding, Level
+from lcf_edge.doctor.finding import Context, Finding, Severity
 
 PATH = "/dev/video0"
 WANTED = Camera(fps=30.0)
@@ -71,42 +73,84 @@ def look(machine: Machine, clock: VirtualClock, webcam: MockCamera) -> Callable[
 Look = Callable[..., list[Finding]]
 
 
-def one(findings: list[Finding], level: Level) -> Finding:
+def one(findings: list[Finding], level: Severity) -> Finding:
     """The only one that bad, and none is worse."""
-    (found,) = [finding for finding in findings if finding.level is not Level.OK]
+    (found,) = [finding for finding in findings if finding.level is not Severity.OK]
     assert found.level is level, found
     return found
 
 
 def test_a_good_camera_is_told_with_its_figures(look: Look) -> None:
     name, rate, light = look()
-    assert {finding.level for finding in (name, rate, light)} == {Level.OK}
+    assert {finding.level for finding in (name, rate, light)} == {Severity.OK}
     assert name.text == "/dev/video0: Mock Webcam"
     assert rate.text.startswith("30.0/s, jitter 0.0 ms, longest gap 33 ms, exposure 25.0 ms")
     assert "mean grey level 100 of 255" in light.text
 
 
 def test_a_missing_camera_names_those_that_are_there(look: Look) -> None:
-    found = one(look(video0=None, video2=MockCamera(card="HD Webcam")), Level.FAIL)
+    found = one(look(video0=None, video2=MockCamera(card="HD Webcam")), Severity.FAIL)
     assert found.text == "/dev/video0: no such camera; there is /dev/video2 (HD Webcam)"
     assert found.remedy.startswith("lcf-edge doctor --set camera.device=/dev/video2 ")
 
 
 def test_no_camera_at_all_asks_what_usb_sees(look: Look) -> None:
-    found = one(look(video0=None), Level.FAIL)
+    found = one(look(video0=None), Severity.FAIL)
     assert "ribbon cable" in found.text
     assert found.remedy.startswith("lsusb")
 
 
+class TestThroughLibcamera:
+    """A camera at a ribbon cable, with the shipped driver on a libcamera that is played."""
+
+    @pytest.fixture
+    def look(self, machine: Machine, clock: VirtualClock) -> Callable[..., list[Finding]]:
+        def find(world: World, driver: str = "auto") -> list[Finding]:
+            kernel = MockKernel(clock)
+            kernel.plug(PATH, MockCamera(card="rp1-cfe", caps=v4l2.CAP_VIDEO_CAPTURE | 0x2000_0000))  # V4L2_CAP_IO_MC
+
+            def opened(_config: Config, _clock: Clock) -> LibcameraCamera:
+                return LibcameraCamera("imx219", width=64, height=48, fps=30.0, command=command(world))
+
+            wanted = Config(camera=Camera(driver=driver, fps=30.0))  # type: ignore[arg-type]
+            context = machine(wanted, kernel=kernel, open_camera=opened, clock=SYSTEM_CLOCK)
+            return list(camera.check(context))
+
+        return find
+
+    def test_it_is_told_with_its_figures(self, look: Look) -> None:
+        name, rate, _ = look(World())
+        assert (name.level, name.text) == (Severity.OK, "/dev/video0: through libcamera")
+        assert re.match(r"(29|30)\.\d/s", rate.text)
+
+    @pytest.mark.parametrize("driver", ["auto", "libcamera"])
+    @pytest.mark.parametrize(
+        ("world", "text", "remedy"),
+        [
+            (World(installed=False), "has no libcamera", "sudo apt install python3-libcamera"),
+            (World(busy=True), "in use by another program", "sudo fuser -v /dev/media*"),
+            (World(names=()), "libcamera finds no camera", ""),
+        ],
+        ids=["not installed", "busy", "no camera"],
+    )
+    def test_what_is_wrong_is_one_line(self, look: Look, driver: str, world: World, text: str, remedy: str) -> None:
+        found = one(look(world, driver), Severity.FAIL)
+        assert text in found.text
+        assert found.remedy.startswith(remedy)
+
+    def test_the_other_driver_points_there(self, look: Look) -> None:
+        assert 'set camera.driver = "libcamera"' in one(look(World(), "v4l2"), Severity.FAIL).text
+
+
 def test_without_permission_the_group_is_named(look: Look, webcam: MockCamera) -> None:
     webcam.open_error = errno.EACCES
-    found = one(look(), Level.FAIL)
+    found = one(look(), Severity.FAIL)
     assert found.text.startswith("/dev/video0: this user may not open it")
     assert found.remedy.startswith("sudo usermod -aG video $USER")
 
 
 def test_a_node_without_pictures_is_told(look: Look) -> None:
-    found = one(look(video0=MockCamera(caps=v4l2.CAP_STREAMING), video1=MockCamera()), Level.FAIL)
+    found = one(look(video0=MockCamera(caps=v4l2.CAP_STREAMING), video1=MockCamera()), Severity.FAIL)
     assert "gives no pictures" in found.text
     assert "camera.device=/dev/video1" in found.remedy
 
@@ -114,19 +158,19 @@ def test_a_node_without_pictures_is_told(look: Look) -> None:
 def test_a_camera_in_use_names_the_program(look: Look, webcam: MockCamera, process: Callable[..., None]) -> None:
     process(4711, "/usr/bin/cheese", opened=("/dev/null", PATH))
     webcam.format_error = errno.EBUSY
-    found = one(look(), Level.FAIL)
+    found = one(look(), Severity.FAIL)
     assert found.text == "/dev/video0: in use by cheese, process 4711"
     assert found.remedy == "kill 4711"
 
 
 def test_a_program_that_may_not_be_known_is_asked_for(look: Look, webcam: MockCamera) -> None:
     webcam.format_error = errno.EBUSY
-    assert one(look(), Level.FAIL).remedy == "sudo fuser -v /dev/video0"
+    assert one(look(), Severity.FAIL).remedy == "sudo fuser -v /dev/video0"
 
 
 def test_what_only_looks_at_the_camera_is_no_trouble(look: Look, process: Callable[..., None]) -> None:
     process(4711, "/usr/bin/wireplumber", opened=(PATH,))
-    assert all(finding.level is Level.OK for finding in look())
+    assert all(finding.level is Severity.OK for finding in look())
 
 
 @pytest.mark.parametrize(
@@ -138,20 +182,20 @@ def test_what_only_looks_at_the_camera_is_no_trouble(look: Look, process: Callab
     ],
 )
 def test_what_is_not_offered_comes_with_the_nearest_that_is(look: Look, wanted: Camera, remedy: str) -> None:
-    found = one(look(wanted), Level.FAIL)
+    found = one(look(wanted), Severity.FAIL)
     assert "offered: " in found.text
     assert found.remedy.startswith(f"lcf-edge doctor {remedy}")
 
 
 def test_the_remedy_of_a_refused_mode_works(look: Look) -> None:
-    refused = one(look(Camera()), Level.FAIL)
+    refused = one(look(Camera()), Severity.FAIL)
     fps = float(refused.remedy.partition("camera.fps=")[2].split()[0])
-    assert all(finding.level is Level.OK for finding in look(Camera(fps=fps)))
+    assert all(finding.level is Severity.OK for finding in look(Camera(fps=fps)))
 
 
 def test_a_silent_camera_fails(look: Look, webcam: MockCamera) -> None:
     webcam.stalled = True
-    found = one(look(), Level.FAIL)
+    found = one(look(), Severity.FAIL)
     assert "no usable picture" in found.text
     assert "dmesg" in found.remedy
 
@@ -159,7 +203,7 @@ def test_a_silent_camera_fails(look: Look, webcam: MockCamera) -> None:
 def test_pictures_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> None:
     whole = itertools.cycle((True, False))
     webcam.spoil = lambda data: data if next(whole) else data[:9]
-    found = one(look(), Level.WARN)
+    found = one(look(), Severity.WARN)
     assert found.text.startswith("15.0/s")
     assert "slower than camera.fps = 30" in found.text
     assert "; short " in found.text
@@ -168,29 +212,29 @@ def test_pictures_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> 
 
 def test_an_exposure_longer_than_the_frame_is_why_it_is_slow(look: Look, webcam: MockCamera) -> None:
     webcam.controls[v4l2.CID_EXPOSURE_ABSOLUTE] = MockControl(500, 3, 2047)
-    assert all(finding.level is Level.OK for finding in look())  # it cannot be: the rate is kept
+    assert all(finding.level is Severity.OK for finding in look())  # it cannot be: the rate is kept
     whole = itertools.cycle((True, False))
     webcam.spoil = lambda data: data if next(whole) else data[:9]
-    found = one(look(), Level.WARN)
+    found = one(look(), Severity.WARN)
     assert found.text.endswith("slower than camera.fps = 30, its exposure of 50.0 ms is longer than a frame")
     assert "--set camera.exposure_s=0.0167" in found.remedy
 
 
 def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera) -> None:
     del webcam.controls[v4l2.CID_EXPOSURE_ABSOLUTE]
-    assert all(finding.level is Level.OK and "exposure" not in finding.text for finding in look())
+    assert all(finding.level is Severity.OK and "exposure" not in finding.text for finding in look())
 
 
 @pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "burnt out")])
 def test_a_picture_without_use_is_told(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
     webcam.pictures = plain(grey)
-    found = one(look(), Level.WARN)
+    found = one(look(), Severity.WARN)
     assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")
 
 
 def test_stamps_of_another_clock_are_told(look: Look, webcam: MockCamera) -> None:
     webcam.stamp_flags = v4l2.FLAG_STAMPED_AT_EXPOSURE
-    assert one(look(), Level.WARN).text.startswith("stamps that cannot be true (stamped at arrival ")
+    assert one(look(), Severity.WARN).text.startswith("stamps that cannot be true (stamped at arrival ")
 
 
 def test_a_camera_that_the_daemon_has_is_not_opened_but_asked_for(
@@ -205,10 +249,10 @@ def test_a_camera_that_the_daemon_has_is_not_opened_but_asked_for(
 
     context = machine(Config(camera=WANTED), kernel=kernel, open_camera=untouched)
     _, silent = camera.check(context)
-    assert silent.level is Level.WARN
+    assert silent.level is Severity.WARN
     assert silent.remedy.startswith("sudo systemctl stop lcf-edge")
 
-    status = DeviceStatus("camera", StatusLevel.STALE, "silent since then", {"rate_hz": "29.97"})
+    status = DeviceStatus("camera", Level.STALE, "silent since then", {"rate_hz": "29.97"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"camera": status}, "")
     _, told = camera.check(context)
-    assert (told.level, told.text) == (Level.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")
+    assert (told.level, told.text) == (Severity.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")

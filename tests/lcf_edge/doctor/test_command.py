@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from hil_mocks import scenes
-from lcf_edge.command_line import main
-from lcf_edge.commands.doctor import line
+from lcf_edge.cli.command_line import main
+from lcf_edge.cli.doctor import line
 from lcf_edge.doctor import camera, imu
-from lcf_edge.doctor.finding import Finding, Level
+from lcf_edge.doctor.finding import Finding, Severity
+from lcf_edge.rendered import scenes
 
-LEVELS = {level.value for level in Level}
+LEVELS = {level.value for level in Severity}
 
 Doctor = Callable[..., int]
 
@@ -64,7 +64,7 @@ def test_a_failure_is_exit_status_1_and_one_line(doctor: Doctor, capsys: pytest.
     assert doctor("--set", "camera.driver=v4l2", "--set", "camera.device=/dev/no-such-camera") == 1
     said, errors = capsys.readouterr()
     assert "\nfail  camera         /dev/no-such-camera: no such camera" in said
-    assert errors == "lcf-edge: 1 check failed; mend the first one and look again\n"
+    assert errors == "lcf-edge: 1 check failed; fix the first one and look again\n"
 
 
 def test_a_wrong_configuration_is_exit_status_2_and_the_rest_is_told(
@@ -118,13 +118,13 @@ def test_colours_are_for_terminals_that_want_them(no_color: str, colours: bool) 
 
 
 def test_names_of_others_do_not_command_the_terminal() -> None:
-    told = line(Finding(Level.FAIL, "network", "taken by \x1b]0;mine\x07\x9b2J\n, process 7", "kill 7"))
+    told = line(Finding(Severity.FAIL, "network", "taken by \x1b]0;mine\x07\x9b2J\n, process 7", "kill 7"))
     assert all(part.isprintable() for part in told.split("\n"))
     assert len(told.split("\n")) == 2
 
 
 def test_the_remedy_is_below_and_can_be_pasted() -> None:
-    told = line(Finding(Level.WARN, "clock", "wrong", "sudo timedatectl set-ntp true"))
+    told = line(Finding(Severity.WARN, "clock", "wrong", "sudo timedatectl set-ntp true"))
     first, remedy = told.splitlines()
     assert first == "warn  clock          wrong"
     assert remedy == " " * first.index("wrong") + "sudo timedatectl set-ntp true"

@@ -12,7 +12,7 @@ from lcf_edge.config import Config
 from lcf_edge.doctor import configuration
 from lcf_edge.doctor.configuration import check, context_of
 from lcf_edge.doctor.examination import STEPS, Step, examine
-from lcf_edge.doctor.finding import Context, Finding, Level, edit, ok
+from lcf_edge.doctor.finding import Context, Finding, Severity, edit, ok
 from lcf_edge.errors import ConfigError
 
 Machine = Callable[..., Context]
@@ -47,7 +47,7 @@ def test_a_check_that_hangs_is_told_and_left_behind(machine: Machine) -> None:
     there, hung, *others = examine(machine(), (Step("camera", hangs), Step("good", good)), limit_s=0.1)
     released.set()
     assert there.text == "there"
-    assert (hung.level, hung.subject) == (Level.FAIL, "camera")
+    assert (hung.level, hung.subject) == (Severity.FAIL, "camera")
     assert hung.text.startswith("does not come back within 0.1 s")
     assert hung.remedy
     assert [finding.text for finding in others] == ["one", "two"]
@@ -64,7 +64,7 @@ def test_a_check_that_hangs_is_told_and_left_behind(machine: Machine) -> None:
 def test_a_check_that_breaks_off_fails_in_one_line(machine: Machine, error: Exception, text: str) -> None:
     first, broken, *others = examine(machine(), (Step("bad", raising(error)), Step("good", good)))
     assert first.text == "first"
-    assert (broken.level, broken.subject, broken.text) == (Level.FAIL, "bad", text)
+    assert (broken.level, broken.subject, broken.text) == (Severity.FAIL, "bad", text)
     assert len(others) == 2
 
 
@@ -86,13 +86,13 @@ def test_the_configuration_tells_where_it_comes_from(tmp_path: Path) -> None:
     context = context_of(file, ["vehicle.speed_mps=1.0"])
     assert context.given == {"camera.height_m", "vehicle.speed_mps"}
     (found,) = check(context)
-    assert (found.level, found.text) == (Level.OK, f"{file} is valid")
+    assert (found.level, found.text) == (Severity.OK, f"{file} is valid")
 
 
 def test_a_remedy_keeps_what_was_asked_for(tmp_path: Path) -> None:
     context = context_of(tmp_path / "none.toml", [])
-    assert context.again() == f"lcf-edge doctor -c {tmp_path}/none.toml"
-    context = Context(Config(), tmp_path / "a rover.toml", ('zenoh.listen=["tcp/[::1]:7"]',))
+    assert context.again() == f"{context.program} doctor -c {tmp_path}/none.toml"
+    context = Context(Config(), tmp_path / "a rover.toml", ('zenoh.listen=["tcp/[::1]:7"]',), program="lcf-edge")
     command = context.again("imu.bus=3")
     words = ["lcf-edge", "doctor", "-c", f"{tmp_path}/a rover.toml", "--set", 'zenoh.listen=["tcp/[::1]:7"]']
     assert shlex.split(command, comments=True) == [*words, "--set", "imu.bus=3"]
@@ -112,6 +112,6 @@ def test_a_wrong_key_fails_with_the_file_to_edit(tmp_path: Path) -> None:
     file = tmp_path / "rover.toml"
     file.write_text("[camera]\nfsp = 30\n")
     (found,) = check(context_of(file, []))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert f"{file}: unknown key camera.fsp; did you mean camera.fps?" in found.text
     assert found.remedy == f"${{EDITOR:-nano}} {file}"

@@ -12,19 +12,18 @@ from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.imu.i2c_bus import I2cBus
 from drivers.imu.i2c_chips import chip_on
 from drivers.imu.iio import Iio
-from drivers.imu.settings import USUAL, ImuSettings
-from drivers.records import ImuSample
+from drivers.imu.settings import DEFAULT_SETTINGS, ImuSettings
+from drivers.samples import ImuSample
 from hil_mocks.i2c import CHIPS, Motion, SimulatedBus
 from hil_mocks.serial_imu import ENCODERS, SerialImuStandIn
 from hil_mocks.virtual_clock import VirtualClock
 from lcf_edge.config import Config, Imu
 from lcf_edge.devices import open_imu
-from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor import imu, wiring
 from lcf_edge.doctor.daemon import Daemon
 from lcf_edge.doctor.examination import LIMIT_S
-from lcf_edge.doctor.finding import Context, Finding, Level
+from lcf_edge.doctor.finding import Context, Finding, Severity
 
 Machine = Callable[..., Context]
 Write = Callable[[str, str], None]
@@ -41,14 +40,17 @@ class Bus:
     def __init__(self, clock: VirtualClock, driver: str, motion: Motion, address: int = 0) -> None:
         chip = CHIPS[driver](motion, clock)
         self.clock = clock
-        self.wire = SimulatedBus(clock, {address or chip.address: chip})
+        places = dict(chip.places)
+        places[address or chip.address] = places.pop(chip.address)
+        self.wire = SimulatedBus(clock, places)
 
     def open(self, number: int) -> I2cBus:
         return I2cBus(number, self.wire, self.clock)
 
     def imu(self, config: Config, clock: Clock) -> object:
         wanted = config.imu
-        return chip_on(self.open(wanted.bus), wanted.driver, wanted.address, ImuSettings(wanted.rate_hz), clock=clock)
+        settings = ImuSettings(wanted.rate_hz, identity=wanted.identity)
+        return chip_on(self.open(wanted.bus), wanted.driver, wanted.address, settings, clock=clock)
 
 
 @pytest.fixture
@@ -72,13 +74,13 @@ def only(findings: list[Finding]) -> Finding:
 
 
 def bad(findings: list[Finding]) -> Finding:
-    return only([finding for finding in findings if finding.level is not Level.OK])
+    return only([finding for finding in findings if finding.level is not Severity.OK])
 
 
 @pytest.mark.parametrize("driver", [driver for driver in CHIPS if driver != "bmi270"])  # that one wants its firmware
 def test_a_chip_at_rest_is_told_with_rate_gravity_and_bias(look: Look, driver: str) -> None:
     rate, gravity, bias = look(Imu(driver=driver), driver)  # type: ignore[arg-type]
-    assert {finding.level for finding in (rate, gravity, bias)} == {Level.OK}
+    assert {finding.level for finding in (rate, gravity, bias)} == {Severity.OK}
     assert "/s, jitter " in rate.text
     assert gravity.text.startswith("gravity 9.8")
     assert bias.text.startswith("gyro at rest 0.0")
@@ -95,8 +97,8 @@ def test_every_chip_is_recognised_at_both_addresses(clock: VirtualClock, driver:
 
 def test_a_chip_at_the_other_address_comes_with_the_setting(look: Look) -> None:
     found = only(look(Imu(driver="icm20948"), "icm20948", address=0x69))
-    assert found.level is Level.FAIL
-    assert found.text.endswith("there is a ICM-20948 at 0x69")
+    assert found.level is Severity.FAIL
+    assert found.text.endswith("; found ICM-20948 at 0x69")
     assert found.remedy.startswith("lcf-edge doctor --set imu.driver=icm20948 --set imu.address=0x69 ")
 
 
@@ -107,8 +109,35 @@ def test_another_chip_is_recognised(look: Look) -> None:
 
 def test_without_a_driver_the_chip_that_is_there_is_proposed(look: Look) -> None:
     found = only(look(Imu(), "lsm6dso"))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert found.remedy.startswith("lcf-edge doctor --set imu.driver=lsm6dso --set imu.address=0x6a ")
+
+
+def test_a_copy_that_no_driver_knows_is_told_and_how_to_learn_what_it_says(
+    machine: Machine, clock: VirtualClock, write: Write
+) -> None:
+    write("dev/i2c-1", "")
+    bus = Bus(clock, "mpu6500", resting())
+    bus.wire.chips[0x68].power_on = {**bus.wire.chips[0x68].power_on, 0x75: 0x5E}
+    bus.wire.chips[0x68].power_up()
+
+    def look(wanted: Imu) -> list[Finding]:
+        return list(imu.check(machine(Config(imu=wanted), open_imu=bus.imu, open_bus=bus.open)))
+
+    found = only(look(Imu()))
+    assert found.level is Severity.WARN
+    assert found.text.endswith("; at 0x68 on i2c-1 is something that no driver knows: a copy of an IMU?")
+    assert found.remedy.startswith("lcf-edge doctor --set imu.driver=mpu6500 --set imu.address=0x68 ")
+    refused = only(look(Imu(driver="mpu6500", address=0x68)))
+    assert refused.text.endswith("or imu.identity to 0x5e if it is a copy")
+    assert {finding.level for finding in look(Imu(driver="mpu6500", address=0x68, identity=0x5E))} == {Severity.OK}
+
+
+def test_what_the_kernel_owns_is_no_unknown_imu(machine: Machine, clock: VirtualClock, write: Write) -> None:
+    write("dev/i2c-1", "")
+    bus = Bus(clock, "mpu6500", resting())
+    bus.wire.owned_by_kernel.add(0x68)  # as a clock of real time
+    assert "0x68" not in only(list(imu.check(machine(Config(imu=Imu()), open_bus=bus.open)))).text
 
 
 def test_an_empty_bus_asks_for_the_wiring(machine: Machine, clock: VirtualClock, write: Write) -> None:
@@ -117,7 +146,7 @@ def test_an_empty_bus_asks_for_the_wiring(machine: Machine, clock: VirtualClock,
     bus.wire.chips.clear()
     context = machine(Config(imu=Imu(driver="mpu6050")), open_imu=bus.imu, open_bus=bus.open)
     found = only(list(imu.check(context)))
-    assert "nobody answers on this bus" in found.text
+    assert "no device answers on this bus" in found.text
     assert found.remedy.startswith("sudo i2cdetect -y 1")
 
 
@@ -134,7 +163,8 @@ def test_a_bus_that_hangs_is_given_up_in_time(machine: Machine, clock: VirtualCl
 
 def test_an_iio_device_that_is_missing_wants_its_driver(machine: Machine, tmp_path: Path) -> None:
     context = machine(
-        Config(imu=Imu(driver="iio")), open_imu=lambda _, clock: Iio("", USUAL, root=tmp_path / "sys", clock=clock)
+        Config(imu=Imu(driver="iio")),
+        open_imu=lambda _, clock: Iio("", DEFAULT_SETTINGS, root=tmp_path / "sys", clock=clock),
     )
     found = only(list(imu.check(context)))
     assert "there is no gyro at all" in found.text
@@ -177,7 +207,7 @@ def test_a_bus_that_is_missing_comes_with_what_brings_it(
         return chip_on(I2cBus(config.imu.bus, clock=clock, dev=tmp_path / "dev"), config.imu.driver)
 
     found = only(list(imu.check(machine(Config(imu=wanted), open_imu=opened))))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert "no such bus" in found.text
     assert found.remedy.startswith(remedy)
 
@@ -195,7 +225,7 @@ def test_flipped_bits_recommend_the_software_bus(machine: Machine, clock: Virtua
         return device
 
     found = bad(list(imu.check(_with(context, opened))))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert found.remedy.startswith("echo dtoverlay=i2c-gpio,bus=3")
 
 
@@ -223,13 +253,13 @@ def test_a_noisy_wire_is_told(machine: Machine, clock: VirtualClock, write: Writ
 @pytest.mark.parametrize(
     ("motion", "level", "text"),
     [
-        (resting(gravity_mps2=9.2), Level.WARN, "gravity 9.20 m/s² (x, y, z: +0.00, +0.00, +9.20) instead of 9.81"),
-        (resting(gravity_mps2=1.0), Level.FAIL, "gravity 1.00 m/s²"),
-        (resting(turn_radps=0.3), Level.WARN, "gyro at rest 0.3"),
-        (lambda t: ((t % 1, 0.0, 0.0), (0.0, 0.0, 9.81)), Level.WARN, "moves"),
+        (resting(gravity_mps2=9.2), Severity.WARN, "gravity 9.20 m/s² (x, y, z: +0.00, +0.00, +9.20) instead of 9.81"),
+        (resting(gravity_mps2=1.0), Severity.FAIL, "gravity 1.00 m/s²"),
+        (resting(turn_radps=0.3), Severity.WARN, "gyro at rest 0.3"),
+        (lambda t: ((t % 1, 0.0, 0.0), (0.0, 0.0, 9.81)), Severity.WARN, "moves"),
     ],
 )
-def test_what_no_imu_at_rest_tells(look: Look, motion: Motion, level: Level, text: str) -> None:
+def test_what_no_imu_at_rest_tells(look: Look, motion: Motion, level: Severity, text: str) -> None:
     found = bad(look(Imu(driver="mpu6050"), "mpu6050", motion))
     assert found.level is level
     assert found.text.startswith(text)
@@ -249,7 +279,7 @@ def trembling(rate_hz: float) -> Iterator[ImuSample]:
 
 @pytest.fixture
 def plugged(tmp_path: Path) -> Iterator[Callable[..., str]]:
-    """A serial IMU that plays; answers with its port."""
+    """A serial IMU that plays. Return its port."""
     there: list[SerialImuStandIn] = []
 
     def plug(protocol: str, rate_hz: float = 200.0) -> str:
@@ -276,7 +306,7 @@ def test_a_serial_imu_at_rest_is_told(
 ) -> None:
     monkeypatch.setattr(imu, "SECONDS", 0.5)
     found = listen(Imu(driver="witmotion", port=plugged("witmotion")))
-    assert {finding.level for finding in found} == {Level.OK}
+    assert {finding.level for finding in found} == {Severity.OK}
     assert [finding.text.split()[0] for finding in found] == ["witmotion", "gravity", "gyro"]
 
 
@@ -285,7 +315,7 @@ def test_another_protocol_at_another_rate_is_recognised(
 ) -> None:
     monkeypatch.setattr(wiring, "LISTENED_S", 0.2)
     found = only(listen(Imu(driver="csv", baud=9600, port=plugged("xsens", 400.0))))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert found.text.endswith("it speaks xsens at 115200 baud")
     assert found.remedy.startswith("lcf-edge doctor --set imu.driver=xsens --set imu.baud=115200 ")
 
@@ -312,7 +342,7 @@ def test_a_missing_port_names_those_that_are_there(listen: Look, write: Write, t
 def test_an_adapter_that_holds_bytes_back_is_told(listen: Look, write: Write, tmp_path: Path) -> None:
     write("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "16\n")
     first, *_ = listen(Imu(driver="csv", port=str(tmp_path / "dev/ttyUSB0")))
-    assert (first.level, first.text) == (Level.WARN, "ttyUSB0: the adapter holds bytes back for 16 ms")
+    assert (first.level, first.text) == (Severity.WARN, "ttyUSB0: the adapter holds bytes back for 16 ms")
     assert first.remedy.startswith("echo 1 | sudo tee ")
 
 
@@ -331,10 +361,10 @@ def test_an_imu_that_the_daemon_has_is_not_opened_but_asked_for(
     context = machine(Config(imu=Imu(driver="mpu6050")), open_imu=untouched)
     found = only(list(imu.check(context)))
     assert found.text.startswith("not opened, since lcf-edge run, process 7 may have it")
-    status = DeviceStatus("imu", StatusLevel.OK, "delivers", {"rate_hz": "200.00"})
+    status = DeviceStatus("imu", Level.OK, "delivers", {"rate_hz": "200.00"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"imu": status}, "")
     found = only(list(imu.check(context)))
-    assert (found.level, found.text) == (Level.OK, "the daemon has it: delivers (rate_hz 200.00)")
+    assert (found.level, found.text) == (Severity.OK, "the daemon has it: delivers (rate_hz 200.00)")
 
 
 def test_a_daemon_without_an_imu_leaves_it_to_others(
@@ -350,7 +380,7 @@ def test_a_daemon_without_an_imu_leaves_it_to_others(
         raise PermissionError
 
     monkeypatch.setattr(Path, "iterdir", forbidden)  # root may look into every process
-    assert {finding.level for finding in imu.check(context)} == {Level.OK}
+    assert {finding.level for finding in imu.check(context)} == {Severity.OK}
 
 
 def test_a_bus_that_the_daemon_reads_is_not_searched(
@@ -368,8 +398,8 @@ def test_a_setting_that_the_chip_does_not_have_says_so(machine: Machine, clock: 
     bus = Bus(clock, "bmi270", resting())
 
     def without_firmware(config: Config, clock: Clock) -> object:
-        return chip_on(bus.open(1), config.imu.driver, firmware=Path("/no/such.fw"), clock=clock)
+        return chip_on(bus.open(1), config.imu.driver, settings=ImuSettings(firmware=Path("/no/such.fw")), clock=clock)
 
     found = only(list(imu.check(machine(Config(imu=Imu(driver="bmi270")), open_imu=without_firmware))))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert "/no/such.fw" in found.text

@@ -11,7 +11,7 @@ from lcf_edge.compilation import Compiled
 from lcf_edge.config import Camera, Config, Imu, Memory, Record
 from lcf_edge.doctor import board, clock, memory, permissions, service, software
 from lcf_edge.doctor.clock import SystemClock
-from lcf_edge.doctor.finding import Context, Finding, Level
+from lcf_edge.doctor.finding import Context, Finding, Severity
 
 Machine = Callable[..., Context]
 Write = Callable[[str, str], None]
@@ -31,7 +31,7 @@ RUNNING = {
 
 def bad(findings: list[Finding]) -> Finding:
     """The only one that is not as it should be."""
-    (found,) = [finding for finding in findings if finding.level is not Level.OK]
+    (found,) = [finding for finding in findings if finding.level is not Severity.OK]
     return found
 
 
@@ -44,10 +44,10 @@ def test_a_cool_board_is_told_with_name_and_temperature(machine: Machine, write:
     write("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "ondemand\n")
     heat, governor, disk = board.check(machine(Config(record=Record(folder="/"))))
     assert (heat.level, heat.text) == (
-        Level.OK,
+        Severity.OK,
         "Raspberry Pi 4 Model B Rev 1.4: 48 °C, nothing slows it down",
     )
-    assert (governor.level, governor.text) == (Level.OK, "governor of the processor: ondemand")
+    assert (governor.level, governor.text) == (Severity.OK, "governor of the processor: ondemand")
     assert "GiB are free in / " in f"{disk.text} "
 
 
@@ -64,14 +64,14 @@ def test_what_slows_a_board_down_is_told(machine: Machine, write: Write, files: 
     for name, content in files.items():
         write(f"sys/{name}", content)
     found = bad(list(board.check(machine(NO_FOLDER))))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert text in found.text
 
 
 def test_powersave_of_a_driver_that_steers_itself_is_good(machine: Machine, write: Write) -> None:
     write("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "powersave")
     write("sys/devices/system/cpu/cpu0/cpufreq/scaling_driver", "intel_pstate")
-    assert all(finding.level is Level.OK for finding in board.check(machine(NO_FOLDER)))
+    assert all(finding.level is Severity.OK for finding in board.check(machine(NO_FOLDER)))
 
 
 def test_a_full_disk_is_told(machine: Machine) -> None:
@@ -85,7 +85,7 @@ def test_a_full_disk_is_told(machine: Machine) -> None:
 def test_the_clock_of_this_machine_can_be_read(machine: Machine) -> None:
     kept, fine = clock.check(machine(sys=Path("/sys")))
     assert kept.text.startswith(("synchronised", "nobody keeps it right"))
-    assert fine.level is Level.OK
+    assert fine.level is Severity.OK
 
 
 @pytest.mark.parametrize(
@@ -97,9 +97,9 @@ def test_the_clock_of_this_machine_can_be_read(machine: Machine) -> None:
     ],
 )
 def test_a_clock_that_is_wrong_or_coarse_is_told(wrong: dict[str, float], text: str) -> None:
-    assert all(finding.level is Level.OK for finding in clock.judged(GOOD_CLOCK))
+    assert all(finding.level is Severity.OK for finding in clock.judged(GOOD_CLOCK))
     found = bad(list(clock.judged(replace(GOOD_CLOCK, **wrong))))  # type: ignore[arg-type]
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert found.text.startswith(text)
 
 
@@ -114,18 +114,20 @@ def meminfo(available_mib: int, swapped_mib: int = 0) -> str:
 def test_a_budget_that_is_too_small_comes_with_one_that_is_not(machine: Machine, write: Write) -> None:
     write("proc/meminfo", meminfo(900))
     found = bad(list(memory.check(machine(Config(memory=Memory(budget_mib=40))))))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert "MiB are needed" in found.text
     budget_mib = float(found.remedy.partition("budget_mib=")[2].split()[0])
-    assert all(f.level is Level.OK for f in memory.check(machine(Config(memory=Memory(budget_mib=budget_mib)))))
+    assert all(f.level is Severity.OK for f in memory.check(machine(Config(memory=Memory(budget_mib=budget_mib)))))
 
 
 @pytest.mark.parametrize(
-    ("told", "level"), [(meminfo(500), Level.OK), (meminfo(60), Level.FAIL), (meminfo(500, 200), Level.WARN)]
+    ("told", "level"), [(meminfo(500), Severity.OK), (meminfo(60), Severity.FAIL), (meminfo(500, 200), Severity.WARN)]
 )
-def test_the_budget_must_be_free_and_nothing_swapped(machine: Machine, write: Write, told: str, level: Level) -> None:
+def test_the_budget_must_be_free_and_nothing_swapped(
+    machine: Machine, write: Write, told: str, level: Severity
+) -> None:
     write("proc/meminfo", told)
-    assert [finding.level for finding in memory.check(machine())] == [Level.OK, level]
+    assert [finding.level for finding in memory.check(machine())] == [Severity.OK, level]
 
 
 # Service.
@@ -147,7 +149,7 @@ def test_systemd_is_asked_for_the_unit(machine: Machine, systemctl: Callable[[st
     answer = "\n".join(f"{key}={value}" for key, value in RUNNING.items())
     asks = f"""[ "$1 $2" = "show lcf-edge.service" ] && echo "{answer}" """
     (found,) = service.check(machine(systemctl=systemctl(asks)))
-    assert (found.level, found.text) == (Level.OK, "running, never started anew")
+    assert (found.level, found.text) == (Severity.OK, "running, never started anew")
 
 
 def test_a_systemd_that_hangs_is_left(
@@ -155,50 +157,55 @@ def test_a_systemd_that_hangs_is_left(
 ) -> None:
     monkeypatch.setattr(service, "ANSWER_S", 0.1)
     (found,) = service.check(machine(systemctl=systemctl("exec sleep 60")))
-    assert (found.level, found.text) == (Level.WARN, "systemd does not answer within 0.1 s")
+    assert (found.level, found.text) == (Severity.WARN, "systemd does not answer within 0.1 s")
 
 
 @pytest.mark.parametrize("command", ["/no/such/program", "/bin/false"])
 def test_without_systemd_it_says_so(machine: Machine, command: str) -> None:
     (found,) = service.check(machine(systemctl=(command,)))
-    assert found.level is Level.OK
+    assert found.level is Severity.OK
     assert "systemd" in found.text
 
 
 @pytest.mark.parametrize(
     ("state", "level", "text", "remedy"),
     [
-        ({"LoadState": "not-found"}, Level.OK, "not installed", ""),
-        ({"LoadState": "masked"}, Level.FAIL, "the unit is masked", "systemd-analyze verify lcf-edge.service"),
-        ({"UnitFileState": "disabled"}, Level.WARN, "does not start at boot", "sudo systemctl enable lcf-edge"),
+        ({"LoadState": "not-found"}, Severity.OK, "not installed", ""),
+        ({"LoadState": "masked"}, Severity.FAIL, "the unit is masked", "systemd-analyze verify lcf-edge.service"),
+        ({"UnitFileState": "disabled"}, Severity.WARN, "does not start at boot", "sudo systemctl enable lcf-edge"),
         (
             {"ActiveState": "inactive", "SubState": "dead"},
-            Level.WARN,
+            Severity.WARN,
             "inactive (dead)",
             "sudo systemctl start lcf-edge",
         ),
-        ({"NRestarts": "3"}, Level.WARN, "runs, after it was started anew 3 times", "journalctl -u lcf-edge"),
-        ({"ActiveState": "failed", "Result": "watchdog"}, Level.FAIL, "failed: the pipeline hung", "journalctl"),
-        ({"ActiveState": "failed", "Result": "oom-kill"}, Level.FAIL, "failed: it took more memory", "journalctl"),
+        ({"NRestarts": "3"}, Severity.WARN, "runs, after it was started anew 3 times", "journalctl -u lcf-edge"),
+        ({"ActiveState": "failed", "Result": "watchdog"}, Severity.FAIL, "failed: the pipeline hung", "journalctl"),
+        ({"ActiveState": "failed", "Result": "oom-kill"}, Severity.FAIL, "failed: it took more memory", "journalctl"),
         (
             {"ActiveState": "failed", "Result": "exit-code", "ExecMainStatus": "2"},
-            Level.FAIL,
+            Severity.FAIL,
             "failed: its configuration cannot work",
             "lcf-edge config",
         ),
-        ({"MemoryMax": str(100 * 2**20)}, Level.WARN, "MemoryMax is 100 MiB", "sudo systemctl set-property lcf-edge"),
+        (
+            {"MemoryMax": str(100 * 2**20)},
+            Severity.WARN,
+            "MemoryMax is 100 MiB",
+            "sudo systemctl set-property lcf-edge",
+        ),
     ],
 )
-def test_every_state_of_the_unit(state: dict[str, str], level: Level, text: str, remedy: str) -> None:
+def test_every_state_of_the_unit(state: dict[str, str], level: Severity, text: str, remedy: str) -> None:
     found = list(service.judged(RUNNING | state, 96.0))
-    worst = next((finding for finding in found if finding.level is not Level.OK), found[0])
+    worst = next((finding for finding in found if finding.level is not Severity.OK), found[0])
     assert worst.level is level
     assert worst.text.startswith(text)
     assert worst.remedy.startswith(remedy)
 
 
 def test_no_limit_of_memory_is_enough_for_every_budget() -> None:
-    assert all(f.level is Level.OK for f in service.judged(RUNNING | {"MemoryMax": "infinity"}, 1e6))
+    assert all(f.level is Severity.OK for f in service.judged(RUNNING | {"MemoryMax": "infinity"}, 1e6))
 
 
 # Permissions.
@@ -233,22 +240,23 @@ def test_a_group_that_does_not_exist_is_made(machine: Machine, monkeypatch: pyte
 
 def test_versions_of_this_environment_are_good(machine: Machine) -> None:
     levels = [finding.level for finding in software.check(machine()) if "uncompiled" not in finding.text]
-    assert set(levels) == {Level.OK}
+    assert set(levels) == {Severity.OK}
 
 
 def test_a_filter_that_runs_uncompiled_is_told_with_the_remedy() -> None:
-    assert software.compilation(Compiled("_compiled.abi3.so")).level is Level.OK
+    assert software.compilation(Compiled("_compiled.abi3.so")).level is Severity.OK
     found = software.compilation(Compiled(reason="it was installed without a compiler", command="sudo apt install gcc"))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert found.text == "the filter runs uncompiled, about 100 times slower: it was installed without a compiler"
     assert found.remedy == "sudo apt install gcc"
 
 
 @pytest.mark.parametrize(
-    ("version", "level"), [("0.10.1", Level.FAIL), ("1.4.9", Level.FAIL), ("1.5.0", Level.OK), ("2.0.0", Level.WARN)]
+    ("version", "level"),
+    [("0.10.1", Severity.FAIL), ("1.4.9", Severity.FAIL), ("1.5.0", Severity.OK), ("2.0.0", Severity.WARN)],
 )
-def test_a_version_out_of_range_is_told(version: str, level: Level) -> None:
+def test_a_version_out_of_range_is_told(version: str, level: Severity) -> None:
     first, *_ = software.packages({"numpy": "2.1.0", "opencv-python-headless": "4.10.0", "eclipse-zenoh": version})
     assert first.level is level
-    if level is not Level.OK:
+    if level is not Severity.OK:
         assert first.remedy == "pip install 'eclipse-zenoh>=1.5,<2'"

@@ -10,11 +10,10 @@ from pathlib import Path
 import pytest
 
 from lcf_edge.config import Config, Zenoh
-from lcf_edge.diagnostics import DeviceStatus
-from lcf_edge.diagnostics import Level as StatusLevel
+from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor import daemon, health, network
 from lcf_edge.doctor.endpoints import Endpoint, parsed
-from lcf_edge.doctor.finding import Context, Finding, Level
+from lcf_edge.doctor.finding import Context, Finding, Severity
 from lcf_edge.doctor.processes import daemon_with, holders, listening, processes
 from lcf_edge.zenoh_link.link import Link
 from lcf_edge.zenoh_link.session import open_session
@@ -24,7 +23,7 @@ PROC = Path("/proc")
 
 
 def bad(findings: list[Finding]) -> Finding:
-    (found,) = [finding for finding in findings if finding.level is not Level.OK]
+    (found,) = [finding for finding in findings if finding.level is not Severity.OK]
     return found
 
 
@@ -123,15 +122,15 @@ def test_a_daemon_of_another_user_may_have_any_device(
 def test_a_free_port_and_loopback_only_are_good(machine: Machine, endpoint: str) -> None:
     found = list(network.check(machine(Config(zenoh=Zenoh(listen=[endpoint])))))
     assert [(finding.level, finding.text) for finding in found] == [
-        (Level.OK, f"Zenoh opens as peer, listens on {endpoint}"),
-        (Level.OK, "only this computer can reach it"),
+        (Severity.OK, f"Zenoh opens as peer, listens on {endpoint}"),
+        (Severity.OK, "only this computer can reach it"),
     ]
 
 
 def test_a_port_that_is_taken_names_the_program(machine: Machine, other: tuple[int, int]) -> None:
     pid, port = other
     found = bad(list(network.check(machine(Config(zenoh=Zenoh(listen=[f"tcp/0.0.0.0:{port}"])), proc=PROC)))[:1])
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert found.text.endswith(f", process {pid}")
     assert found.remedy.startswith(f"kill {pid} ")
 
@@ -160,13 +159,13 @@ def test_a_neighbour_that_cannot_be_reached_is_told(machine: Machine, endpoint: 
 )
 def test_a_session_that_does_not_open_fails(machine: Machine, options: Zenoh, text: str) -> None:
     found = bad(list(network.check(machine(Config(zenoh=options)))))
-    assert found.level is Level.FAIL
+    assert found.level is Severity.FAIL
     assert found.text.startswith(text)
 
 
 def test_an_open_port_without_encryption_is_warned_of(machine: Machine) -> None:
     found = bad(list(network.exposed(machine(), Zenoh(listen=["tcp/127.0.0.1:7447", "tcp/0.0.0.0:7448"]))))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert found.text.startswith("tcp/0.0.0.0:7448: whoever reaches this port reads every scene")
     assert "docs/network.md" in found.text
 
@@ -178,7 +177,7 @@ def test_encryption_wants_certificates_of_both_and_the_gate(
     file = tmp_path / "zenoh.json5"
     file.write_text(f"{{transport: {{link: {{tls: {{enable_mtls: {mutual}}}}}}}}}")
     (found,) = network.exposed(machine(), Zenoh(listen=["tls/0.0.0.0:7447"], config_file=str(file)))
-    assert found.level is Level.WARN
+    assert found.level is Severity.WARN
     assert text in found.text
 
 
@@ -213,10 +212,8 @@ def running(endpoint: str) -> Iterator[Config]:
     config = Config(zenoh=Zenoh(listen=[endpoint]))
     link = Link(open_session(config.zenoh), config)
     statuses = [
-        DeviceStatus("camera", StatusLevel.OK, "delivers", {"rate_hz": "30.00"}),
-        DeviceStatus(
-            "pipeline", StatusLevel.WARN, "dark", {"gyro_bias_sigma_radps": "0.2000", "latency_p50_ms": "3.2"}
-        ),
+        DeviceStatus("camera", Level.OK, "delivers", {"rate_hz": "30.00"}),
+        DeviceStatus("pipeline", Level.WARN, "dark", {"gyro_bias_sigma_radps": "0.2000", "latency_p50_ms": "3.2"}),
     ]
     ended = threading.Event()
 
@@ -241,11 +238,11 @@ def test_a_running_daemon_is_asked(machine: Machine, running: Config) -> None:
     answers, pipeline = health.check(context)
     assert answers.text.endswith("has no scene (no scene yet)")
     assert (pipeline.level, pipeline.text) == (
-        Level.WARN,
+        Severity.WARN,
         "pipeline: dark (latency_p50_ms 3.2, gyro_bias_sigma_radps 0.2000)",
     )
     held = next(network.check(context))
-    assert (held.level, held.text) == (Level.OK, f"{running.zenoh.listen[0]}: the daemon listens")
+    assert (held.level, held.text) == (Severity.OK, f"{running.zenoh.listen[0]}: the daemon listens")
 
 
 def test_nobody_is_asked_where_nobody_listens(endpoint: str) -> None:
@@ -268,4 +265,4 @@ def test_a_daemon_that_does_not_answer_is_told(machine: Machine, process: Callab
 
 def test_no_daemon_is_no_trouble(machine: Machine) -> None:
     (found,) = health.check(machine())
-    assert (found.level, found.text) == (Level.OK, "does not run")
+    assert (found.level, found.text) == (Severity.OK, "does not run")

@@ -12,9 +12,11 @@ from lcf_edge.filter.line_circle_filter import Step
 def digest(tables: LineCircleFilter, step: Step) -> str:
     """Of all that a step leaves behind."""
     found = hashlib.sha256(step.omitted.tobytes() + repr(step.sizes).encode())
-    for table in (tables.edges, tables.normal, tables.rebel, tables.psi, tables.groups):
+    for table in (tables.edges, tables.normal, tables.rebel, tables.objects, tables.psi, tables.groups):
         for column in table.arrays.values():
             found.update(column.tobytes())
+    for column in (tables.patches.x, tables.patches.y, tables.patches.scale, tables.patches.sigma):
+        found.update(bytes(column))
     return found.hexdigest()
 
 
@@ -23,7 +25,7 @@ def main(path: Path) -> None:
     config, lens, frames = pickle.loads(path.read_bytes())
     tables = LineCircleFilter(config, lens)
     lines = ["uncompiled" if str(alpha.__file__).endswith(".py") else "compiled"]
-    lines += [digest(tables, tables.step(corners, motion)) for corners, motion in frames]
+    lines += [digest(tables, tables.step(*taken)) for taken in frames]
     sys.stdout.write("\n".join(lines))
 
 

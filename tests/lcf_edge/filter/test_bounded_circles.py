@@ -15,7 +15,7 @@ from lcf_edge.config import Config
 from lcf_edge.filter import Corners, LineCircleFilter, Motion, rebel_circles
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.lens import Lens
-from lcf_edge.records import Cause
+from lcf_edge.messages import Cause
 
 HORIZON_S = 4.0
 EXTENT_SIGMAS = 3.6

@@ -16,6 +16,8 @@ import pytest
 import lcf_edge
 from lcf_edge.config import Config, Memory
 from lcf_edge.lens import Lens
+from tests.lcf_edge.filter.boards import LENS as BOARDS_LENS
+from tests.lcf_edge.filter.boards import Board
 
 SCRIPT = Path(__file__).with_name("digests.py")
 FISHEYE = Lens(640, 480, 330.0, 330.0, 319.5, 239.5, "equidistant", (0.02, -0.01, 0.0, 0.0))
@@ -66,3 +68,13 @@ def test_compiled_and_uncompiled_the_tables_hold_the_same_bytes_after_every_fram
         pytest.skip("nothing is compiled here")
     assert len(digests) == street.frames
     assert [k for k, pair in enumerate(zip(digests, others, strict=True)) if pair[0] != pair[1]] == []
+
+
+def test_compiled_and_uncompiled_patches_hold_the_same_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "frames"
+    path.write_bytes(pickle.dumps((Config(), BOARDS_LENS, list(Board(frames=25)))))
+    (compiled, *digests), (uncompiled, *others) = run(path, pure=False), run(path, pure=True)
+    assert uncompiled == "uncompiled"
+    if compiled == "uncompiled":
+        pytest.skip("nothing is compiled here")
+    assert digests == others

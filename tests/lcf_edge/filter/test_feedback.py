@@ -13,7 +13,7 @@ from lcf_edge.filter import LineCircleFilter, line_expert
 from lcf_edge.filter.line_circle_filter import Step
 from lcf_edge.filter.settings import REFERENCE_FOCAL_PX
 from lcf_edge.filter.tables import PsiTable
-from lcf_edge.records import Shape
+from lcf_edge.messages import Shape
 
 DEFAULTS = Config()
 TR_S, TR_MAX = DEFAULTS.filter.tr_s, DEFAULTS.filter.tr_max

@@ -42,22 +42,29 @@ class Seen:
     noise_px: float = 0.4
     number: int = 300
     seed: int = 0
+    slot_turn_rad: float = 0.0  # error of the rotation since the oldest key frame alone
+    known_radps: float = 0.0  # at which the camera turns to the left, as the gyro tells
+    distortion: float = 0.0  # of a lens that is taken for a pinhole: r is seen at r·(1 + distortion·r²)
+    youngest: bool = False  # nothing was seen in the older half of the key frames
     fit: FlowFit = field(default_factory=FlowFit)
     baselines: Baselines = field(default_factory=Baselines)
+    keys: KeyFrames = field(default_factory=KeyFrames)
 
-    def measured(self) -> "Seen":
-        edges, keys = EdgeTable(self.number, 1, 1), KeyFrames()
-        edges.append(self.number)
-        self._look(edges, keys)
+    def measured(self, number: int = 0) -> "Seen":
+        """With ``number`` of the landmarks, 0: all of them."""
+        number = number or self.number
+        edges = EdgeTable(number, 1, 1)
+        edges.append(number)
+        self._look(edges, self.keys, number)
         around = Situation(Config(), PINHOLE)
-        lines.measure(self.baselines, keys, Homography(), PINHOLE, around)
+        lines.measure(self.baselines, self.keys, Homography(), PINHOLE, around)
         self.fit.prior_x = self.fit.prior_y = PRIOR_PX
-        flow_fit.measure(self.fit, edges.columns, keys, self.baselines, PINHOLE, SETTINGS)
+        flow_fit.measure(self.fit, edges.columns, self.keys, self.baselines, PINHOLE, 0.05, SETTINGS)
         return self
 
-    def _look(self, edges: EdgeTable, keys: KeyFrames) -> None:
+    def _look(self, edges: EdgeTable, keys: KeyFrames, n: int) -> None:
         """Key frames from the oldest on, and where the edges were at each."""
-        random, n = np.random.default_rng(self.seed), self.number
+        random = np.random.default_rng(self.seed)
         keys.number = KEY_FRAMES
         depth_m = random.uniform(3, 12, n)
         now = random.uniform([20, 20], [620, 460], (n, 2))
@@ -70,14 +77,26 @@ class Seen:
             heading = np.array([*(np.array(self.focus_px) / PINHOLE.fx), 1.0])
             before = rays * depth_m[:, None] + way_m * heading
             x, y, z = (before @ self.rotation(elapsed_s)).T  # turned back
+            if self.known_radps:
+                turned = np.array([0.0, self.known_radps * elapsed_s, 0.0])
+                np.asarray(keys.rotation)[slot] = cv2.Rodrigues(turned)[0]
+                x, y, z = (np.stack([x, y, z], axis=1) @ np.asarray(keys.rotation)[slot]).T
+            if slot == 0:
+                x, z = x + self.slot_turn_rad * z, z - self.slot_turn_rad * x
             then = np.stack([PINHOLE.cx + PINHOLE.fx * x / z, PINHOLE.cy + PINHOLE.fy * y / z], axis=1)
-            then += random.normal(0, self.noise_px, (n, 2)) - own_pxps * elapsed_s
+            then = self.bent(then) + random.normal(0, self.noise_px, (n, 2)) - own_pxps * elapsed_s
             edges.key_x[:n, slot], edges.key_y[:n, slot] = then.T
             keys.elapsed_s[slot] = elapsed_s
             keys.displacement[slot, 2] = way_m
-        edges.x[:n], edges.y[:n] = (now + random.normal(0, self.noise_px, (n, 2))).T
-        edges.born_key[:n] = random.integers(0, KEY_FRAMES, n)
+        edges.x[:n], edges.y[:n] = (self.bent(now) + random.normal(0, self.noise_px, (n, 2))).T
+        edges.born_key[:n] = random.integers(KEY_FRAMES // 2 if self.youngest else 0, KEY_FRAMES, n)
         edges.trust[:n], edges.matched[:n] = SETTINGS.tr_max, True
+
+    def bent(self, at: Floats) -> Floats:
+        """Where the lens shows what a pinhole would show there, px."""
+        middle = np.array([PINHOLE.cx, PINHOLE.cy])
+        r = np.hypot(*(at - middle).T)[:, None] / PINHOLE.focal
+        return np.asarray(middle + (at - middle) * (1 + self.distortion * r * r))
 
     def rotation(self, elapsed_s: float) -> Floats:
         return np.asarray(cv2.Rodrigues(elapsed_s * np.array(self.rate_radps))[0])
@@ -135,6 +154,53 @@ def test_the_rotation_since_every_key_frame_is_put_right() -> None:
     right = Seen(rate_radps).measured()
     for slot in range(KEY_FRAMES - 3):
         assert right.rotation_px(slot) < 0.2 * wrong.rotation_px(slot)
+
+
+def test_a_key_frame_keeps_what_the_flow_told_of_its_rotation() -> None:
+    seen = Seen(slot_turn_rad=0.02)
+    seen.keys.sigma_rad[0] = 0.02
+    rotation = np.asarray(seen.measured().keys.rotation)
+    assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
+    assert rotation[0] @ rotation[0].T == pytest.approx(np.eye(3), abs=1e-3)
+    assert np.abs(rotation[1:] - np.eye(3)).max() < 0.005
+    assert seen.keys.sigma_rad[0] < 0.002
+    seen.measured(14)  # too few for a fit: those that told it are gone
+    assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
+    assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
+
+
+def test_a_key_frame_that_nothing_told_of_stays_as_uncertain_as_the_gyro_leaves_it() -> None:
+    seen = Seen()
+    seen.keys.sigma_rad[:] = 0.01
+    assert lines.sigma_along(seen.measured(14).baselines, PINHOLE, 0, 500.0, 300.0) == pytest.approx(
+        0.01 * PINHOLE.focal
+    )
+    few = Seen(youngest=True)
+    few.keys.sigma_rad[:] = 0.01
+    few.measured()
+    assert few.baselines.is_fitted
+    oldest, told = (lines.sigma_along(few.baselines, PINHOLE, slot, 500.0, 300.0) for slot in (0, KEY_FRAMES - 6))
+    assert oldest >= 0.01 * PINHOLE.focal
+    assert told < 0.3 * oldest
+
+
+def turn_share(distortion: float, frames: int = 60) -> float:
+    """What is learnt while the camera turns for three seconds."""
+    fit = FlowFit()
+    for seed in range(frames):
+        Seen(known_radps=0.8, distortion=distortion, seed=seed, fit=fit).measured()
+    return float(fit.turn_share)
+
+
+def test_a_turn_is_doubted_as_much_as_the_lens_deserves() -> None:
+    shares = [turn_share(distortion) for distortion in (0.0, -0.2, -0.4)]
+    assert shares[0] < 0.015 < shares[1] < shares[2]
+    assert shares[2] < 0.2
+
+
+def test_without_a_turn_nothing_is_learnt_of_it() -> None:
+    before = FlowFit().turn_share
+    assert Seen().measured().fit.turn_share == before
 
 
 def test_what_is_right_stays_right() -> None:

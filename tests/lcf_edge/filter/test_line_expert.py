@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from lcf_edge.filter import line_expert
 from lcf_edge.filter.tables import NO_CIRCLE, CircleTable, GroupTable, PsiTable
-from lcf_edge.records import Shape
+from lcf_edge.messages import Shape
 
 TR_CR = 2.0
 

@@ -15,12 +15,14 @@ from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.patch_circles import PatchGroups
+from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable
 from lcf_edge.lens import Lens
-from lcf_edge.records import Cause
+from lcf_edge.messages import Cause
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SETTINGS = Settings(Filter(), PINHOLE)
@@ -95,6 +97,8 @@ class Scene:
             seen.verdicts,
             seen.breaking,
             seen.count,
+            Patches(0),
+            PatchGroups(0),
             seen.baselines,
             self.around,
             self.settings,
@@ -110,6 +114,26 @@ class Scene:
 @pytest.fixture
 def scene(situation: Situation) -> Scene:
     return Scene(situation())
+
+
+def standing(around: Any, x: Floats, y: Floats, vx: Floats, vy: Floats) -> CircleTable:
+    """Circles that edges make which are judged to stand in the way."""
+    scene = Scene(around)
+    seen = Seen(scene.edges, x, y, vx, vy, around)
+    np.asarray(seen.verdicts.mover)[:], np.asarray(seen.verdicts.incoming)[:] = 0, 1
+    columns, circles = scene.edges.columns, scene.circles.columns
+    none = Patches(0), PatchGroups(0)
+    rebel_circles.update(
+        scene.groups, columns, circles, seen.verdicts, seen.breaking, seen.count, *none, seen.baselines, around,
+        scene.settings, scene.ids,
+    )  # fmt: skip
+    return scene.circles
+
+
+def thing(number: int) -> tuple[Floats, Floats]:
+    """Where edges on something 60 px wide are, off to the left of O."""
+    off = np.random.default_rng(1).uniform(-30, 30, (2, number))
+    return (190 + off[0]).astype(np.float32), (180 + off[1]).astype(np.float32)
 
 
 # Grouping
@@ -173,9 +197,16 @@ def test_links_reach_through_neighbours_and_no_farther_than_they_do(situation: S
 def test_a_few_rebels_in_a_crowd_that_flows_make_and_keep_no_circle(situation: Situation) -> None:
     few = SETTINGS.rebel_support
     assert not Scene(situation()).update(CROSSING, number=few, flowing=40).trust
-    scene = Scene(situation()).update(CROSSING, number=few).update(CROSSING, number=few)
+    scene = Scene(situation())
+    for _ in range(4):
+        scene.update(CROSSING, number=few)
     (trust,) = scene.trust
     assert scene.update(CROSSING, number=few, flowing=40).trust == [trust - 1]
+
+
+def test_what_moves_has_a_quarter_of_the_edges_where_it_is(situation: Situation) -> None:
+    assert Scene(situation()).update(CROSSING, number=5, flowing=10).trust
+    assert not Scene(situation()).update(CROSSING, number=5, flowing=25).trust
 
 
 # Trust
@@ -184,6 +215,14 @@ def test_a_few_rebels_in_a_crowd_that_flows_make_and_keep_no_circle(situation: S
 def test_an_aligned_circle_gains_one_a_frame_up_to_the_most(scene: Scene) -> None:
     seen = [scene.update(CROSSING).trust[0] for _ in range(6)]
     assert seen == [min(NEWBORN + frame, TR_MAX) for frame in range(6)]
+
+
+def test_a_circle_of_few_rebels_is_told_a_frame_later_than_one_of_many(situation: Situation) -> None:
+    def told_after(number: int) -> int:
+        scene = Scene(situation())
+        return next(frame for frame in range(10) if scene.update(CROSSING, number=number).trust[0] >= TR_S)
+
+    assert [told_after(number) for number in (3, 4, 5, 8)] == [2, 2, 1, 1]
 
 
 def test_a_deviated_circle_takes_the_new_direction_and_loses_one(scene: Scene) -> None:
@@ -209,15 +248,33 @@ def test_a_circle_without_rebels_loses_one_a_frame_until_it_goes(situation: Situ
 def test_what_is_about_to_be_met_coasts_when_it_is_large(situation: Situation) -> None:
     for extent_px, keeps in ((80.0, True), (20.0, False)):
         scene = Scene(situation())
-        scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
+        scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
         scene.circles.ttc[:], scene.circles.width[:], scene.circles.height[:] = 0.2 * HORIZON_S, extent_px, extent_px
         before = scene.trust
         assert (scene.update().trust == before) == keeps
 
 
-def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation, lens: Lens) -> None:
+@pytest.mark.parametrize(("yaw_rate_radps", "keeps"), [(0.25, True), (-0.25, True), (0.4, False), (-0.4, False)])
+def test_what_is_lost_in_a_turn_does_not_coast(yaw_rate_radps: float, keeps: bool, situation: Situation) -> None:
+    """A quarter of a radian before contact is a turn."""
+    scene = Scene(situation(yaw_rate_radps=yaw_rate_radps))
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
+    scene.circles.ttc[:], scene.circles.width[:], scene.circles.height[:] = 0.2 * HORIZON_S, 80.0, 80.0
+    before = scene.trust
+    assert (scene.update().trust == before) == keeps
+
+
+def test_what_was_seen_twice_alone_does_not_coast(situation: Situation) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0))
+    scene.circles.ttc[:], scene.circles.width[:], scene.circles.height[:] = 0.2 * HORIZON_S, 80.0, 80.0
+    (before,) = scene.trust
+    assert scene.update().trust == [before - 1]
+
+
+def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation, lens: Lens) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
     circles = scene.circles
     row = int(np.flatnonzero(circles.active)[0])
 
@@ -231,6 +288,31 @@ def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situa
     assert not stays(695.0, 0.2 * HORIZON_S)
     assert not stays(680.0, HORIZON_S)
     assert stays(630.0, HORIZON_S)
+
+
+def test_what_is_about_to_be_met_and_hides_all_that_flows_stays_until_contact(situation: Situation, lens: Lens) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
+    circles = scene.circles
+    circles.ttc[:], circles.width[:], circles.height[:] = 0.2 * HORIZON_S, 80.0, 80.0
+    scene.around.flow_is_seen = False
+    (before,) = scene.trust
+    circles.unseen_s[:] = HORIZON_S  # longer than anything coasts
+    assert scene.update().trust == [before]
+    circles.x[:] = 900.0  # it ran out of the picture, as what crosses does
+    rebel_circles.end_outside(circles.columns, ImagePlane(lens), scene.around, SETTINGS)
+    assert scene.trust == [before]
+    scene.around.flow_is_seen = True
+    rebel_circles.end_outside(circles.columns, ImagePlane(lens), scene.around, SETTINGS)
+    assert scene.trust == []
+
+
+def test_what_is_unseen_ends_at_its_contact_whatever_it_hides(situation: Situation) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
+    scene.circles.ttc[:], scene.circles.width[:], scene.circles.height[:] = -0.01, 80.0, 80.0
+    scene.around.flow_is_seen = False
+    assert scene.update().trust == []
 
 
 def test_what_a_nearer_circle_hides_waits_behind_it(situation: Situation) -> None:
@@ -398,6 +480,28 @@ def test_with_the_speed_unknown_nothing_is_said_in_metres(drive: Drive, box: Lan
     assert tables.rebel.active.any()
     assert np.isnan(tables.rebel.range[tables.rebel.active]).all()
     assert np.isnan(tables.rebel.lateral[tables.rebel.active]).all()
+
+
+def test_what_is_to_stand_near_must_spread(situation: Situation) -> None:
+    """An error of rotation shifts all edges alike."""
+    around = situation()
+    x, y = thing(8)
+    rate = 0.5
+    spreads = standing(around, x, y, rate * (x - around.focus_x), rate * (y - around.focus_y))
+    assert spreads.count == 1
+    shift = np.full_like(x, rate)
+    shifted = standing(around, x, y, shift * (x.mean() - around.focus_x), shift * (y.mean() - around.focus_y))
+    assert shifted.count == 0
+
+
+def test_one_edge_that_took_the_place_of_another_tells_no_range(situation: Situation) -> None:
+    around = situation()
+    x, y = thing(8)
+    rate = np.full_like(x, 0.3)
+    alone = standing(around, x, y, rate * (x - around.focus_x), rate * (y - around.focus_y))
+    rate[np.argmin(x)] = 1.5
+    stray = standing(around, x, y, rate * (x - around.focus_x), rate * (y - around.focus_y))
+    assert stray.range[0] == pytest.approx(alone.range[0], rel=0.05)
 
 
 @pytest.mark.parametrize("aside_pxps", [-200.0, 0.0, 200.0])

@@ -80,7 +80,7 @@ class Watched:
         verdicts = Verdicts(edges.count)
         verdicts.count = edges.count
         for row in range(edges.count):
-            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines, PINHOLE)
+            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines, self.around)
             rebel_detection.judge(verdicts, row, edges.columns, baselines, self.around, SETTINGS)
         return verdicts
 
@@ -150,6 +150,17 @@ def test_nor_on_an_arc(watch: Watch, z: float, x: float, y: float, yaw_rate_radp
     verdict = watched.verdict()
     assert not verdict.mover
     assert not verdict.incoming
+
+
+def test_an_edge_is_doubted_by_a_share_of_the_way_that_a_turn_moved_it(watch: Watch) -> None:
+    watched = watch((0.5, 0.0, 4.0), yaw_rate_radps=0.4)
+    edges, baselines = watched.seen()
+    sure = watched.judged(edges, baselines, 0)
+    watched.around.turn_share = 0.1
+    doubted = watched.judged(edges, baselines, 0)
+    turned_px = math.hypot(sure.x[0] - edges.key_x[0, 0], sure.y[0] - edges.key_y[0, 0])
+    assert turned_px > 50
+    assert doubted.sigma[0] == pytest.approx(math.hypot(sure.sigma[0], 0.1 * turned_px))
 
 
 @given(st.floats(1.5, 20.0), st.floats(-2.0, 2.0))

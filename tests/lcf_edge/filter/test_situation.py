@@ -25,7 +25,7 @@ class Ahead:
         self._around = Situation(Config(), PINHOLE)
 
     def turn(self, moved: Motion) -> None:
-        turn_heading(self.heading, moved.rotation[None], moved.yaw_rate_radps, moved.dt_s)
+        turn_heading(self.heading, moved.rotation[None], moved.path_yaw_rate_radps, moved.dt_s)
 
     @property
     def focus(self) -> tuple[float, float]:

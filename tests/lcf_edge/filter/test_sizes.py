@@ -11,7 +11,7 @@ import pytest
 from lcf_edge.config import Config
 from lcf_edge.filter import LineCircleFilter
 from lcf_edge.lens import Lens
-from lcf_edge.records import Cause
+from lcf_edge.messages import Cause
 
 Drive = Callable[..., Any]
 Landmarks = Callable[..., npt.NDArray[np.float64]]

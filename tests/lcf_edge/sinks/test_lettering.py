@@ -48,5 +48,24 @@ def test_every_letter_but_the_space_has_ink_and_its_own() -> None:
     assert len(set(pictures.values())) == len(LETTERS)
 
 
+def test_plus_minus_is_a_plus_with_a_bar_under_it() -> None:
+    plus, both = lettering("+").astype(int), lettering("±").astype(int)
+    assert both.shape == plus.shape
+    rows = np.flatnonzero(both.max(axis=1) > 200)
+    assert 0 < rows.min() < rows.max() < HEIGHT_PX - 1
+    np.testing.assert_array_equal(both[rows.max()], plus[plus.sum(axis=1).argmax()])
+    np.testing.assert_array_equal(both[: rows.max() - 1].sum(axis=0), plus.sum(axis=0))
+
+
+def test_a_zero_is_empty_inside_and_narrower_than_an_o() -> None:
+    zero = lettering("0")
+    assert zero.shape == lettering("8").shape
+    rows, columns = np.nonzero(zero > 128)
+    assert np.ptp(columns) < np.ptp(np.nonzero(lettering("O") > 128)[1])
+    inside = zero[rows.min() + 2 : rows.max() - 1, (columns.min() + columns.max()) // 2]
+    assert len(inside) >= 4
+    assert inside.max() < 64  # no stroke across it
+
+
 def test_what_it_cannot_write_is_a_question_mark() -> None:
     np.testing.assert_array_equal(lettering("ψ\n"), lettering("??"))

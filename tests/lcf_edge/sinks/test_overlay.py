@@ -1,21 +1,39 @@
 """The overlay shows each thing in its colour, in its panel, and the video holds every frame."""
 
 from collections.abc import Callable
-from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
-import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from lcf_edge.errors import UsageError
-from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene, Shape, View
-from lcf_edge.sinks import SinkError
-from lcf_edge.sinks.overlay import BLUE, GREEN, GREY, RED, WHITE, YELLOW, Colour, Picture, VideoSink, draw
+from lcf_edge.messages import (
+    CIRCLE,
+    OBJECT,
+    PSI_REGION,
+    Cause,
+    Kind,
+    ObjectClass,
+    ObjectState,
+    PipelineScene,
+    Shape,
+    View,
+)
+from lcf_edge.sinks.overlay import (
+    BLUE,
+    GREEN,
+    GREY,
+    LIGHT_BLUE,
+    ORANGE,
+    RED,
+    WHITE,
+    YELLOW,
+    Colour,
+    Picture,
+    draw,
+)
 
 WIDTH, HEIGHT = 320, 240
 NO_POINTS = np.zeros((0, 2), np.float32)
@@ -33,6 +51,14 @@ def circle(**fields: Any) -> npt.NDArray[np.void]:
     return row
 
 
+def thing(**fields: Any) -> npt.NDArray[np.void]:
+    """A box from (100, 80) to (180, 140)."""
+    row = np.zeros(1, OBJECT)
+    for name, value in ({"x": 140, "y": 110, "width": 80, "height": 60, "ttc": np.inf} | fields).items():
+        row[name] = value
+    return row
+
+
 def region(shape: Shape, x: float, y: float, width: float, height: float) -> npt.NDArray[np.void]:
     return np.array([(1, shape, x, y, width, height, 5)], PSI_REGION)
 
@@ -41,12 +67,15 @@ def picture(
     *,
     circles: npt.NDArray[np.void] | None = None,
     psi: npt.NDArray[np.void] | None = None,
+    objects: npt.NDArray[np.void] | None = None,
+    circle_objects: tuple[int, ...] = (),
+    grey: int = 60,
     size: tuple[int, int] = (WIDTH, HEIGHT),
     notes: tuple[str, ...] = (),
     **view: Any,
 ) -> Picture:
     width, height = size
-    scene = Scene(
+    scene = PipelineScene(
         stamp_ns=1_000_000_000,
         seq=1,
         image_width=width,
@@ -55,6 +84,8 @@ def picture(
         circles=np.zeros(0, CIRCLE) if circles is None else circles,
         psi=np.zeros(0, PSI_REGION) if psi is None else psi,
         notes=notes,
+        objects=np.zeros(0, OBJECT) if objects is None else objects,
+        circle_objects=np.array(circle_objects, np.uint32),
     )
     parts = {
         "corners": NO_POINTS,
@@ -65,8 +96,7 @@ def picture(
         "edge_group": np.zeros(0, np.intp),
         "focus": points((WIDTH - 20.0, 20.0))[0],
     }
-    outcome: Any = SimpleNamespace(scene=scene, view=View(**{**parts, **view}))
-    return draw(np.full((height, width), 60, np.uint8), outcome)
+    return draw(np.full((height, width), grey, np.uint8), scene, View(**{**parts, **view}))
 
 
 def has(panels: Picture, x: int, y: int, colour: Colour) -> bool:
@@ -126,6 +156,8 @@ SHOWN: dict[str, tuple[Callable[[], Picture], int, int, Colour]] = {
         100,
         RED,
     ),
+    "object that passes": (lambda: picture(objects=thing(probability=0.4)), RIGHT_OFFSET + 100, 110, LIGHT_BLUE),
+    "object that will be met": (lambda: picture(objects=thing(probability=0.5)), RIGHT_OFFSET + 140, 140, ORANGE),
     "rebel edge": (lambda: picture(rebels=points((50, 60))), RIGHT_OFFSET + 47, 60, RED),
     "focus": (lambda: picture(focus=points((160, 120))[0]), RIGHT_OFFSET + 160, 120, WHITE),
 }
@@ -168,6 +200,79 @@ def test_cause_and_time_to_contact_stand_beside_the_rebel_circle() -> None:
         assert WIDTH + 40 < columns.min() < columns.max() < WIDTH + 160
 
 
+SIDE = np.s_[85:136, WIDTH + 97 : WIDTH + 104]  # the left side of the box, and what is beside it
+
+
+def test_what_is_seen_has_a_whole_box_and_what_is_not_a_dashed_and_thinner_one() -> None:
+    def blue(state: ObjectState) -> npt.NDArray[np.bool_]:
+        drawn = picture(objects=thing(state=state))[SIDE].astype(int)
+        return (np.abs(drawn - LIGHT_BLUE).max(axis=2) < 60).T  # (column, row)
+
+    seen = blue(ObjectState.SEEN)
+    assert seen.any(axis=0).all()
+    for state in (ObjectState.HIDDEN, ObjectState.COASTING):
+        unseen = blue(state)
+        starts = np.diff(unseen.any(axis=0).astype(int)) == 1
+        assert 3 <= starts.sum() <= 6
+        assert unseen.sum() < seen.sum() / 2
+
+
+@pytest.mark.parametrize("state", ObjectState)
+@pytest.mark.parametrize("grey", [0, 130, 255])
+def test_a_box_stands_out_from_any_picture(grey: int, state: ObjectState) -> None:
+    for probability in (0.0, 1.0):
+        side = picture(objects=thing(state=state, probability=probability), grey=grey)[SIDE].astype(int)
+        brightness = side.mean(axis=2)
+        assert np.ptp(brightness[brightness.max(axis=1).argmax()]) > 100  # light beside dark
+
+
+def test_class_contact_and_its_sigma_stand_beside_the_box() -> None:
+    def drawn(kind: ObjectClass, ttc: float, sigma: float) -> Picture:
+        return picture(objects=thing(class_id=kind, ttc=ttc, ttc_sigma=sigma))
+
+    known = drawn(ObjectClass.CROSSING, 2.1, 0.2)
+    for other in (
+        drawn(ObjectClass.CUTTING_IN, 2.1, 0.2),
+        drawn(ObjectClass.CROSSING, 3.4, 0.2),
+        drawn(ObjectClass.CROSSING, 2.1, 0.8),
+        drawn(ObjectClass.CROSSING, 2.1, np.nan),
+        drawn(ObjectClass.CROSSING, np.inf, np.nan),
+    ):
+        rows, columns = text_pixels(known, other).T
+        assert len(rows) > 5
+        assert 55 < rows.min() < rows.max() < 80  # above the box
+        assert WIDTH + 60 < columns.min() < columns.max() < WIDTH + 220
+
+
+def test_in_a_crowd_what_passes_gives_up_its_label_and_what_is_met_does_not() -> None:
+    place = {"x": 160, "y": 110, "width": 20, "height": 20}
+    crowd = np.concatenate([thing(**place, class_id=ObjectClass.STANDING, probability=1.0)] * 8)
+
+    def drawn(kind: ObjectClass, probability: float) -> Picture:
+        return picture(objects=np.concatenate([crowd, thing(**place, class_id=kind, probability=probability)]))
+
+    for probability, is_labelled in ((0.1, False), (0.9, True)):
+        changed = text_pixels(drawn(ObjectClass.CROSSING, probability), drawn(ObjectClass.CUTTING_IN, probability))
+        assert (len(changed) > 10) == is_labelled
+
+
+def test_a_circle_of_an_object_leaves_the_telling_to_it() -> None:
+    rebels = np.concatenate([circle(kind=Kind.REBEL, x=x, y=200, radius=10, ttc=1.0) for x in (60, 250)])
+    with_labels, own, none = (picture(circles=rebels, circle_objects=of) for of in ((0, 0), (0, 7), (7, 7)))
+    left, right = np.s_[172:187, WIDTH : WIDTH + 160], np.s_[172:187, WIDTH + 160 :]
+    assert (with_labels[left] == own[left]).all()
+    assert text_pixels(own[right], none[right]).size == 0
+    assert text_pixels(own[left], none[left]).size > 20
+    assert text_pixels(with_labels[right], own[right]).size > 20
+    assert (picture(circles=rebels) == with_labels).all(), "nobody said which circle is of which object"
+
+
+def test_the_caption_counts_objects() -> None:
+    changed = text_pixels(picture(objects=thing(x=np.nan)), picture())
+    assert len(changed) > 10
+    assert changed[:, 0].min() >= HEIGHT - 20
+
+
 @pytest.mark.parametrize(("x", "y"), [(-10, -10), (WIDTH + 5, 4), (3, HEIGHT), (WIDTH, HEIGHT)])
 def test_a_label_never_leaves_its_panel(x: float, y: float) -> None:
     """Whole inside: as many pixels of it as in the middle of the picture."""
@@ -203,13 +308,19 @@ def test_notes_stand_in_the_caption() -> None:
     y=st.floats(width=32),
     radius=st.floats(width=32),
     ttc=st.floats(width=32),
+    state=st.sampled_from(ObjectState),
     size=st.sampled_from([(1, 1), (33, 7), (64, 48), (320, 240)]),
 )
-def test_no_value_breaks_the_drawing(x: float, y: float, radius: float, ttc: float, size: tuple[int, int]) -> None:
+def test_no_value_breaks_the_drawing(
+    x: float, y: float, radius: float, ttc: float, state: ObjectState, size: tuple[int, int]
+) -> None:
     circles = np.concatenate([circle(kind=kind, x=x, y=y, radius=radius, ttc=ttc) for kind in Kind])
     panels = picture(
         circles=circles,
         psi=np.concatenate([region(shape, x, y, radius, radius) for shape in Shape]),
+        objects=thing(
+            x=x, y=y, width=radius, height=ttc, ttc=ttc, ttc_sigma=radius, probability=x, state=state, class_id=state
+        ),
         corners=points((x, y)),
         omitted=np.array([False]),
         edges=points((x, y)),
@@ -220,38 +331,3 @@ def test_no_value_breaks_the_drawing(x: float, y: float, radius: float, ttc: flo
         size=size,
     )
     assert panels.shape == (size[1], 2 * size[0], 3)
-
-
-@pytest.mark.parametrize("height", [48, 47])
-def test_the_video_holds_every_frame(tmp_path: Path, height: int) -> None:
-    path = tmp_path / "overlay.mp4"
-    with VideoSink(path, 29.97, (128, height)) as video:
-        for grey in range(0, 240, 20):
-            video.write(np.full((height, 128, 3), grey, np.uint8))
-    capture = cv2.VideoCapture(str(path))
-    assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(29.97)
-    pictures = [frame for got, frame in iter(capture.read, (False, None)) if got]
-    capture.release()
-    assert [frame.shape for frame in pictures] == [(48 - height % 2 * 2, 128, 3)] * 12
-    assert [frame.mean() for frame in pictures] == pytest.approx(range(0, 240, 20), abs=4)
-
-
-def test_a_video_under_a_wrong_name_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(UsageError, match=r"overlay\.avi: the name must end in \.mp4"):
-        VideoSink(tmp_path / "overlay.avi", 20, (64, 48))
-
-
-def test_a_video_that_cannot_be_written_is_named(tmp_path: Path) -> None:
-    with pytest.raises(SinkError, match=r"nowhere/overlay\.mp4: cannot be written \(No such file"):
-        VideoSink(tmp_path / "nowhere" / "overlay.mp4", 20, (64, 48))
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="needs /dev/full")
-def test_a_full_disk_does_not_pass_for_a_video(tmp_path: Path) -> None:
-    path = tmp_path / "overlay.mp4"
-    path.symlink_to("/dev/full")
-    with (
-        pytest.raises(SinkError, match=r"overlay\.mp4: the video cannot be written"),
-        VideoSink(path, 20, (64, 48)) as video,
-    ):
-        video.write(np.zeros((48, 64, 3), np.uint8))

@@ -8,22 +8,29 @@ import cv2
 import numpy as np
 import pytest
 
+from drivers.samples import Frame
 from lcf_edge.errors import UsageError
-from lcf_edge.records import Sizes
+from lcf_edge.messages import CIRCLE, PSI_REGION, PipelineScene, Sizes
 from lcf_edge.sinks import SinkError
 from lcf_edge.sinks.size_plot import SizePlot
+
+
+def put(plot: SizePlot, sizes: Sizes) -> None:
+    """A frame of which the sizes alone matter."""
+    scene = PipelineScene(0, 0, 0, 0, 0.0, np.empty(0, CIRCLE), np.empty(0, PSI_REGION), sizes=sizes)
+    plot.put(Frame(0, 0, np.empty((0, 0), np.uint8)), scene, lambda: pytest.fail("not looked at"))
 
 
 def filled(path: Path, frames: int) -> SizePlot:
     plot = SizePlot(path)
     for frame in range(frames):
-        plot.add(Sizes(700, 150, 500 + frame, 20 + frame % 5, 30, 12, frame % 3, 14, 4, 0))
+        put(plot, Sizes(700, 150, 500 + frame, 20 + frame % 5, 30, 12, frame % 3, 14, 4, 0))
     return plot
 
 
 def test_the_picture_shows_a_curve_in_the_colour_of_each_table(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
-    filled(path, 60).save()
+    filled(path, 60).close()
     picture = cv2.imread(str(path))
     assert picture is not None
     assert picture.shape[1] == 1400
@@ -35,8 +42,8 @@ def test_the_picture_shows_a_curve_in_the_colour_of_each_table(tmp_path: Path) -
 def test_a_single_frame_is_enough(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     plot = SizePlot(path)
-    plot.add(Sizes())
-    plot.save()
+    put(plot, Sizes())
+    plot.close()
     assert cv2.imread(str(path)) is not None
 
 
@@ -47,10 +54,10 @@ def test_refused_before_the_work_begins(tmp_path: Path) -> None:
         SizePlot(tmp_path / "nowhere" / "sizes.png")
 
 
-def test_a_picture_that_is_there_outlives_a_replay_that_fails(tmp_path: Path) -> None:
+def test_a_picture_that_is_there_outlives_a_replay_without_a_frame(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     path.write_bytes(b"kept")
-    SizePlot(path)
+    SizePlot(path).close()
     assert path.read_bytes() == b"kept"
     assert not SizePlot(tmp_path / "new.png").path.exists()
 
@@ -60,7 +67,7 @@ def test_a_full_disk_is_one_error(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     path.symlink_to("/dev/full")
     with pytest.raises(SinkError, match=r"sizes\.png: cannot be written"):
-        filled(path, 3).save()
+        filled(path, 3).close()
 
 
 def test_without_matplotlib_the_remedy_is_told(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -20,7 +20,7 @@ import zenoh
 from rosbags.typesys.store import Typestore
 
 from lcf_edge.config import Zenoh
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+from lcf_edge.messages import CIRCLE, PSI_REGION, Scene
 from lcf_edge.zenoh_link import open_session, opened_session
 
 PATIENCE_S = 20.0
@@ -180,3 +180,31 @@ def velocity(ros: Typestore) -> Callable[..., bytes]:
         return bytes(ros.serialize_cdr(message, kind, little_endian=little_endian))
 
     return write
+
+
+@contextmanager
+def _without_camera(endpoint: str, *options: str) -> Iterator[subprocess.Popen[str]]:
+    chosen = (f'zenoh.listen=["{endpoint}"]', "camera.device=/dev/no-such-camera", *options)
+    command = [sys.executable, "-m", "lcf_edge", "run", *(part for option in chosen for part in ("--set", option))]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    assert process.stderr
+    assert next(line for line in process.stderr if "ready" in line)
+    yield process
+    process.terminate()
+    _, said = process.communicate(timeout=PATIENCE_S)
+    assert process.returncode == 0
+    assert "Traceback" not in said
+
+
+@pytest.fixture
+def without_camera(endpoint: str) -> Iterator[Callable[..., subprocess.Popen[str]]]:
+    """Start a daemon that has no camera, with options, at ``endpoint``; at the end it must go in good order."""
+    with ExitStack() as daemons:
+        yield lambda *options: daemons.enter_context(_without_camera(endpoint, *options))
+
+
+@pytest.fixture
+def resident_mib() -> Callable[[subprocess.Popen[str]], float]:
+    """Resident memory of a process, MiB."""
+    page = os.sysconf("SC_PAGE_SIZE")
+    return lambda process: int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * page / 2**20

@@ -78,6 +78,20 @@ class Peer:
         """Declare a liveliness token."""
         self.kept.append(self.session.liveliness().declare_token(key))
 
+    def announce_many(self, key: str, count: int) -> None:
+        """Declare so many liveliness tokens."""
+        self.kept += [self.session.liveliness().declare_token(f"{key}/{n}") for n in range(count)]
+
+    def offer_many(self, key: str, count: int) -> None:
+        """Declare so many publishers."""
+        self.kept += [self.session.declare_publisher(f"{key}/{n}") for n in range(count)]
+
+    def matched(self, key: str) -> bool:
+        """Whether somebody seems to subscribe; what was declared before an answer is known by then."""
+        publisher = self.session.declare_publisher(key)
+        list(self.session.get("lcf/query/schema", timeout=PATIENCE_S))
+        return bool(publisher.matching_status.matching)
+
     def put_large(self, key: str, size: int, count: int) -> None:
         """Whether or not somebody subscribed, at each priority."""
         for number in range(count):

@@ -1,14 +1,12 @@
 """On loopback every local process may read, ask and tell the speed; it cannot speak for the rover."""
 
-import resource
 import subprocess
-import sys
-from collections.abc import Callable, Iterator
-from pathlib import Path
+from collections.abc import Callable
 from typing import Any
 
 import pytest
 
+from lcf_edge.cdr import decode_diagnostics
 from lcf_edge.config import Publish, Zenoh
 from lcf_edge.zenoh_link.admission import settings
 
@@ -19,22 +17,9 @@ PATIENCE_S = 20.0
 Daemon = subprocess.Popen[str]
 
 
-def resident_mib(process: Daemon) -> float:
-    return int(Path(f"/proc/{process.pid}/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
-
-
 @pytest.fixture
-def daemon(endpoint: str) -> Iterator[Daemon]:
-    """Without a camera."""
-    command = ("run", "--set", f'zenoh.listen=["{endpoint}"]', "--set", "camera.device=/dev/no-such-camera")
-    process = subprocess.Popen([sys.executable, "-m", "lcf_edge", *command], stderr=subprocess.PIPE, text=True)
-    assert process.stderr
-    assert next(line for line in process.stderr if "ready" in line)
-    yield process
-    process.terminate()
-    _, said = process.communicate(timeout=20)
-    assert process.returncode == 0
-    assert "Traceback" not in said
+def daemon(without_camera: Callable[..., Daemon]) -> Daemon:
+    return without_camera()
 
 
 @pytest.fixture
@@ -75,7 +60,30 @@ def test_a_local_process_may_read_by_wildcards(local: Callable[[], Any]) -> None
     assert reader.tokens("lcf/@alive/**") == ["lcf/@alive/rover"]
 
 
-def test_large_messages_do_not_fill_its_memory(local: Callable[[], Any], daemon: Daemon) -> None:
+def test_a_local_process_receives_messages_that_others_know(
+    without_camera: Callable[..., Daemon], start: Any, endpoint: str
+) -> None:
+    """The camera's place goes out without a camera, too, and its key is not below the prefix."""
+    without_camera("publish.transform=true")
+    reader = start(mode="client", listen__endpoints=[], connect__endpoints=[endpoint])
+    reader.subscribe("tf_static")
+    (sample,) = reader.receive("tf_static")
+    assert sample.encoding == "application/cdr;tf2_msgs/msg/TFMessage"
+
+
+def test_what_a_local_process_declares_is_not_passed_on_to_others(local: Callable[[], Any]) -> None:
+    """Or it would fill their memory as well."""
+    planner, greedy = local(), local()
+    greedy.subscribe("lcf/of-the-peer/**")
+    greedy.subscribe("lcf/speed")
+    assert greedy.get("lcf/query/schema"), "what it has declared has arrived"
+    assert planner.ask("matched", key="lcf/speed"), "the rover listens to it"
+    assert not planner.ask("matched", key="lcf/of-the-peer/1")
+
+
+def test_large_messages_do_not_fill_its_memory(
+    local: Callable[[], Any], daemon: Daemon, resident_mib: Callable[[Daemon], float]
+) -> None:
     floods = [local() for _ in range(6)]
     assert floods[0].get("lcf/query/schema")
     before_mib = resident_mib(daemon)
@@ -83,6 +91,10 @@ def test_large_messages_do_not_fill_its_memory(local: Callable[[], Any], daemon:
         flood.ask("put_large", key="lcf/speed", size=1_000_000, count=20)
     assert floods[0].get("lcf/query/schema")
     assert resident_mib(daemon) - before_mib < ALLOWED_MIB
+    floods[0].subscribe("lcf/diagnostics")
+    (sample,) = floods[0].receive("lcf/diagnostics")
+    link = next(dict(one.values) for one in decode_diagnostics(sample.payload).status if one.name == "link")
+    assert "speed too large" not in link, "they were dropped before they were put together"
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ import zenoh
 from lcf_edge import client
 from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Publish, Zenoh
-from lcf_edge.records import CIRCLE, PSI_REGION, Scene
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
 from lcf_edge.zenoh_link import open_session
 from lcf_edge.zenoh_link.link import Link
 
@@ -92,9 +92,14 @@ def test_a_rover_starts_without_the_router(endpoint: str) -> None:
 
 
 def test_a_scene_is_as_large_as_the_document_says() -> None:
-    def size(circles: int, regions: int) -> int:
+    def size(circles: int = 0, regions: int = 0, objects: int = 0) -> int:
         rows, psi = np.zeros(circles, CIRCLE), np.zeros(regions, PSI_REGION)
-        return len(encode_scene(Scene(1, 1, 640, 480, 1.0, rows, psi), Publish().frame_id))
+        scene = Scene(1, 1, 640, 480, 1.0, rows, psi, objects=np.zeros(objects, OBJECT))
+        return len(encode_scene(scene, Publish().frame_id))
 
-    (told,) = re.findall(r"A scene is (\d+) bytes and (\d+) more for each circle, (\d+) for each ψ region", DOCUMENT)
-    assert (size(0, 0), size(1, 0) - size(0, 0), size(0, 1) - size(0, 0)) == tuple(map(int, told))
+    (told,) = re.findall(
+        r"A scene has (\d+) bytes, plus (\d+) for each circle, (\d+) for each ψ region and (\d+) for each object",
+        DOCUMENT,
+    )
+    more = [size(**{table: 1}) - size() for table in ("circles", "regions", "objects")]
+    assert [size(), *more] == [*map(int, told)]

@@ -19,23 +19,33 @@ from rosbags.typesys.store import Typestore
 from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Publish
 from lcf_edge.diagnostics import DeviceStatus, Level
-from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene, Shape
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Cause, Kind, ObjectClass, ObjectState, Scene, Shape
 from lcf_edge.zenoh_link.link import Link
 
 TOPICS = {
     "/lcf/scene": "lcf_msgs/msg/Scene",
     "/lcf/diagnostics": "diagnostic_msgs/msg/DiagnosticArray",
     "/lcf/preview/compressed": "sensor_msgs/msg/CompressedImage",
+    "/lcf/annotations": "foxglove_msgs/msg/ImageAnnotations",
+    "/lcf/points": "sensor_msgs/msg/PointCloud2",
+    "/lcf/markers": "visualization_msgs/msg/MarkerArray",
+    "/lcf/detections": "vision_msgs/msg/Detection2DArray",
+    "/lcf/detections_3d": "vision_msgs/msg/Detection3DArray",
+    "/lcf/speed_limit": "geometry_msgs/msg/TwistStamped",
+    "/lcf/nav2_speed_limit": "nav2_msgs/msg/SpeedLimit",
+    "/tf_static": "tf2_msgs/msg/TFMessage",
 }
-WITHIN = {
-    "lcf_msgs/msg/Scene": ("lcf_msgs/msg/Circle", "lcf_msgs/msg/PsiRegion", "std_msgs/msg/Header"),
-    "diagnostic_msgs/msg/DiagnosticArray": (
-        "diagnostic_msgs/msg/DiagnosticStatus",
-        "diagnostic_msgs/msg/KeyValue",
-        "std_msgs/msg/Header",
-    ),
-    "sensor_msgs/msg/CompressedImage": ("std_msgs/msg/Header",),
-}
+EVERYTHING = Publish(
+    ros2=True,
+    ros2_domain=7,
+    robot="rover",
+    annotations=True,
+    points=True,
+    markers=True,
+    detections=True,
+    speed_limit=True,
+    transform=True,
+)
 STAMP_NS = 1_700_000_000_123_456_789
 
 
@@ -44,12 +54,17 @@ def a_scene() -> Scene:
     circle[0] = (5, Kind.REBEL, Cause.CROSSING, 11, 312.5, 201.0, 24.0, 1.5, 63.0, 4.0, 2.25, 0.25, -0.5, 3.25, np.nan)
     region = np.zeros(1, PSI_REGION)
     region[0] = (2, Shape.CIRCLE, 90.0, 240.0, 120.0, 120.0, 5.0)
-    return Scene(STAMP_NS, 17, 640, 480, 1.5, circle, region)
+    numbers = np.arange(24.0)
+    numbers[10] = np.nan  # the range
+    thing = np.array([(9, ObjectClass.CUTTING_IN, ObjectState.HIDDEN, 21, *numbers)], OBJECT)
+    return Scene(STAMP_NS, 17, 640, 480, 1.5, circle, region, objects=thing)
 
 
-def definition(ros: Typestore, name: str) -> str:
-    """Without those of the types within it."""
-    return ros.generate_msgdef(name, ros_version=2)[0].partition("=" * 80)[0]
+def definitions(ros: Typestore, name: str) -> dict[str, str]:
+    """Of a type, and of each type within it."""
+    first, *others = ros.generate_msgdef(name, ros_version=2)[0].split("=" * 80 + "\n")
+    parts = (other.removeprefix("MSG: ").partition("\n") for other in others)
+    return {**{kind.replace("/", "/msg/"): text for kind, _, text in parts}, name: first}
 
 
 @pytest.fixture
@@ -59,21 +74,18 @@ def node(ros: Typestore, endpoint: str, session: zenoh.Session) -> Iterator[subp
     command = (sys.executable, str(Path(__file__).with_name("ros_node.py")), port, "7")
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True) as process:
         assert process.stdin
-        names = {kind: (*WITHIN[kind], "builtin_interfaces/msg/Time", kind) for kind in TOPICS.values()}
-        topics = {
-            topic: (kind, {name: definition(ros, name) for name in names[kind]}) for topic, kind in TOPICS.items()
-        }
+        topics = {topic: (kind, definitions(ros, kind)) for topic, kind in TOPICS.items()}
         process.stdin.write(json.dumps(topics) + "\n")
         process.stdin.flush()
         yield process
         process.kill()
 
 
-def test_a_node_receives_scene_diagnostics_and_preview(
+def test_a_node_receives_all_that_is_published(
     node: subprocess.Popen[str], session: zenoh.Session, until_matched: Callable[[zenoh.Session, str], None]
 ) -> None:
     _, jpeg = cv2.imencode(".jpg", np.zeros((48, 64), np.uint8))
-    link = Link(session, Config(publish=Publish(ros2=True, ros2_domain=7, robot="rover")))
+    link = Link(session, Config(publish=EVERYTHING))
     assert node.stdout
     keys = json.loads(node.stdout.readline())  # with the hashes that it finds itself
     topics = json.loads(node.stdout.readline())
@@ -94,11 +106,29 @@ def test_a_node_receives_scene_diagnostics_and_preview(
     assert (circle["id"], circle["cause"], circle["support"], circle["ttc"]) == (5, Cause.CROSSING, 11, 2.25)
     assert circle["lateral"] == "nan"
     assert scene["psi"][0]["width"] == 120.0
+    (thing,) = scene["objects"]
+    assert (thing["id"], thing["class_id"], thing["state"]) == (9, ObjectClass.CUTTING_IN, ObjectState.HIDDEN)
+    assert (thing["ttc"], thing["ttc_sigma"], thing["range"], thing["unseen"]) == (4.0, 5.0, "nan", 23.0)
     (status,) = received["/lcf/diagnostics"]["status"]
     assert (status["name"], status["message"]) == ("camera", "dark")
     assert status["values"] == [{"key": "rate_hz", "value": "29.9"}]
     preview = received["/lcf/preview/compressed"]
     assert (preview["format"], preview["data"]) == ("jpeg", {"bytes": jpeg.size})
+    texts = [text["text"] for text in received["/lcf/annotations"]["texts"]]
+    assert texts == ["crossing 2.2 s", "cutting in 4.0 ±5.0 s"]
+    assert received["/lcf/annotations"]["timestamp"] == stamp
+    cloud = received["/lcf/points"]
+    assert (cloud["header"], cloud["point_step"]) == ({"stamp": stamp, "frame_id": "camera"}, 16)
+    assert cloud["data"] == {"bytes": 16 * cloud["width"]}
+    assert [marker["action"] for marker in received["/lcf/markers"]["markers"]] == [3]  # its range is not known
+    (detection,) = received["/lcf/detections"]["detections"]
+    assert (detection["id"], detection["results"][0]["hypothesis"]["class_id"]) == ("9", "cutting_in")
+    assert received["/lcf/detections_3d"]["detections"] == []
+    assert received["/lcf/speed_limit"]["twist"]["linear"]["x"] == 0.0
+    assert received["/lcf/nav2_speed_limit"]["speed_limit"] == 0.001
+    (transform,) = received["/tf_static"]["transforms"]
+    assert (transform["header"]["frame_id"], transform["child_frame_id"]) == ("base_link", "camera")
+    assert transform["transform"]["translation"] == {"x": 0.0, "y": 0.0, "z": 0.3}
 
 
 @dataclass
@@ -130,6 +160,15 @@ class PsiRegion(IdlStruct, typename="lcf_msgs/msg/PsiRegion"):
 
 
 @dataclass
+class Thing(IdlStruct, typename="lcf_msgs/msg/Object"):
+    id: uint32 = 0
+    class_id: uint8 = 0
+    state: uint8 = 0
+    support: uint16 = 0
+    numbers: array[float32, 24] = field(default_factory=list)  # x to unseen
+
+
+@dataclass
 class SceneMessage(IdlStruct, typename="lcf_msgs/msg/Scene"):
     header: Header = field(default_factory=Header)
     frame_seq: uint64 = 0
@@ -138,6 +177,7 @@ class SceneMessage(IdlStruct, typename="lcf_msgs/msg/Scene"):
     vehicle_speed: float32 = 0.0
     circles: sequence[Circle] = field(default_factory=list)
     psi: sequence[PsiRegion] = field(default_factory=list)
+    objects: sequence[Thing] = field(default_factory=list)
 
 
 def test_another_cdr_library_reads_a_scene() -> None:
@@ -151,6 +191,9 @@ def test_another_cdr_library_reads_a_scene() -> None:
     (region,) = message.psi
     assert (region.id, region.shape) == (2, Shape.CIRCLE)
     np.testing.assert_array_equal(region.numbers, [90.0, 240.0, 120.0, 120.0, 5.0])
+    (thing,) = message.objects
+    assert (thing.id, thing.class_id, thing.state, thing.support) == (9, 5, 1, 21)
+    np.testing.assert_array_equal(thing.numbers, scene.objects[0].tolist()[4:])
 
 
 def test_it_writes_the_same_bytes() -> None:

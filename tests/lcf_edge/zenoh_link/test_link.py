@@ -16,7 +16,7 @@ from rosbags.typesys.store import Typestore
 from lcf_edge.config import Config, Publish, Vehicle, load
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import PublishError
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import ATTACHMENT
 from lcf_edge.zenoh_link.link import Link
 
@@ -173,9 +173,28 @@ def test_the_message_definitions_are_told(link: Link, peer: Any, ros: Typestore)
     assert link
     (answer,) = peer.get("lcf/query/schema")
     types = get_types_from_msg(answer.payload.decode(), "lcf_msgs/msg/Scene")
-    ours = {name: types[name] for name in ("lcf_msgs/msg/Scene", "lcf_msgs/msg/Circle", "lcf_msgs/msg/PsiRegion")}
+    ours = {
+        name: types[name]
+        for name in ("lcf_msgs/msg/Scene", "lcf_msgs/msg/Circle", "lcf_msgs/msg/PsiRegion", "lcf_msgs/msg/Object")
+    }
     assert ours == {name: ros.fielddefs[name] for name in ours}
     assert {"std_msgs/msg/Header", "builtin_interfaces/msg/Time"} <= set(types)
+
+
+def test_a_query_for_what_there_is_not_is_counted(link: Link, peer: Any) -> None:
+    assert peer.get("lcf/query/nothing") == []
+    assert link.counts["query unknown"] == 1
+
+
+def test_who_is_connected_and_how_much_came_is_known(link: Link, peer: Any) -> None:
+    assert peer.get("lcf/query/schema")
+    assert link.sessions == 1
+    link.charge(0.0)
+    before = link.counts["bytes received"]
+    peer.ask("put_blindly", key="lcf/nothing", payload=bytes(20_000).hex())
+    assert peer.get("lcf/query/schema")
+    link.charge(0.0)
+    assert link.counts["bytes received"] > before + 20_000
 
 
 def test_one_query_asks_for_everything(link: Link, peer: Any, scene: Callable[..., Scene]) -> None:

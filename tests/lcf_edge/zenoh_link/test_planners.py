@@ -6,6 +6,7 @@ import subprocess
 import sys
 import tomllib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +17,7 @@ import zenoh
 
 from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Publish, Zenoh
-from lcf_edge.records import CIRCLE, PSI_REGION, Cause, Kind, Scene
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, ObjectClass, Scene
 from lcf_edge.zenoh_link import ScenePublisher
 
 DOCUMENT = (Path(__file__).parents[3] / "docs/planners.md").read_text(encoding="utf-8")
@@ -37,6 +38,9 @@ int main(int, char** files) {
                   s.image_height, s.vehicle_speed);
       for (const auto& c : s.circles) std::printf(" %u %u %u %g %g", c.id, c.kind, c.support, c.x, c.lateral);
       for (const auto& p : s.psi) std::printf(" %u %u %g %g", p.id, p.shape, p.x, p.trust);
+      for (const auto& o : s.objects)
+        std::printf(" %u %u %u %u %g %g %g %g %g %g", o.id, o.class_id, o.state, o.support, o.height, o.ttc,
+                    o.range_sigma, o.closest, o.probability, o.unseen);
       std::printf("\\n");
     } catch (const std::exception&) { std::printf("no scene\\n"); }
   }
@@ -51,10 +55,21 @@ fn main() {
         print!("{} {} {} {} {}", s.stamp_ns, s.frame_seq, s.image_width, s.image_height, s.vehicle_speed);
         for c in &s.circles { print!(" {} {} {} {} {}", c.id, c.kind, c.support, c.image[0], c.world[4]); }
         for p in &s.psi { print!(" {} {} {} {}", p.id, p.shape, p.image[0], p.image[4]); }
+        for o in &s.objects {
+            print!(" {} {} {} {} {} {}", o.id, o.class_id, o.state, o.support, o.image[3], o.ttc[0]);
+            print!(" {} {} {} {}", o.range[1], o.closest[0], o.probability, o.unseen);
+        }
         println!();
     }
 }
 """
+
+
+SHOWN = ["id", "class_id", "state", "support", "height", "ttc", "range_sigma", "closest", "probability", "unseen"]
+
+
+def printed(words: list[Any]) -> str:
+    return " ".join(f"{word:g}" if isinstance(word, float) else str(word) for word in words)
 
 
 def blocks(language: str) -> list[str]:
@@ -73,21 +88,29 @@ def payloads(tmp_path: Path) -> tuple[list[str], list[str]]:
     """Files, and what is said of them."""
     files, said = [], []
     for frame_id in ("", "c", "camera", "camera_link"):
-        for circles, psi in ((0, 0), (1, 0), (0, 1), (3, 2)):
-            scene = Scene(
-                1_700_000_000_123_456_789, 2**40, 640, 480, 1.5, filled(CIRCLE, circles), filled(PSI_REGION, psi)
-            )
-            path = tmp_path / f"scene-{frame_id}-{circles}-{psi}"
+        for circles, psi, objects in ((0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1), (3, 2, 2)):
+            tables = filled(CIRCLE, circles), filled(PSI_REGION, psi)
+            things = filled(OBJECT, objects)
+            scene = Scene(1_700_000_000_123_456_789, 2**40, 640, 480, 1.5, *tables, objects=things)
+            path = tmp_path / f"scene-{frame_id}-{circles}-{psi}-{objects}"
             path.write_bytes(encode_scene(scene, frame_id))
             words = [scene.stamp_ns, scene.seq, 640, 480, 1.5]
             for row in scene.circles[["id", "kind", "support", "x", "lateral"]].tolist():
                 words += row
             for row in scene.psi[["id", "shape", "x", "trust"]].tolist():
                 words += row
+            before = len(words)
+            for row in scene.objects[SHOWN].tolist():
+                words += row
             files.append(str(path))
-            said.append(" ".join(f"{word:g}" if isinstance(word, float) else str(word) for word in words))
+            said.append(printed(words))
     whole = Path(files[-1]).read_bytes()
-    for length in (0, 3, 4, 20, 60, len(whole) - 1):
+    before_objects = whole[: -4 - 2 * OBJECT.itemsize]
+    old = tmp_path / "before-objects"
+    old.write_bytes(before_objects)
+    files.append(str(old))
+    said.append(printed(words[:before]))
+    for length in (0, 3, 4, 20, 60, len(before_objects) - 1, len(before_objects) + 1, len(whole) - 1):
         path = tmp_path / f"cut-{length}"
         path.write_bytes(whole[:length])
         files.append(str(path))
@@ -117,23 +140,48 @@ def test_a_program_decodes_scenes(
     assert done.stdout.splitlines() == said
 
 
-def test_the_python_program_tells_what_is_met_first(
+def test_the_python_program_slows_down_for_what_will_probably_be_met(
     session: zenoh.Session, endpoint: str, scene: Callable[..., Scene]
 ) -> None:
     code = blocks("python")[0].replace("tcp/127.0.0.1:7447", endpoint)
-    sent = scene(41)
-    sent.circles["kind"] = Kind.NORMAL, Kind.REBEL, Kind.REBEL
-    sent.circles["cause"] = Cause.NONE, Cause.CROSSING, Cause.INCOMING
-    sent.circles["ttc"], sent.circles["bearing"] = (0.5, 3.0, 1.25), (0.0, 0.1, -0.25)
+    objects = np.zeros(3, OBJECT)
+    objects["class_id"] = ObjectClass.STANDING, ObjectClass.CROSSING, ObjectClass.ONCOMING
+    objects["ttc"], objects["ttc_sigma"] = (0.5, 2.25, 3.0), (0.1, 0.125, np.nan)
+    objects["bearing"], objects["probability"] = (0.0, -0.25, 0.5), (0.25, 0.75, 0.5)
     publisher = ScenePublisher(session, Publish())
     with subprocess.Popen((sys.executable, "-u", "-c", code), stdout=subprocess.PIPE, text=True) as planner:
         try:
             assert publisher.wait_for_subscriber(PATIENCE_S)
-            publisher.put(sent)
+            publisher.put(replace(scene(41), objects=objects))
             assert planner.stdout
-            assert planner.stdout.readline() == "41: INCOMING at -0.25 rad, contact in 1.2 s\n"
+            assert [planner.stdout.readline() for _ in range(3)] == [
+                "41: 0.75 m/s\n",
+                "  crossing at -0.25 rad, contact in 2.2 ± 0.1 s\n",
+                "  oncoming at 0.50 rad, contact in 3.0 ± nan s\n",
+            ]
         finally:
             planner.kill()
+
+
+@pytest.fixture(scope="module")
+def rule() -> Any:
+    """The rule of the Python program, without its loop."""
+    names: dict[str, Any] = {}
+    exec(blocks("python")[0].partition("\nfor scene in")[0], names)
+    return names
+
+
+def test_it_cruises_where_nothing_is_met(rule: Any) -> None:
+    objects = np.zeros(2, OBJECT)
+    objects["probability"], objects["ttc"] = (0.0, 0.4), (1.0, np.inf)
+    assert rule["wanted_mps"](objects) == rule["wanted_mps"](objects[:0]) == rule["CRUISE_MPS"]
+
+
+def test_it_stops_for_what_is_met_at_a_time_that_is_unknown_or_over(rule: Any) -> None:
+    for ttc in (np.nan, 0.0, -1.0):
+        objects = np.zeros(1, OBJECT)
+        objects["probability"], objects["ttc"] = 0.9, ttc
+        assert rule["wanted_mps"](objects) == 0
 
 
 def test_what_is_written_into_the_configuration_is_understood() -> None:

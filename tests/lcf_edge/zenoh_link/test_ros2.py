@@ -14,7 +14,7 @@ from rosbags.typesys.store import Typestore
 from lcf_edge.config import Config, Publish, Zenoh
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import PublishError
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import ATTACHMENT, ScenePublisher, opened_session
 from lcf_edge.zenoh_link.link import Link
 from lcf_edge.zenoh_link.ros2 import TYPE_HASHES, dds_type

@@ -14,7 +14,7 @@ import zenoh
 from lcf_edge.cdr import decode_scene
 from lcf_edge.config import Publish, Zenoh
 from lcf_edge.errors import PublishError
-from lcf_edge.records import Scene
+from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import ATTACHMENT, ScenePublisher, opened_session
 
 PATIENCE_S = 20.0
@@ -25,7 +25,7 @@ NewScene = Callable[..., Scene]
 
 def test_a_second_process_receives_every_scene_whole(session: zenoh.Session, endpoint: str, scene: NewScene) -> None:
     subscriber = subprocess.Popen(
-        [sys.executable, "-m", "lcf_edge.commands.demo_subscriber", endpoint, "robot7/scene"],
+        [sys.executable, "-m", "lcf_edge.cli.demo_subscriber", endpoint, "robot7/scene"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,
@@ -46,7 +46,7 @@ def test_a_second_process_receives_every_scene_whole(session: zenoh.Session, end
 def test_the_subscriber_ends_with_its_input(session: zenoh.Session, endpoint: str) -> None:
     publisher = ScenePublisher(session, Publish())
     subscriber = subprocess.Popen(
-        [sys.executable, "-m", "lcf_edge.commands.demo_subscriber", endpoint, "lcf/scene"],
+        [sys.executable, "-m", "lcf_edge.cli.demo_subscriber", endpoint, "lcf/scene"],
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,
         text=True,

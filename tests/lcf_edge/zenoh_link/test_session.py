@@ -18,6 +18,7 @@ from lcf_edge.zenoh_link import close_session, open_session, opened_session
     [
         (Zenoh(listen=["nonsense"]), "nonsense"),
         (Zenoh(listen=["bogus/1"]), "bogus/1: Unicast not supported for bogus protocol"),
+        (Zenoh(listen=["tcp/127.0.0.1:0#="]), "zenoh.listen: tcp/127.0.0.1:0: what follows ? or # cannot be read"),
         (Zenoh(listen=["tcp/127.0.0.1:99999"]), "tcp/127.0.0.1:99999: invalid port"),
         (
             Zenoh(mode="client", connect=["tcp/127.0.0.1:9"], listen=[]),

@@ -11,9 +11,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Config, Publish, Vehicle, Zenoh
-from lcf_edge.zenoh_link import LARGEST_MESSAGE_BYTES, opened_session
+from lcf_edge.zenoh_link import MAX_MESSAGE_BYTES, opened_session
 from lcf_edge.zenoh_link.link import Link
-from lcf_edge.zenoh_link.speed_input import CAPACITY, LARGEST_BYTES, REFUSALS, SpeedInput
+from lcf_edge.zenoh_link.speed_input import CAPACITY, MAX_BYTES, REFUSALS, SpeedInput
 
 ODOMETRY = "nav_msgs/msg/Odometry"
 TWIST = "geometry_msgs/msg/TwistStamped"
@@ -129,10 +129,10 @@ def test_a_message_of_any_other_length_is_refused(heard: Any, velocity: Velocity
     assert {"taken": 1} not in refused, "not even where an Odometry is cut to the length of a TwistStamped"
     assert heard(payload + b"\0") == {"malformed": 1}
     assert heard(payload + payload) == {"malformed": 1}
-    assert heard(payload + bytes(LARGEST_BYTES)) == {"too large": 1}
+    assert heard(payload + bytes(MAX_BYTES)) == {"too large": 1}
 
 
-@given(st.binary(max_size=LARGEST_BYTES + 10), st.sampled_from([b"", b"\0\1\0\0", b"\0\0\0\0"]))
+@given(st.binary(max_size=MAX_BYTES + 10), st.sampled_from([b"", b"\0\1\0\0", b"\0\0\0\0"]))
 def test_any_bytes_are_one_count(speeds: Any, body: bytes, start: bytes) -> None:
     session, taken = speeds
     before = taken.counts.total()
@@ -165,8 +165,8 @@ def test_the_newest_wait_and_the_others_are_counted(speeds: Any, velocity: Veloc
 
 
 def test_megabytes_are_a_count_and_what_comes_after_them_is_heard(link: Link, peer: Any, velocity: Velocity) -> None:
-    peer.put("lcf/speed", bytes(LARGEST_MESSAGE_BYTES // 2), count=3)
-    peer.put("lcf/speed", bytes(4 * LARGEST_MESSAGE_BYTES), count=3)  # not even put together
+    peer.put("lcf/speed", bytes(MAX_MESSAGE_BYTES // 2), count=3)
+    peer.put("lcf/speed", bytes(4 * MAX_MESSAGE_BYTES), count=3)  # not even put together
     peer.put("lcf/speed", velocity())
     peer.get("lcf/query/config")
     assert len(link.take_speeds()) == 1

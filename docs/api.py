@@ -1,0 +1,123 @@
+"""Write docs/api.md from the docstrings of what is public: ``python docs/api.py``."""
+
+import ast
+import inspect
+import re
+from collections.abc import Callable, Iterator
+from enum import IntEnum
+from itertools import pairwise
+from pathlib import Path
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from lcf_edge import client, errors, messages
+from lcf_edge.sinks import sink
+
+PAGE = Path(__file__).parent / "api.md"
+HEAD = """# API reference
+
+Written by `python docs/api.py` from the docstrings; [planners.md](planners.md) and
+[developing.md](developing.md#a-new-sink) show how it is used.
+"""
+RECORDS = ("CIRCLE", "PSI_REGION", "OBJECT")
+ENUMERATIONS = ("Kind", "Cause", "ObjectClass", "ObjectState", "Shape")
+PARTS: tuple[tuple[ModuleType, tuple[str, ...]], ...] = (
+    (client, ("scenes", "Scenes")),
+    (messages, ("Scene", *RECORDS, *ENUMERATIONS, "PipelineScene", "Sizes", "Timing", "View")),
+    (sink, ("Sink",)),
+    (errors, ("LcfError", "UsageError", "ConfigError", "RecordingError", "PublishError")),
+)
+"""Modules and the names of each that others may build on."""
+
+
+def page() -> str:
+    """Return the whole page."""
+    parts = [HEAD]
+    for module, names in PARTS:
+        parts.append(f"## {module.__name__}\n\n{_text(module.__doc__)}\n")
+        parts += [f"{_entry(module, name)}\n" for name in names]
+    return "\n".join(parts)
+
+
+def _entry(module: ModuleType, name: str) -> str:
+    thing = getattr(module, name)
+    if isinstance(thing, np.dtype):
+        return "\n".join(
+            [f"### {name}", "", _text(_doc_of_constant(module, name)), "", *_fields_of_dtype(module, name)]
+        )
+    lines = [f"### {name}", ""]
+    if not isinstance(thing, type):
+        return "\n".join([*lines, f"`{_signature(name, thing)}`", "", _text(thing.__doc__)])
+    base = thing.__bases__[0]
+    lines.append(f"`{name}({base.__name__})`: {_text(thing.__doc__)}" if base is not object else _text(thing.__doc__))
+    if fields := list(_fields_of_class(thing)):
+        lines += ["", *fields]
+    for method, function in vars(thing).items():
+        if inspect.isfunction(function) and not method.startswith("_"):
+            lines += ["", f"`{_signature(method, function)}`: {_text(function.__doc__)}"]
+    return "\n".join(lines)
+
+
+def _signature(name: str, function: Callable[..., Any]) -> str:
+    signature = inspect.signature(function, eval_str=True)
+    others = [each for each in signature.parameters.values() if each.name != "self"]
+    return re.sub(r"\b[a-z_.]+\.(?=[A-Z])", "", f"{name}{signature.replace(parameters=others)}")
+
+
+def _fields_of_class(thing: type) -> Iterator[str]:
+    """Rows of a table: members of an enumeration, or annotated fields whose comment says what they are."""
+    source = inspect.getsource(thing)
+    (definition,) = ast.parse(source).body
+    assert isinstance(definition, ast.ClassDef)
+    rows = []
+    for node in definition.body:
+        comment = _comment(source.splitlines()[node.lineno - 1])
+        if isinstance(node, ast.Assign) and issubclass(thing, IntEnum):
+            rows.append(f"| `{ast.unparse(node.targets[0])}` | {ast.unparse(node.value)} | {comment} |")
+        elif isinstance(node, ast.AnnAssign):
+            rows.append(
+                f"| `{ast.unparse(node.target)}` | `{ast.unparse(node.annotation)}` | {comment} |".replace("npt.", "")
+            )
+    if rows:
+        yield from (
+            "| name | value |  |" if issubclass(thing, IntEnum) else "| name | type |  |",
+            "|---|---|---|",
+            *rows,
+        )
+
+
+def _fields_of_dtype(module: ModuleType, name: str) -> Iterator[str]:
+    """Rows of a table: name, type, and the comment behind it, where there is one."""
+    dtype: np.dtype[Any] = getattr(module, name)
+    source = inspect.getsource(module)
+    block = source[source.index(f"\n{name} = ") :].partition("\n)\n")[0]
+    comments = {found[1]: _comment(found[0]) for found in re.finditer(r'^ *\("(\w+)",.*$', block, re.M)}
+    yield from ("| field | type | at byte |  |", "|---|---|--:|---|")
+    for field in dtype.names or ():
+        kind, at = dtype.fields[field][:2]  # type: ignore[index]
+        yield f"| `{field}` | {kind.name} | {at} | {comments.get(field, '')} |"
+
+
+def _comment(line: str) -> str:
+    return line.partition("  # ")[2].strip().replace("|", "\\|")
+
+
+def _doc_of_constant(module: ModuleType, name: str) -> str:
+    """The text right behind a module's constant."""
+    body = ast.parse(inspect.getsource(module)).body
+    for node, after in pairwise(body):
+        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == name:
+            assert isinstance(after, ast.Expr)
+            assert isinstance(after.value, ast.Constant)
+            return str(after.value.value)
+    raise KeyError(name)
+
+
+def _text(docstring: str | None) -> str:
+    return inspect.cleandoc(docstring or "").replace("``", "`")
+
+
+if __name__ == "__main__":
+    PAGE.write_text(page(), encoding="utf-8")

@@ -1,0 +1,374 @@
+"""The process that runs libcamera for the driver ``libcamera``: ``python3 -I libcamera_process.py FD REQUEST``.
+
+It runs under the system's own Python, for which Debian builds libcamera's binding, and needs nothing else. ``FD`` is
+a socket of whole messages (``SOCK_SEQPACKET``), ``REQUEST`` the settings as JSON. Messages out, as JSON, each with its
+``type``:
+
+- ``cameras``: what there is, where the request has no device; then the process ends.
+- ``ready``: what was granted; with it go the descriptors of the buffers, which the reader maps.
+- ``picture``: a buffer is filled.
+- ``failure``: ``kind`` and ``text`` for the user; then the process ends.
+
+In come the numbers of buffers that were read, a byte each. The process ends when the socket is closed.
+Source: libcamera's Python binding 0.4 (Debian 13) and its control and property definitions.
+"""
+
+import array
+import errno
+import json
+import math
+import os
+import re
+import selectors
+import signal
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+BUFFERS = 4  # one being filled, one being read, two for the time in between
+PIXEL_FORMATS = {  # libcamera's names, which are the bytes' order in a word: this project's, which are V4L2's
+    "R8": "GREY",
+    "NV12": "NV12",
+    "NV21": "NV21",
+    "YUV420": "YU12",
+    "YVU420": "YV12",
+    "YUYV": "YUYV",
+    "UYVY": "UYVY",
+    "XRGB8888": "XR24",
+    "XBGR8888": "XB24",
+    "BGR888": "RGB3",
+    "RGB888": "BGR3",
+    "MJPEG": "MJPG",
+}
+_RAW = re.compile(r"(?:S[RGB]{4}|R)(\d+)")  # of a sensor; its bits
+_MAX_SIZES = 12
+_MAX_SHARE = 0.95  # of the widest field of view is as good
+_MANUAL, _AUTOMATIC, _OFF = 1, 0, 0
+
+
+class Refused(Exception):  # noqa: N818  # it is no fault of the program
+    """The request cannot be met."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        super().__init__(text)
+        self.kind = kind
+
+
+def serve(libcamera: Any, connection: socket.socket, request: dict[str, Any]) -> None:
+    """Hand pictures over until the other end closes. Raises ``Refused``."""
+    manager = libcamera.CameraManager.singleton()
+    if not request["device"]:
+        _send(connection, "cameras", cameras=[{"name": _model(one), "id": one.id} for one in manager.cameras])
+        return
+    camera = _find(manager, request["device"])
+    with _refusing("lost", "fails in libcamera"):
+        _acquire(camera)
+        try:
+            _run(libcamera, manager, camera, connection, request)
+        finally:
+            camera.release()
+
+
+def _find(manager: Any, device: str) -> Any:
+    """The camera that has this name or id, whole or in part, or whose pipeline has this node in /dev."""
+    cameras = list(manager.cameras)
+    if not cameras:
+        raise why_none(sorted(Path("/dev").glob("media*")))
+    wanted = device.casefold()
+    if device.startswith("/dev/"):
+        found = [camera for camera in cameras if _node(device) in _property(camera, "SystemDevices", ())]
+    else:
+        names = [(camera, (camera.id.casefold(), _model(camera).casefold())) for camera in cameras]
+        found = [camera for camera, own in names if wanted in own]
+        found = found or [camera for camera, own in names if any(wanted in name for name in own)]
+    listed = ", ".join(f"{_model(camera)} ({camera.id})" for camera in cameras)
+    if not found:
+        raise Refused("missing", f"no camera of libcamera's; found: {listed}; set camera.device to one of these names")
+    if len(found) > 1:
+        raise Refused("wrong", f"more than one camera is called so; take the id from: {listed}")
+    return found[0]
+
+
+def why_none(media: list[Path]) -> Refused:
+    """What keeps libcamera from finding a camera. Whoever runs one has its media device locked."""
+    for path in media:
+        try:
+            with path.open("r+b", buffering=0) as device:
+                os.lockf(device.fileno(), os.F_TEST, 0)
+        except PermissionError as error:
+            if error.filename is not None:  # of opening it
+                return Refused("forbidden", f"no permission for {path}; add this user to the group video, log in again")
+            return Refused("busy", "in use by another program; close that")
+        except OSError as error:
+            if error.errno == errno.EAGAIN:
+                return Refused("busy", "in use by another program; close that")
+    return Refused("missing", "libcamera finds no camera; check that the ribbon cable sits straight, then reboot")
+
+
+def _acquire(camera: Any) -> None:
+    try:
+        camera.acquire()
+    except (RuntimeError, OSError) as error:
+        raise Refused("busy", f"in use by another program ({error}); close that") from error
+
+
+def _run(libcamera: Any, manager: Any, camera: Any, connection: socket.socket, request: dict[str, Any]) -> None:
+    stream, granted = _configure(libcamera, camera, request)
+    controls = _controls(camera, request)
+    allocator = libcamera.FrameBufferAllocator(camera)
+    allocator.allocate(stream)
+    buffers = allocator.buffers(stream)
+    requests = []
+    for index, buffer in enumerate(buffers):
+        requests.append(camera.create_request(index))
+        requests[-1].add_buffer(stream, buffer)
+    planes = [buffer.planes[0] for buffer in buffers]  # the luminance, or all there is
+    granted["buffers"] = [[plane.offset, plane.length] for plane in planes]
+    _send(connection, "ready", [plane.fd for plane in planes], **granted)
+    camera.start(controls)
+    try:
+        for one in requests:
+            camera.queue_request(one)
+        _hand_over(libcamera, manager, camera, connection, stream, requests)
+    finally:
+        camera.stop()
+
+
+def _hand_over(
+    libcamera: Any, manager: Any, camera: Any, connection: socket.socket, stream: Any, requests: list[Any]
+) -> None:
+    with selectors.DefaultSelector() as selector:
+        selector.register(connection, selectors.EVENT_READ)
+        selector.register(manager.event_fd, selectors.EVENT_READ)
+        while True:
+            for key, _ in selector.select():
+                if key.fileobj is connection:
+                    read = connection.recv(64)
+                    if not read:
+                        return
+                    for index in read:
+                        requests[index].reuse()
+                        camera.queue_request(requests[index])
+                else:
+                    for done in manager.get_ready_requests():
+                        _pass_on(libcamera, connection, stream, done)
+
+
+def _pass_on(libcamera: Any, connection: socket.socket, stream: Any, done: Any) -> None:
+    if done.status != libcamera.Request.Status.Complete:
+        raise Refused("lost", "libcamera gave its pictures up, as when a camera is unplugged; check its cable")
+    metadata = done.buffers[stream].metadata
+    stamps = {control.name: value for control, value in done.metadata.items()}
+    _send(
+        connection,
+        "picture",
+        index=done.cookie,
+        sequence=metadata.sequence,
+        stamp_ns=stamps.get("SensorTimestamp") or metadata.timestamp,
+        size=metadata.planes[0].bytes_used,
+        good=metadata.status == libcamera.FrameMetadata.Status.Success,
+    )
+
+
+def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
+    """The camera's stream, set up, and what was granted."""
+    width, height, fps = request["width"], request["height"], request["fps"]
+    offered = camera.generate_configuration([libcamera.StreamRole.Viewfinder]).at(0).formats
+    readable = {PIXEL_FORMATS[str(one)]: one for one in offered.pixel_formats if str(one) in PIXEL_FORMATS}
+    asked = request["format"]
+    for name in PIXEL_FORMATS.values():
+        if name not in readable or asked not in {"auto", name}:
+            continue
+        config = _configuration(libcamera, camera, readable[name], width, height)
+        if config is None:
+            continue
+        config = _widest(libcamera, camera, request, readable[name], config)
+        camera.configure(config)
+        _check_rate(camera, fps)
+        stream = config.at(0)
+        return stream.stream, {"format": name, "width": width, "height": height, "stride": stream.stride, "fps": fps}
+    described = "; ".join(f"{name}: {_sizes(offered, one)}" for name, one in readable.items())
+    raise Refused("unsupported", f"no {asked} of {width}x{height}; offered: {described or 'nothing that can be read'}")
+
+
+def _configuration(libcamera: Any, camera: Any, pixel_format: Any, width: int, height: int, mode: Any = None) -> Any:
+    """One that is granted as it is asked for; None: there is none."""
+    config = camera.generate_configuration([libcamera.StreamRole.Viewfinder])
+    stream = config.at(0)
+    stream.pixel_format, stream.size, stream.buffer_count = pixel_format, libcamera.Size(width, height), BUFFERS
+    if mode is not None:
+        config.sensor_config = mode
+    if config.validate() == libcamera.CameraConfiguration.Status.Invalid:
+        return None
+    stream = config.at(0)
+    same = (stream.size.width, stream.size.height, str(stream.pixel_format)) == (width, height, str(pixel_format))
+    return config if same else None
+
+
+def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: Any, fallback: Any) -> Any:
+    """The configuration with the sensor's smallest mode of those that see the most, at the rate that is asked for.
+
+    Left alone, libcamera takes the mode whose size is nearest, which on many sensors is a part of the picture. What a
+    mode sees is only known once it is set up. ``fallback``: where modes cannot be chosen.
+    """
+    seen: list[tuple[int, int, Any]] = []
+    for mode in _modes(libcamera, camera):
+        size = request["width"], request["height"]
+        config = _configuration(libcamera, camera, pixel_format, *size, mode)
+        if config is None:
+            continue
+        camera.configure(config)
+        crop = _property(camera, "ScalerCropMaximum", None)
+        fastest_us = _limits(camera)[0]
+        if crop is not None and fastest_us * request["fps"] <= 1.01e6:
+            output = mode.output_size
+            seen.append((crop.size.width * crop.size.height, output.width * output.height, config))
+    most = max((field for field, *_ in seen), default=0)
+    wide = [one for one in seen if one[0] >= _MAX_SHARE * most]
+    return min(wide, key=lambda one: one[1])[2] if wide else fallback
+
+
+def _modes(libcamera: Any, camera: Any) -> Iterator[Any]:
+    """The sensor's modes, where the pipeline tells what they see and lets them be chosen."""
+    if _property(camera, "ScalerCropMaximum", None) is None or not hasattr(libcamera, "SensorConfiguration"):
+        return
+    raw = camera.generate_configuration([libcamera.StreamRole.Raw])
+    if raw is None or len(raw) == 0:
+        return
+    formats = raw.at(0).formats
+    deepest: dict[tuple[int, int], int] = {}
+    for pixel_format in formats.pixel_formats:
+        if bits := _RAW.match(str(pixel_format)):
+            for size in formats.sizes(pixel_format):
+                key = size.width, size.height
+                deepest[key] = max(deepest.get(key, 0), int(bits[1]))
+    for (width, height), bits_of_mode in deepest.items():
+        mode = libcamera.SensorConfiguration()
+        mode.bit_depth, mode.output_size = bits_of_mode, libcamera.Size(width, height)
+        yield mode
+
+
+def _check_rate(camera: Any, fps: float) -> None:
+    fastest_us, slowest_us = _limits(camera)
+    if slowest_us and not 0.99 * fastest_us <= 1e6 / fps <= 1.01 * slowest_us:
+        slow, fast = 1e6 / slowest_us, 1e6 / fastest_us if fastest_us else 0.0
+        raise Refused("unsupported", f"no {fps:g} pictures a second at this size; offered: {slow:.4g}..{fast:.4g}/s")
+
+
+def _limits(camera: Any) -> tuple[int, int]:
+    """Shortest and longest time of a frame in µs; 0, 0: the camera does not tell."""
+    info = _known(camera).get("FrameDurationLimits")
+    return (int(_first(info[1].min)), int(_first(info[1].max))) if info else (0, 0)
+
+
+def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
+    """What is set at the start. Raises ``Refused`` for what the camera does not have or grant."""
+    known = _known(camera)
+    chosen: dict[str, Any] = {}
+    exposure_s, gain, power_line_hz = request["exposure_s"], request["gain"], request["power_line_hz"]
+    if "FrameDurationLimits" in known:
+        interval_us = round(1e6 / request["fps"])
+        chosen["FrameDurationLimits"] = (interval_us, interval_us)
+    if exposure_s is not None:
+        chosen["ExposureTime"] = _within(known, "ExposureTime", "the exposure in µs", round(exposure_s * 1e6))
+    if gain is not None:
+        chosen["AnalogueGain"] = _within(known, "AnalogueGain", "the gain", float(gain))
+    if "ExposureTimeMode" in known:  # of libcamera 0.5 on; before, a value is a lock
+        chosen["ExposureTimeMode"] = _AUTOMATIC if exposure_s is None else _MANUAL
+    if "AnalogueGainMode" in known:
+        chosen["AnalogueGainMode"] = _AUTOMATIC if gain is None else _MANUAL
+    if "AeEnable" in known and "ExposureTimeMode" not in known:
+        chosen["AeEnable"] = exposure_s is None or gain is None
+    if power_line_hz is not None:
+        if not {"AeFlickerMode", "AeFlickerPeriod"} <= set(known):
+            raise Refused("unsupported", "the power-line frequency cannot be set; leave it unset")
+        chosen["AeFlickerMode"] = _MANUAL if power_line_hz else _OFF
+        if power_line_hz:
+            chosen["AeFlickerPeriod"] = round(1e6 / (2 * power_line_hz))
+    if "AfMode" in known:  # a lens that moves would be taken for motion
+        chosen["AfMode"] = _OFF
+        if "LensPosition" in known and (default := _first(known["LensPosition"][1].default)) is not None:
+            chosen["LensPosition"] = float(default)
+    return {known[name][0]: value for name, value in chosen.items()}
+
+
+def _within(known: dict[str, Any], name: str, what: str, value: float) -> float:
+    if name not in known:
+        raise Refused("unsupported", f"{what} cannot be set; leave it unset")
+    least, most = _first(known[name][1].min) or 0, _first(known[name][1].max) or math.inf
+    if not least <= value <= most:
+        raise Refused("unsupported", f"{what} cannot be {value:g}; choose {least:g} to {most:g}, or leave it unset")
+    return value
+
+
+def _known(camera: Any) -> dict[str, tuple[Any, Any]]:
+    """The camera's controls by name."""
+    return {control.name: (control, info) for control, info in camera.controls.items()}
+
+
+def _property(camera: Any, name: str, default: Any) -> Any:
+    return next((value for control, value in camera.properties.items() if control.name == name), default)
+
+
+def _model(camera: Any) -> str:
+    return str(_property(camera, "Model", camera.id))
+
+
+def _node(path: str) -> int:
+    """The device number of a node; 0: there is none."""
+    try:
+        return os.stat(path).st_rdev  # noqa: PTH116  # as libcamera does
+    except OSError:
+        return 0
+
+
+def _sizes(offered: Any, pixel_format: Any) -> str:
+    sizes = [f"{size.width}x{size.height}" for size in offered.sizes(pixel_format)]
+    return ", ".join(sizes[:_MAX_SIZES] + ["…"] * (len(sizes) > _MAX_SIZES)) or str(offered.range(pixel_format))
+
+
+def _first(value: Any) -> Any:
+    return value[0] if isinstance(value, (list, tuple)) else value
+
+
+def _send(connection: socket.socket, what: str, descriptors: list[int] | None = None, **fields: Any) -> None:
+    rights = [(socket.SOL_SOCKET, socket.SCM_RIGHTS, array.array("i", descriptors))] if descriptors else []
+    connection.sendmsg([json.dumps({"type": what, **fields}).encode()], rights)
+
+
+@contextmanager
+def _refusing(kind: str, text: str) -> Iterator[None]:
+    """What libcamera raises, as ``Refused``; that the reader is gone stays what it is."""
+    try:
+        yield
+    except ConnectionError:
+        raise
+    except (RuntimeError, OSError) as error:
+        raise Refused(kind, f"{text} ({error})") from error
+
+
+def _answer(connection: socket.socket, request: str) -> None:
+    try:
+        import libcamera  # type: ignore[import-not-found]  # noqa: PLC0415  # of the system's Python
+    except ImportError as error:
+        text = f"{sys.executable} has no libcamera ({error}); apt install python3-libcamera libcamera-ipa"
+        raise Refused("software", text) from error
+    serve(libcamera, connection, json.loads(request))
+
+
+def main(descriptor: str, request: str) -> None:
+    """Run until the socket is closed."""
+    for number in (signal.SIGINT, signal.SIGTERM):  # meant for the reader, which closes the socket
+        signal.signal(number, signal.SIG_IGN)
+    with socket.socket(fileno=int(descriptor)) as connection, suppress(ConnectionError):
+        try:
+            _answer(connection, request)
+        except Refused as refusal:
+            _send(connection, "failure", kind=refusal.kind, text=str(refusal))
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

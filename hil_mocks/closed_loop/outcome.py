@@ -1,0 +1,93 @@
+"""What came of a drive: collisions, brakings, those for nothing, mean speed."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+from hil_mocks.closed_loop.loop import Contact, Log
+
+_BRAKES, _DONE = 0.85, 0.95  # a braking: below this share of the cruise speed, until above that
+_BEFORE_S, _AFTER_S = 1.0, 0.5  # the truth's own braking is looked for so long before it, and after its end
+
+
+@dataclass(frozen=True, slots=True)
+class Braking:
+    """From the first to the last picture of it."""
+
+    first: int
+    last: int
+    for_nothing: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Outcome:
+    """Of one drive, or of several together."""
+
+    threats: int = 0  # that a blind vehicle runs into, and the one with the truth does not
+    collisions: tuple[Contact, ...] = ()  # those that the vehicle with the truth avoids
+    brakings: int = 0
+    for_nothing: int = 0
+    speed_shares: tuple[float, ...] = field(default=())  # of the mean speed with the truth, one a drive
+
+    @property
+    def mean_speed_share(self) -> float:
+        """Mean over the drives."""
+        return sum(self.speed_shares) / max(len(self.speed_shares), 1)
+
+    @property
+    def contact_mps(self) -> float:
+        """Mean speed at contact."""
+        return sum(each.speed_mps for each in self.collisions) / max(len(self.collisions), 1)
+
+
+def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
+    """The brakings of a drive; `right`: whether the planner with the truth would brake, for each picture.
+
+    A braking is for nothing if it would not in any picture of it, nor shortly before or after.
+    """
+    found: list[Braking] = []
+    first: int | None = None
+    before, after = round(_BEFORE_S * fps), round(_AFTER_S * fps)
+
+    def end(last: int) -> None:
+        if first is not None:
+            around = right[max(first - before, 0) : last + after + 1]
+            found.append(Braking(first, last, not any(around)))
+
+    for picture, (wanted, cruise) in enumerate(zip(log.wanted_mps, log.cruise_mps, strict=True)):
+        if first is None and wanted < _BRAKES * cruise:
+            first = picture
+        elif first is not None and wanted >= _DONE * cruise:
+            end(picture - 1)
+            first = None
+    end(len(log.wanted_mps) - 1)
+    return found
+
+
+def brakes(wanted_mps: float, cruise_mps: float) -> bool:
+    """Whether it is less than the cruise speed, so that a braking at the same time is not for nothing."""
+    return wanted_mps < _DONE * cruise_mps
+
+
+def judge(log: Log, right: Sequence[bool], fps: float, truth: Log, blind: Log) -> Outcome:
+    """Compare a drive with those of the planner with the truth and of nobody in the same world."""
+    unavoidable = {contact.number for contact in truth.contacts}
+    threats = {contact.number for contact in blind.contacts} - unavoidable
+    found = brakings(log, right, fps)
+    return Outcome(
+        len(threats),
+        tuple(contact for contact in log.contacts if contact.number not in unavoidable),
+        len(found),
+        sum(braking.for_nothing for braking in found),
+        ((log.distance_m / log.seconds) / (truth.distance_m / truth.seconds),),
+    )
+
+
+def pool(outcomes: Sequence[Outcome]) -> Outcome:
+    """Several drives together."""
+    return Outcome(
+        sum(each.threats for each in outcomes),
+        tuple(contact for each in outcomes for contact in each.collisions),
+        sum(each.brakings for each in outcomes),
+        sum(each.for_nothing for each in outcomes),
+        tuple(share for each in outcomes for share in each.speed_shares),
+    )

@@ -1,0 +1,249 @@
+"""What stands and what moves around the vehicle, and who yields to whom."""
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from hil_mocks.closed_loop.course import Course
+from hil_mocks.closed_loop.vehicle import Build, Vehicle
+from lcf_edge.rendered.drives import Box, Drive, Floats, Lens, Paint, Profile, SensorNoise, Shake
+
+_REACH_M = 0.3  # movers keep so much between themselves and others
+_SLOW_MPS = 0.25  # a vehicle slower than this is stepped around
+_EVEN_SHARE = 0.1  # of its speed: what is less to one side is straight on
+_PATIENCE_S = 3.0
+_NEAR_M = 8.0
+_TURNING_RADPS = 3.0
+_GONE_M = 1e4
+
+LENS, NOISE, STEADY, GREY = Lens(), SensorNoise(), Profile(((0.0, 1.0),)), Paint(0)
+
+
+@dataclass(frozen=True, slots=True)
+class Leg:
+    """A way on a straight line, a rest at its end."""
+
+    x_m: float
+    z_m: float
+    speed_mps: float
+    rest_s: float = 0.0
+    from_m: float = -math.inf  # it is begun once the vehicle has come so far along its course
+
+
+@dataclass(frozen=True, slots=True)
+class Body:
+    """A cuboid that stands on the ground, and what it does; without legs it stands."""
+
+    name: str
+    width_m: float
+    height_m: float
+    length_m: float
+    x_m: float
+    z_m: float
+    heading_rad: float
+    paint: Paint
+    legs: tuple[Leg, ...] = ()
+    acceleration_mps2: float = 3.0  # also of its braking
+    walker: bool = False
+
+    @property
+    def box(self) -> Box:
+        """As it stands at first."""
+        path = ((0.0, self.x_m, self.z_m),)
+        return Box(self.name, self.width_m, self.height_m, self.length_m, path, self.heading_rad, self.paint)
+
+
+@dataclass(frozen=True)
+class World:
+    """A drive to be: the same world and the same decisions give the same bytes."""
+
+    seed: int
+    events: tuple[str, ...]  # what happens along the course
+    condition: str
+    course: Course
+    cruise_mps: float
+    build: Build
+    bodies: tuple[Body, ...]
+    blocked: bool = False  # its course ends before a box that stands in the way
+    start_mps: float = 0.0
+    waits_m: tuple[tuple[float, float], ...] = ()  # where it stops of its own accord, and for how long, s
+    fps: float = 20.0
+    horizon_s: float = 4.0
+    camera_height_m: float = 0.5
+    camera_pitch_rad: float = 0.0
+    lens: Lens = LENS
+    noise: SensorNoise = NOISE
+    shakes: tuple[Shake, ...] = ()  # at 1 m/s; as much less as it is slower
+    gyro: bool = True
+    odometry: bool = True
+    ticks_per_m: float = 2000.0
+    track_m: float = 0.4
+    gain: Profile = STEADY
+    ground: Paint = GREY
+    sky: Paint = GREY
+
+    @property
+    def seconds(self) -> float:
+        """A drive that takes longer is given up."""
+        return 2.5 * (self.course.length_m / self.cruise_mps + sum(rest for _, rest in self.waits_m) + 5.0)
+
+    def drawn(self) -> Drive:
+        """What the renderer is given: everything but the motion."""
+        nothing = Profile(((0.0, 0.0),))
+        return Drive(
+            "closed loop",
+            self.seed,
+            1.0,
+            self.fps,
+            nothing,
+            nothing,
+            tuple(body.box for body in self.bodies),
+            lens=self.lens,
+            noise=self.noise,
+            gain=self.gain,
+            camera_height_m=self.camera_height_m,
+            camera_pitch_rad=self.camera_pitch_rad,
+            ground=self.ground,
+            sky=self.sky,
+            half_width_m=self.build.half_width_m,
+            horizon_s=self.horizon_s,
+        )
+
+    def changed(self, **values: Any) -> "World":
+        """The world with other values of some fields."""
+        return replace(self, **values)
+
+
+class _Mover:
+    """Where one that moves is in its legs."""
+
+    def __init__(self, row: int, body: Body) -> None:
+        self.row, self.body = row, body
+        self.leg = 0
+        self.rests_s = 0.0
+        self.speed_mps = 0.0
+        self.side = 0  # that it goes round what is in its way, 1: to the right of what it wants
+        self.hindered_s = 0.0
+        self.patience_s = _PATIENCE_S
+
+
+class Bodies:
+    """Where all bodies are, by number."""
+
+    def __init__(self, world: World) -> None:
+        bodies = world.bodies
+        self.half: Floats = np.array([[body.width_m, body.length_m] for body in bodies]).reshape(-1, 2) / 2
+        self.position: Floats = np.array([[body.x_m, body.z_m] for body in bodies]).reshape(-1, 2)
+        self.velocity: Floats = np.zeros_like(self.position)
+        self.heading: Floats = np.array([body.heading_rad for body in bodies])
+        self._sees = world.lens.width / 2 / world.lens.focal_px  # tangent of half the camera's field of view
+        self._movers = [_Mover(row, body) for row, body in enumerate(bodies) if body.legs]
+
+    def footprints(self) -> Floats:
+        """(n, 4, 2) corners (x, z) in m: back left, back right, front right, front left."""
+        sine, cosine = np.sin(self.heading)[:, None], np.cos(self.heading)[:, None]
+        right = np.hstack([cosine, sine]) * self.half[:, :1]
+        ahead = np.hstack([-sine, cosine]) * self.half[:, 1:]
+        corners: Floats = np.stack([-right - ahead, right - ahead, right + ahead, ahead - right], axis=1)
+        return corners + self.position[:, None]
+
+    def remove(self, number: int) -> None:
+        """Take away what was run into."""
+        self.position[number] = _GONE_M
+        self.velocity[number] = 0.0
+        self._movers = [mover for mover in self._movers if mover.row != number]
+
+    def step(self, dt_s: float, vehicle: Vehicle) -> None:
+        """Let all movers move on for a short while."""
+        for mover in self._movers:
+            wish = self._wish(mover, dt_s, vehicle.travelled_m)
+            if wish.any():
+                wish = self._around(mover, wish, vehicle, dt_s)
+            row = mover.row
+            self.velocity[row] = wish
+            self.position[row] += wish * dt_s
+            if wish.any():
+                way = math.atan2(-wish[0], wish[1]) - self.heading[row]
+                way = math.remainder(way, math.tau)
+                self.heading[row] += min(max(way, -_TURNING_RADPS * dt_s), _TURNING_RADPS * dt_s)
+
+    def _wish(self, mover: _Mover, dt_s: float, travelled_m: float) -> Floats:
+        """The velocity that its legs give."""
+        mover.rests_s = max(mover.rests_s - dt_s, 0.0)
+        legs = mover.body.legs
+        if mover.leg == len(legs) or mover.rests_s > 0 or travelled_m < legs[mover.leg].from_m:
+            mover.speed_mps = 0.0
+            return np.zeros(2)
+        leg = legs[mover.leg]
+        rest = np.array([leg.x_m, leg.z_m]) - self.position[mover.row]
+        left_m = math.hypot(*rest)
+        step = mover.body.acceleration_mps2 * dt_s
+        stops = leg.rest_s > 0 or mover.leg + 1 == len(legs) or legs[mover.leg + 1].from_m > travelled_m
+        most = min(leg.speed_mps, math.sqrt(2 * mover.body.acceleration_mps2 * left_m)) if stops else leg.speed_mps
+        mover.speed_mps += min(max(most - mover.speed_mps, -step), step)
+        if left_m <= max(mover.speed_mps * dt_s, 0.02):
+            mover.leg += 1
+            mover.rests_s = leg.rest_s
+        velocity: Floats = rest * (mover.speed_mps / max(left_m, 1e-9))
+        return velocity
+
+    def _around(self, mover: _Mover, wish: Floats, vehicle: Vehicle, dt_s: float) -> Floats:
+        """The wish, so that it goes round what is near: the others, and the vehicle, if it is slow or cannot see it.
+
+        Nobody whom its camera could see looks out for a vehicle that comes.
+        """
+        row = mover.row
+        here = self.position[row]
+        keep = float(self.half[row].max()) + _REACH_M
+        near = np.flatnonzero(np.abs(self.position - here).sum(axis=1) < _NEAR_M)
+        near = near[near != row]
+        points = [_nearest(here, self.position[near], self.heading[near], self.half[near])]
+        right_m, ahead_m = (vehicle.axes @ (here - vehicle.position)).tolist()
+        if vehicle.speed_mps < _SLOW_MPS or ahead_m < abs(right_m) / self._sees:
+            middle = vehicle.position - vehicle.ahead * vehicle.build.length_m / 2
+            half = np.array([[vehicle.build.half_width_m, vehicle.build.length_m / 2]])
+            points.append(_nearest(here, middle[None], np.array([vehicle.heading_rad]), half))
+        away = here - np.concatenate(points)
+        distance = np.hypot(*away.T)
+        speed = math.hypot(*wish)
+        hindered = False
+        for number in np.argsort(-distance):
+            share = min(max((keep - distance[number]) / _REACH_M + 1, 0.0), 1.0)
+            normal = away[number] / max(distance[number], 1e-9)
+            if share == 0 or wish @ normal >= 0:
+                continue
+            hindered = True
+            along = np.array([-normal[1], normal[0]])
+            if mover.side == 0:
+                mover.side = 1 if wish @ along >= -_EVEN_SHARE * speed else -1
+            wish = (1 - share) * wish + share * speed * mover.side * along
+        mover.hindered_s = mover.hindered_s + dt_s if hindered else max(mover.hindered_s - dt_s, 0.0)
+        if mover.hindered_s == 0:
+            mover.side, mover.patience_s = 0, _PATIENCE_S
+        elif mover.hindered_s > mover.patience_s:  # it does not get round there: the other way, and farther
+            mover.side, mover.hindered_s = -mover.side, dt_s
+            mover.patience_s *= 2
+        return wish
+
+
+def _nearest(point: Floats, middle: Floats, heading: Floats, half: Floats) -> Floats:
+    """(n, 2) points of rectangles that are nearest to a point."""
+    sine, cosine = np.sin(heading), np.cos(heading)
+    right, ahead = np.stack([cosine, sine], axis=1), np.stack([-sine, cosine], axis=1)
+    offset = point - middle
+    x = np.clip((offset * right).sum(axis=1), -half[:, 0], half[:, 0])
+    z = np.clip((offset * ahead).sum(axis=1), -half[:, 1], half[:, 1])
+    nearest: Floats = middle + right * x[:, None] + ahead * z[:, None]
+    return nearest
+
+
+def touch(one: Floats, two: Floats) -> bool:
+    """Whether two rectangles (4, 2) overlap."""
+    for corners in (one, two):
+        for axis in (corners[1] - corners[0], corners[3] - corners[0]):
+            a, b = one @ axis, two @ axis
+            if a.max() < b.min() or b.max() < a.min():
+                return False
+    return True

@@ -1,0 +1,241 @@
+"""``lcf-edge demo``: the whole way, on a drive that it renders itself.
+
+A rendered drive is written as a recording, replayed through the real pipeline, published over Zenoh on
+loopback and received in a second process. Rendering has a process of its own, and drawing comes after the
+measured run, so that speed and memory are those of the filter and its link.
+"""
+
+import os
+import re
+import shlex
+import signal
+import socket
+import subprocess
+import sys
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import ExitStack, nullcontext
+from dataclasses import replace
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TypeVar
+
+import cv2
+import msgspec
+import numpy as np
+import zenoh
+
+from lcf_edge.cli.demo_subscriber import Received
+from lcf_edge.cli.findings import FoundThreat, findings, trusted_rebels
+from lcf_edge.cli.replay import frame_rate
+from lcf_edge.cli.summary import Summary
+from lcf_edge.config import Camera, Config, Vehicle, Zenoh, to_toml
+from lcf_edge.errors import LcfError, PublishError, UsageError
+from lcf_edge.messages import Cause
+from lcf_edge.pipeline import run
+from lcf_edge.recording.read import Recording, open_recording
+from lcf_edge.rendered import scenes
+from lcf_edge.sinks import cannot_write, check_output
+from lcf_edge.sinks.overlay import draw
+from lcf_edge.sinks.results import ResultsSink
+from lcf_edge.sinks.sink import Sink
+from lcf_edge.sinks.size_plot import SizePlot
+from lcf_edge.sinks.video import VideoSink
+from lcf_edge.zenoh_link import ScenePublisher, close_session, open_session
+
+SEED = 1
+PICTURES = 4
+
+_SUBSCRIBER_STARTS_S = 20.0
+_SUBSCRIBER_ENDS_S = 20.0
+
+Say = Callable[[str], None]
+Output = TypeVar("Output", SizePlot, VideoSink)
+
+
+def demo(folder: Path, seconds: float, say: Say) -> None:
+    """Run the demo into ``folder`` and tell each stage and the outcome. Raises ``LcfError``."""
+    drive = _drive(seconds)
+    _prepare(folder)
+    say(f"1/5 rendering {seconds:g} s of a drive past objects and walkers: {folder / 'recording'}")
+    _render(drive, folder / "recording")
+    config = Config(
+        camera=Camera(height_m=drive.camera_height_m, pitch_rad=drive.camera_pitch_rad),
+        vehicle=Vehicle(half_width_m=drive.half_width_m, horizon_s=drive.horizon_s),
+    )
+    recording = open_recording(folder / "recording", config)
+    plot = _unless_missing("plot", lambda: SizePlot(folder / "sizes.png"), say)
+    rate = frame_rate(recording, config)
+    video = _unless_missing("video", lambda: VideoSink(folder / "overlay.webm", rate), say)
+
+    with ExitStack() as stack:
+        session, endpoint = _open_link()
+        stack.callback(close_session, session)
+        publisher = ScenePublisher(session, config.publish)
+        subscriber = stack.enter_context(_subscriber(endpoint, publisher.key))
+        if not publisher.wait_for_subscriber(_SUBSCRIBER_STARTS_S):
+            raise PublishError(f"{endpoint}: the demo's subscriber could not connect; is loopback filtered?")
+        say(f"2/5 {publisher.key} on {endpoint}, subscriber in process {subscriber.pid}")
+
+        say(f"3/5 filtering and publishing: {folder / 'results.jsonl'}")
+        summary = Summary(config.memory)
+        rebels: dict[int, list[tuple[float, float, Cause]]] = {}
+        most_psi = (0, 0)
+        sinks: list[Sink] = [stack.enter_context(ResultsSink(str(folder / "results.jsonl")))]
+        if plot is not None:
+            sinks.append(plot)
+        for frame, outcome in run(recording, config):
+            scene = outcome.scene
+            publisher.put(scene)
+            for sink in sinks:
+                sink.put(frame, scene, outcome.view)
+            summary.add(scene)
+            rebels[scene.seq] = trusted_rebels(scene, config.filter.tr_s)
+            most_psi = max(most_psi, (scene.sizes.psi, scene.seq))
+        received = _finish(subscriber, publisher.sent)
+        memory_mib = peak_resident_mib()
+
+    (usual,) = config.zenoh.listen
+    _write(folder / "config.toml", to_toml(config).encode())
+    threats = findings(scenes.truths(drive), rebels)
+    wanted = [threat.found_seq for threat in threats if threat.found_seq is not None]
+    pictures = sorted({most_psi[1], *wanted[: PICTURES - 1]})
+    say(f"4/5 drawing what the filter saw: {folder}")
+    _draw(recording, config, folder, pictures, video)
+    if plot is not None:
+        say(f"5/5 plotting the sizes of the tables: {plot.path}")
+        plot.close()
+    for warning in recording.warnings:
+        say(f"    warning: {warning}")
+    say("")
+    for line in (
+        *(_told(threat) for threat in threats),
+        *summary.lines(recording.skipped),
+        f"memory   {memory_mib:.0f} MiB at most, of the process that filters and publishes",
+        f"received {received.scenes} of {publisher.sent} scenes in the second process, "
+        f"{received.bytes / 1e3:.0f} kB, {received.circles} circles, {received.broken} broken",
+        "",
+        "To see it live, publish in one terminal and subscribe in another:",
+        *([] if endpoint == usual else [f"(after you have stopped what has {usual} now)"]),
+        *_live_lines(folder, usual),
+    ):
+        say(line)
+
+
+def _unless_missing(what: str, make: Callable[[], Output], say: Say) -> Output | None:
+    """An output, or None and a word about it where the library that it needs is missing."""
+    try:
+        return make()
+    except UsageError as error:
+        say(f"    no {what}: {error}")
+        return None
+
+
+def peak_resident_mib() -> float:
+    """Most memory that this process ever held, MiB; unlike ``ru_maxrss`` it does not know what started it."""
+    status = Path("/proc/self/status").read_text(encoding="ascii")
+    peak = re.search(r"^VmHWM:\s+(\d+) kB", status, re.MULTILINE)
+    return int(peak[1]) / 1024 if peak else float("nan")
+
+
+def _drive(seconds: float) -> scenes.Drive:
+    """Clutter on both sides, a walker from each side, and a cart that comes towards the vehicle."""
+    drive = scenes.make("two_crossing", SEED, seconds=seconds)
+    contact_s, speed_mps = seconds + 0.8, 1.2
+    ahead_m = float(drive.speed.integral(np.array([contact_s]))[0])
+    path = ((0.0, 0.0, ahead_m + speed_mps * contact_s), (contact_s, 0.0, ahead_m))
+    paint = scenes.Paint(SEED, feature_m=0.18)
+    cart = scenes.Box("cart", 1.2, 1.1, 1.6, path, heading_rad=np.pi, paint=paint)
+    return replace(drive, boxes=(*drive.boxes, cart))
+
+
+def _prepare(folder: Path) -> None:
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    check_output(folder / "results.jsonl")
+
+
+def _render(drive: scenes.Drive, folder: Path) -> None:
+    """In a process of its own: its textures are no memory of the filter."""
+    context = get_context("spawn")
+    ignore = (signal.SIGINT, signal.SIG_DFL)  # interrupted, it ends without a word
+    try:
+        with ProcessPoolExecutor(1, context, initializer=signal.signal, initargs=ignore) as pool:
+            pool.submit(scenes.write, drive, folder).result()
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+    except BrokenProcessPool as error:
+        raise LcfError(f"{folder}: the rendering process was ended from outside; free memory, try again") from error
+
+
+def _open_link() -> tuple[zenoh.Session, str]:
+    """A session that listens on the usual port, or on a free one when that is busy, and its endpoint."""
+    usual = Zenoh()
+    try:
+        return open_session(usual), usual.listen[0]
+    except PublishError:
+        with socket.socket() as probe:
+            probe.bind(("127.0.0.1", 0))
+            endpoint = f"tcp/127.0.0.1:{probe.getsockname()[1]}"
+        return open_session(Zenoh(listen=[endpoint])), endpoint
+
+
+def _subscriber(endpoint: str, key: str) -> subprocess.Popen[str]:
+    # A session of its own: an interrupt reaches it as the end of its input, not as a signal.
+    return subprocess.Popen(
+        [sys.executable, "-m", "lcf_edge.cli.demo_subscriber", endpoint, key],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+    )
+
+
+def _finish(subscriber: subprocess.Popen[str], sent: int) -> Received:
+    try:
+        received, _ = subscriber.communicate(f"{sent}\n", timeout=_SUBSCRIBER_ENDS_S)
+        return msgspec.json.decode(received, type=Received)
+    except (subprocess.TimeoutExpired, msgspec.DecodeError) as error:
+        subscriber.kill()
+        raise PublishError("the demo's subscriber did not tell what it received; try again") from error
+
+
+def _draw(recording: Recording, config: Config, folder: Path, pictures: list[int], video: VideoSink | None) -> None:
+    """The same input gives the same output: a second run draws what the first one found."""
+    with video or nullcontext():
+        for frame, outcome in run(recording, config):
+            panels = draw(frame.image, outcome.scene, outcome.view())
+            if video is not None:
+                video.write(panels)
+            if frame.seq in pictures:
+                png = cv2.imencode(".png", panels)[1].tobytes()
+                _write(folder / f"picture-{pictures.index(frame.seq) + 1}.png", png)
+
+
+def _write(path: Path, data: bytes) -> None:
+    try:
+        path.write_bytes(data)
+    except OSError as error:
+        raise cannot_write(path, error) from error
+
+
+def _told(threat: FoundThreat) -> str:
+    if threat.latency_s is None:
+        return f"missed   {threat.name}, in sight for {(threat.last_ns - threat.since_ns) / 1e9:.1f} s"
+    ((cause, _),) = threat.causes.most_common(1)
+    return f"found    {threat.name}, {cause.name.lower()}, {threat.latency_s:.2f} s after it came to threaten"
+
+
+def _live_lines(folder: Path, endpoint: str) -> tuple[str, str]:
+    """Two lines for a shell."""
+    python = min(sys.executable, os.path.relpath(sys.executable), key=len)
+    code = (
+        "from lcf_edge.client import scenes; "
+        f"[print(s.seq, s.circles[['cause', 'x', 'y', 'ttc']]) for s in scenes('{endpoint}')]"
+    )
+    command = (python, "-m", "lcf_edge", "replay", str(folder / "recording"))
+    options = ("-c", str(folder / "config.toml"), "--publish", "--realtime")
+    return f"  {shlex.join(command + options)}", f'  {shlex.quote(python)} -c "{code}"'

@@ -1,0 +1,57 @@
+"""The demo's second process: subscribes to scenes and tells what came.
+
+``python -m lcf_edge.cli.demo_subscriber ENDPOINT KEY``; a line on standard input tells how many scenes
+were sent, then one JSON line with a ``Received`` goes to standard output.
+"""
+
+import sys
+import threading
+
+import msgspec
+import zenoh
+
+from lcf_edge.cdr import CdrError, decode_scene
+from lcf_edge.config import Zenoh
+from lcf_edge.zenoh_link import SCENE_ENCODING, opened_session
+
+_LAST_ON_THE_WAY_S = 3.0
+
+
+class Received(msgspec.Struct):
+    """What a subscriber got."""
+
+    scenes: int = 0
+    bytes: int = 0
+    broken: int = 0  # not decodable, or not announced as a scene
+    circles: int = 0
+
+
+def receive(endpoint: str, key: str) -> Received:
+    """Subscribe, read from standard input how many scenes were sent, wait a little for the last of them."""
+    received = Received()
+    arrived = threading.Condition()
+
+    def take(sample: zenoh.Sample) -> None:
+        payload = sample.payload.to_bytes()
+        try:
+            circles = len(decode_scene(payload).circles)
+            broken = str(sample.encoding) != SCENE_ENCODING
+        except CdrError:
+            circles, broken = 0, True
+        with arrived:
+            received.scenes += 1
+            received.bytes += len(payload)
+            received.broken += broken
+            received.circles += circles
+            arrived.notify()
+
+    with opened_session(Zenoh(connect=[endpoint], listen=[])) as session:
+        session.declare_subscriber(key, take)
+        sent = int(sys.stdin.readline() or 0)
+        with arrived:
+            arrived.wait_for(lambda: received.scenes >= sent, _LAST_ON_THE_WAY_S)
+    return received
+
+
+if __name__ == "__main__":
+    sys.stdout.write(msgspec.json.encode(receive(*sys.argv[1:])).decode() + "\n")

@@ -1,0 +1,63 @@
+"""``lcf-edge doctor``: what a vehicle's computer, devices and configuration lack, and how to fix it."""
+
+import os
+import sys
+from collections import Counter
+from collections.abc import Callable, Sequence
+from pathlib import Path
+
+import msgspec
+
+from lcf_edge.doctor.configuration import context_of
+from lcf_edge.doctor.examination import examine
+from lcf_edge.doctor.finding import Finding, Severity
+from lcf_edge.errors import LcfError
+from lcf_edge.printable import printable
+
+Tell = Callable[[str], None]
+
+_COLOURS = {Severity.OK: "32", Severity.WARN: "33", Severity.FAIL: "31"}
+_WIDE = len("configuration")
+_LONGEST = 4096  # a path may be
+
+
+class UnfitError(LcfError):
+    """Something that was looked at does not work."""
+
+
+def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, tell: Tell) -> None:
+    """Look at everything and tell each finding as it is found.
+
+    Raises ``UnfitError`` when something failed, and ``ConfigError`` for a configuration that cannot be used, after what
+    can be said without it.
+    """
+    context = context_of(path, settings)
+    coloured = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
+    levels: Counter[Severity] = Counter()
+    for finding in examine(context):
+        levels[finding.level] += 1
+        tell(json_line(finding) if as_json else line(finding, coloured=coloured))
+    if context.error is not None:
+        raise context.error
+    if levels[Severity.FAIL]:
+        raise UnfitError(f"{_count(levels[Severity.FAIL], 'check')} failed; fix the first one and look again")
+    if not as_json:
+        tell(f"\nnothing failed, {_count(levels[Severity.WARN], 'warning')}")
+
+
+def line(finding: Finding, *, coloured: bool = False) -> str:
+    """A finding for people; its remedy below it, in a line of its own that can be pasted."""
+    level = finding.level.value
+    shown = f"\x1b[{_COLOURS[finding.level]}m{level:<4}\x1b[0m" if coloured else f"{level:<4}"
+    text = f"{shown}  {finding.subject:<{_WIDE}}  {printable(finding.text, _LONGEST)}"
+    return f"{text}\n{'':<{_WIDE + 8}}{printable(finding.remedy, _LONGEST)}" if finding.remedy else text
+
+
+def json_line(finding: Finding) -> str:
+    """A finding as a JSON object."""
+    values = {"level": finding.level.value, "subject": finding.subject, "text": finding.text, "remedy": finding.remedy}
+    return msgspec.json.encode(values).decode()
+
+
+def _count(number: int, what: str) -> str:
+    return f"{number} {what}{'s' * (number != 1)}"

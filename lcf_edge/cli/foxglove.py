@@ -1,0 +1,28 @@
+"""``lcf-edge foxglove``: what a running daemon sees, for the Foxglove app."""
+# ruff: noqa: PLC0415
+
+import signal
+import threading
+from collections.abc import Callable
+from contextlib import closing
+
+from lcf_edge.errors import LcfError
+from lcf_edge.monitor.live.source import Source
+
+HOST = "127.0.0.1"
+
+
+def foxglove(source: Source, port: int, tell: Callable[[str], None]) -> None:
+    """Serve until a signal ends it. Raises ``PublishError``, and ``LcfError`` without the extra ``foxglove``."""
+    try:
+        import foxglove as _  # noqa: F401
+    except ImportError as error:
+        raise LcfError("foxglove: foxglove-sdk is missing; run pip install 'lcf-edge[foxglove]'") from error
+    from lcf_edge.monitor.foxglove.relay import Relay
+
+    ended = threading.Event()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, lambda *_: ended.set())
+    with closing(Relay(source, HOST, port)) as relay:
+        tell(f"open a connection to ws://{HOST}:{relay.port} in Foxglove (Ctrl-C ends)")
+        ended.wait()

@@ -1,0 +1,57 @@
+"""``lcf-edge record``: the daemon, recording into a file, or into a folder as a bag of rosbag2."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from lcf_edge.cli.run import run
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.daemon.recorder import Recorder
+from lcf_edge.errors import LcfError, RecordingError, UsageError
+from lcf_edge.recording.write.destination import Bag, Named
+from lcf_edge.sinks import cannot_write, check_output
+
+
+def record(file: Path, seconds: float | None, path: Path | None, settings: Sequence[str]) -> str:
+    """Record until a signal ends it, or for so long from the first picture on. Return the summary.
+
+    ``file``: a name that ends in ``.mcap`` is a file's, one without an ending a folder's. Raises ``UsageError`` for one
+    that is there already or is none, ``SinkError`` for one that cannot be written, ``LcfError`` when not one picture
+    was recorded, and what ``run`` raises.
+    """
+    if file.exists():
+        raise UsageError(f"{file}: is there already; name another file, or remove it")
+    is_bag = not file.suffix
+    if is_bag:
+        _make(file)
+    else:
+        check_output(file, (".mcap",))
+    try:
+        sinks = run(path, (*settings, "record.when=always"), Bag(file) if is_bag else Named(file), seconds)
+    finally:
+        if is_bag:
+            _finish(file)
+    (recorder,) = (sink for sink in sinks if isinstance(sink, Recorder))
+    summary = f"{file}: {recorder.summary()}"
+    if not recorder.pictures:
+        raise LcfError(f"{summary}; see above what the camera or the disk lacks")
+    return summary
+
+
+def _make(folder: Path) -> None:
+    try:
+        folder.mkdir()
+    except OSError as error:
+        raise cannot_write(folder, error) from error
+
+
+def _finish(folder: Path) -> None:
+    """Say in the folder what its files hold together; remove it when there are none."""
+    from lcf_edge.recording.write.bag import write_metadata  # noqa: PLC0415  # what reads takes memory while it records
+
+    try:
+        if any(folder.iterdir()):
+            write_metadata(folder)
+        else:
+            folder.rmdir()
+    except (RecordingError, OSError) as error:
+        LOGGER.warning("recorder: %s: no metadata.yaml: %s", folder, error)

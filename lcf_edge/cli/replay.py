@@ -1,0 +1,137 @@
+"""``lcf-edge replay``: the pipeline over a recording, with what a user wants written."""
+
+import math
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from itertools import count, islice
+from pathlib import Path
+
+import numpy as np
+from tqdm import tqdm
+
+from drivers.samples import Frame
+from lcf_edge.cli.summary import Summary
+from lcf_edge.config import Config
+from lcf_edge.errors import UsageError
+from lcf_edge.pipeline import Outcome, run
+from lcf_edge.recording.pace import Pace
+from lcf_edge.recording.read import Recording, open_recording
+from lcf_edge.sinks.results import ResultsSink
+from lcf_edge.sinks.sink import Sink
+from lcf_edge.sinks.size_plot import SizePlot
+from lcf_edge.sinks.video import VideoSink
+
+Say = Callable[[str], None]
+
+_SLOWEST_VIDEO, _FASTEST_VIDEO = 2.0, 120.0  # frames/s
+
+
+@dataclass(frozen=True, slots=True)
+class Outputs:
+    """What a replay writes."""
+
+    results: str | None = None  # a file, "-": standard output
+    video: Path | None = None
+    plot: Path | None = None
+    publish: bool = False
+
+
+def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) -> list[str]:
+    """Run the pipeline over a recording. Return the summary, line by line.
+
+    ``warn`` gets the recording's warnings, also when the replay fails. Raises ``RecordingError`` for a
+    recording without a single usable frame, ``SinkError`` for an output that cannot be written,
+    ``PublishError``, ``UsageError``.
+    """
+    recording = open_recording(path, config)
+    recording.start_s, recording.duration_s = pace.start_s, pace.duration_s
+    summary = Summary(config.memory)
+    try:
+        _run(recording, config, outputs, pace, summary)
+    finally:
+        for warning in recording.warnings:
+            warn(f"{warning}")
+    return summary.lines(recording.skipped)
+
+
+def _run(recording: Recording, config: Config, outputs: Outputs, pace: Pace, summary: Summary) -> None:
+    for output in (outputs.results, outputs.video, outputs.plot):
+        _refuse_input(recording.path, output)
+    with ExitStack() as stack:
+        sinks = [stack.enter_context(sink) for sink in _sinks(recording, config, outputs)]
+        whole = pace.start_s == 0 and pace.duration_s == math.inf and not pace.loop
+        steps = tqdm(
+            _paced(recording, config, pace),
+            total=recording.frame_count if whole else None,
+            unit="frame",
+            disable=pace.step or None,  # unless standard error is a terminal
+            file=sys.stderr,
+            ncols=_terminal_columns(),
+        )
+        for frame, outcome in stack.enter_context(steps):
+            for sink in sinks:
+                sink.put(frame, outcome.scene, outcome.view)
+            summary.add(outcome.scene)
+
+
+def _sinks(recording: Recording, config: Config, outputs: Outputs) -> Iterator[Sink]:
+    """Open each output that is wanted."""
+    if outputs.publish:
+        from lcf_edge.sinks.scenes import SceneSink  # noqa: PLC0415  # else no network is started
+
+        yield SceneSink(config)
+    if outputs.results is not None:
+        yield ResultsSink(outputs.results)
+    if outputs.video is not None:
+        yield VideoSink(outputs.video, frame_rate(recording, config))
+    if outputs.plot is not None:
+        yield SizePlot(outputs.plot)
+
+
+def _terminal_columns() -> int:
+    """Width of the terminal behind standard error; 80 where it does not tell, as on a serial line."""
+    try:
+        return os.get_terminal_size(sys.stderr.fileno()).columns or 80
+    except OSError:
+        return 80
+
+
+def frame_rate(recording: Recording, config: Config) -> float:
+    """Return the rate for a video, frames/s, by a glance at the first frames. Raises ``RecordingError``."""
+    frames = (item.stamp_ns for item in recording if isinstance(item, Frame))
+    intervals_s = np.diff(list(islice(frames, 9))) / 1e9
+    rate = 1 / np.median(intervals_s) if len(intervals_s) else config.camera.fps
+    return float(np.clip(rate, _SLOWEST_VIDEO, _FASTEST_VIDEO))
+
+
+def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[Frame, Outcome]]:
+    """Each picture and what it gave, when it is due; in a loop lap after lap, each with a filter that begins anew."""
+    for lap in count():
+        if lap and not pace.loop:
+            return
+        begun: tuple[float, int] | None = None
+        for frame, outcome in run(recording, config):
+            if pace.step and not _asked_for(frame):
+                return
+            if pace.speed is not None and not pace.step:
+                since_s, first_ns = begun = begun or (time.monotonic(), frame.stamp_ns)
+                due_s = since_s + (frame.stamp_ns - first_ns) / 1e9 / pace.speed
+                time.sleep(max(due_s - time.monotonic(), 0.0))
+            yield frame, outcome
+
+
+def _asked_for(frame: Frame) -> bool:
+    """Wait for a line on standard input; False: it has ended."""
+    sys.stderr.write(f"picture {frame.seq}: Enter lets it come, Ctrl-D ends\n")
+    sys.stderr.flush()
+    return sys.stdin.readline() != ""
+
+
+def _refuse_input(recording: Path, output: Path | str | None) -> None:
+    """An output must not take the place of the recording."""
+    if output not in {None, "-"} and Path(output).exists() and Path(output).samefile(recording):
+        raise UsageError(f"{output}: is the recording itself; name another file to write")

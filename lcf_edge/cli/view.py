@@ -1,0 +1,24 @@
+"""``lcf-edge view``: a page for a browser, of what a running daemon sees or a recording shows."""
+# ruff: noqa: PLC0415
+
+from collections.abc import Callable
+
+from lcf_edge.errors import LcfError
+from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.replay.replayed import Replayed
+
+
+def view(seen: Source | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
+    """Serve the page until a signal ends it.
+
+    Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``view``.
+    """
+    try:
+        import aiohttp  # noqa: F401
+    except ImportError as error:
+        raise LcfError("view: aiohttp is missing; run pip install 'lcf-edge[view]'") from error
+    import asyncio
+
+    from lcf_edge.monitor.web.server import serve
+
+    asyncio.run(serve(seen, host, port, tell))

@@ -1,0 +1,23 @@
+"""Zenoh's endpoints, as ``tcp/127.0.0.1:7447``: what is wrong with one, before Zenoh waits for it for ever."""
+
+import re
+
+_WITH_PORTS = frozenset({"tcp", "udp", "tls", "quic", "ws"})
+_MAX_PORT = 65535
+_EXAMPLE = "write for example tcp/127.0.0.1:7447"
+
+
+def fault(endpoint: str) -> str:
+    """What is wrong, with the remedy; empty: nothing. What stands behind ``#`` may be keys and is not shown."""
+    shown = endpoint.partition("#")[0]
+    protocol, slash, address = shown.partition("?")[0].partition("/")
+    if not (protocol and slash and address):
+        return f"{shown}: no endpoint, which is protocol/address; {_EXAMPLE}"
+    if protocol not in _WITH_PORTS:
+        return ""
+    host, colon, port = address.rpartition(":")
+    if not host or (host.startswith("[") and not host.endswith("]")):
+        return f"{shown}: {'no host' if colon and not host else 'no port'}; {_EXAMPLE}"
+    if not re.fullmatch(r"[0-9]{1,5}", port) or int(port) > _MAX_PORT:
+        return f"{shown}: invalid port; write a number up to {_MAX_PORT}"
+    return ""

@@ -1,0 +1,136 @@
+"""From a picture to corners: FAST, but for those along an edge; spread over the picture, with looks."""
+
+import math
+
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.config import Filter
+from lcf_edge.corners.along_edge import keep_round
+from lcf_edge.corners.appearance import BORDER_PX, appearance
+from lcf_edge.corners.fast import Fast, Found, Grey, Parts, Pixels, Strengths
+from lcf_edge.corners.fast_threshold import FollowingThreshold
+from lcf_edge.corners.spread import Squares, find_poor, keep_spread, keep_strongest, leave_poor
+from lcf_edge.filter.inputs import Corners
+from lcf_edge.filter.memory import memory_of
+from lcf_edge.lens import Lens
+
+SQUARES = 192  # that a picture is divided into, about
+MOST = 4.0  # times the mean: no square has more corners
+FEW = 2  # a square with fewer is poor
+SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
+THRESHOLDS = (13, 90)
+WEAKEST = THRESHOLDS[0]  # what is fainter still is noise as often as not
+ROWS_ABOVE = 2  # of squares: what can be met may begin so much higher than is thought
+WEAK_SHARE = 0.5  # of the wanted corners may be looked at there
+
+
+class CornerDetector:
+    """FAST-9 corners of one size of picture, at most ``capacity`` a frame.
+
+    With ``fast_adaptive`` about ``corners_target`` are found, by a threshold that follows the scene; no part of the
+    picture has more than its share, and where there are next to none a lower threshold looks again. All of it depends
+    on the pictures so far and nothing else. ``seen``: where corners are wanted, (height, width), elsewhere 0; None:
+    everywhere.
+    """
+
+    def __init__(self, settings: Filter, lens: Lens, capacity: int, seen: Grey | None = None) -> None:
+        self._seen = seen
+        self._settings = settings
+        self._lens = lens
+        self._capacity = capacity
+        size = lens.width, lens.height
+        self._room = BORDER_PX, np.array((*size, *size), np.int32) - BORDER_PX
+        self._whole = np.array([(0, 0, *size)], np.int32)
+        self._fast = Fast(*size)
+        self._budget_squares = Squares(*size, SPREAD_PX)
+        self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
+        self._most = max(round(MOST * settings.corners_target / SQUARES), FEW)
+        self._rectangles = np.asarray(self._squares.rectangles)
+        self._among = memory_of(self._touched(seen))
+        self._strong = FollowingThreshold(settings.fast_threshold, *THRESHOLDS)
+        self._weak = FollowingThreshold(WEAKEST, WEAKEST, THRESHOLDS[1])
+
+    @property
+    def threshold(self) -> int:
+        """Of the next frame, grey levels."""
+        return self._strong.value
+
+    def detect(self, image: Grey, highest_row: float = math.nan) -> tuple[Corners, int]:
+        """Corners of a (height, width) picture, and how many were left out because the budget was full.
+
+        ``highest_row``: px, above it nothing can be met, and faint corners are not looked for; NaN: unknown.
+        """
+        image = np.ascontiguousarray(image)
+        self._fast.look(image)
+        pixel, strength = self._look(image, self._strong, self._whole)
+        if self._settings.fast_adaptive:
+            pixel, strength = self._shared_out(image, pixel, strength, highest_row)
+        position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
+        if self._lens.is_distorted:
+            placed = np.isfinite(position[:, 0]).nonzero()[0]
+            pixel, position, strength = pixel.take(placed, axis=0), position.take(placed, axis=0), strength.take(placed)
+        evicted = max(0, len(pixel) - self._capacity)
+        if evicted:
+            kept = strongest_spread(self._budget_squares, pixel, strength, self._capacity)
+            pixel, position = pixel.take(kept, axis=0), position.take(kept, axis=0)
+        return Corners(pixel, position, appearance(image, pixel)), evicted
+
+    def _look(self, image: Grey, threshold: FollowingThreshold, parts: Parts) -> Found:
+        """Corners of parts of the picture, but for those along an edge."""
+        within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
+        pixel, strength = self._fast.corners(threshold.value, within)
+        if self._seen is not None:
+            seen = self._seen[pixel[:, 1], pixel[:, 0]] != 0
+            pixel, strength = pixel[seen], strength[seen]
+        if least := self._settings.least_roundness:
+            count = keep_round(image.reshape(-1).data, image.shape[1], pixel.data, strength.data, least)
+            pixel, strength = pixel[:count], strength[:count]
+        return pixel, strength
+
+    def _shared_out(self, image: Grey, pixel: Pixels, strength: Strengths, highest_row: float) -> Found:
+        """No square has more than its share; the poor ones are looked at again."""
+        squares = self._squares
+        pixel, strength = strongest(squares, pixel, strength, self._most)
+        found = 0
+        if self._weak.value < self._strong.value:  # else it would find what has been found
+            first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
+            square = np.empty(len(pixel), np.int32)
+            poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
+            faint, how_faint = self._look(image, self._weak, self._rectangles[:poor])
+            found = len(faint)
+            if found:  # also what is in the poor ones, again
+                rich = leave_poor(squares, pixel.data, strength.data, square.data)
+                faint, how_faint = strongest(squares, faint, how_faint, FEW)
+                pixel, strength = np.concatenate([pixel[:rich], faint]), np.concatenate([strength[:rich], how_faint])
+        self._weak.follow(max(found, 1) / (WEAK_SHARE * self._settings.corners_target))
+        self._strong.follow(max(len(pixel), 1) / self._settings.corners_target)
+        return pixel, strength
+
+    def _touched(self, seen: Grey | None) -> npt.NDArray[np.uint8]:
+        """Which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
+        rows, columns, side = self._squares.rows, self._squares.columns, self._squares.side_px
+        if seen is None:
+            return np.ones((rows, columns), np.uint8)
+        across = np.maximum.reduceat(seen, np.arange(columns) * side, axis=1)
+        return np.maximum.reduceat(across, np.arange(rows) * side, axis=0)
+
+
+def strongest(squares: Squares, pixel: Pixels, strength: Strengths, share: int) -> Found:
+    """The ``share`` strongest corners of each square, in the same order; the arrays are written."""
+    held, square = np.empty((2, len(pixel)), np.int32)
+    count = keep_strongest(squares, pixel.data, strength.data, held.data, square.data, share)
+    return pixel[:count], strength[:count]
+
+
+def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capacity: int) -> npt.NDArray[np.int32]:
+    """Rows, ascending, of the ``capacity`` corners to keep: the strongest of every square, then the second, and on."""
+    held, place = np.empty((2, len(pixel)), np.int32)
+    count = min(capacity, len(pixel))
+    keep_spread(squares, pixel.data, strength.data, held.data, place.data, count)
+    return place[:count]
+
+
+def side_px(width: int, height: int) -> int:
+    """Of ``SQUARES`` squares that divide a picture."""
+    return max(round(math.sqrt(width * height / SQUARES)), 1)

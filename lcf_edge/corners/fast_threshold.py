@@ -1,0 +1,24 @@
+"""A threshold of FAST-9 that follows the scene."""
+
+
+class FollowingThreshold:
+    """Grey levels, kept within ``least`` and ``most`` once it follows."""
+
+    def __init__(self, value: int, least: int, most: int) -> None:
+        self.value = value
+        self._range = least, most
+        self._too_many: bool | None = None  # in the last frame
+
+    def follow(self, ratio: float) -> None:
+        """Take next frame's threshold; ``ratio``: how many corners were found to how many are wanted.
+
+        Corner counts fall with its 1.5th to 8th power: a step suits 2.5, and 5 when the last one went too far.
+        """
+        swung = self._too_many not in {None, ratio > 1}
+        self._too_many = ratio > 1
+        power = 0.2 if swung else 0.4
+        wanted = self.value * min(max(ratio**power, 0.6), 1.6)
+        least, most = self._range
+        value = min(max(round(wanted), least), most)
+        if abs(wanted - self.value) > 0.2 * power * self.value and value != self.value:
+            self.value = value

@@ -1,0 +1,65 @@
+"""What is wrong with a picture, in a word: few corners, dark, glare, blurred."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+FEW_CORNERS = 40
+DARK = 25  # mean grey level
+BURNT_OUT = 250  # grey level of a pixel
+GLARE_SHARE = 0.2  # of the picture is burnt out
+BLURRED = 0.65  # of the usual sharpness
+MEMORY = 0.05  # share by which each picture changes what is usual
+GREY_STEP_PX, LINE_STEP_PX = 8, 32  # of the samples
+
+Grey = npt.NDArray[np.uint8]
+
+
+class PictureQuality:
+    """Follows the pictures of one camera: what is sharp for one lens is soft for another."""
+
+    def __init__(self) -> None:
+        self._usual: float | None = None  # sharpness
+
+    def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
+        """What degrades this (height, width) picture, in which so many corners were found; most often nothing."""
+        grey = image[::GREY_STEP_PX, ::GREY_STEP_PX]
+        notes: list[str] = []
+        if not corners:
+            notes.append("no corners")
+        elif corners < FEW_CORNERS:
+            notes.append("few corners")
+        if grey.sum() < DARK * grey.size:
+            notes.append("dark")
+        if np.count_nonzero(grey >= BURNT_OUT) > GLARE_SHARE * grey.size:
+            notes.append("glare")
+        sharp = sharpness(image)
+        usual = sharp if self._usual is None else self._usual
+        if sharp < BLURRED * usual:
+            notes.append("blurred")
+        self._usual = usual + MEMORY * (sharp - usual)
+        return tuple(notes)
+
+
+def sharpness(image: Grey) -> float:
+    """How much of what differs over 4 px differs over 1 px already, squared: 1/4 of steps, 1/16 of long ramps.
+
+    The lesser of rows and columns, as motion blurs one direction alone.
+    """
+    rows = image[LINE_STEP_PX // 2 :: LINE_STEP_PX]
+    columns = np.ascontiguousarray(image[:, LINE_STEP_PX // 2 :: LINE_STEP_PX].T)
+    return min(_fine_share(rows), _fine_share(columns))
+
+
+def _fine_share(lines: Grey) -> float:
+    """``lines``: uint8 (n, length), each along a row or a column of the picture."""
+    if lines.shape[0] == 0 or lines.shape[1] <= 4:
+        return 1.0
+    near, far = _square_difference(lines, 1), _square_difference(lines, 4)
+    return near / max(far, 1.0)
+
+
+def _square_difference(lines: Grey, apart: int) -> float:
+    """Mean over all places."""
+    count = lines.shape[0] * (lines.shape[1] - apart)
+    return float(cv2.norm(lines[:, apart:], lines[:, :-apart], cv2.NORM_L2SQR) / count)

@@ -1,0 +1,172 @@
+"""The picture in squares: which corners are kept, and where there are too few.
+
+A hedge, a row of trees or printed paint has more corners than all the rest and would take them all; something dark
+before a bright sky has none that are as strong.
+"""
+
+from typing import Any, TypeAlias
+
+from lcf_edge.filter.memory import integers, octets
+
+Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
+Grid: TypeAlias = Any  # and [i, j]
+LEAVES = -1  # the square of a corner that is one too many
+
+
+class Squares:
+    """The squares of one size of picture, row after row.
+
+    ``begin``: of each square, where its corners begin in a list of all, square after square, or how many it has;
+    ``poor``: uint8, 1 where there are few; ``rectangles``: int32 (n, 4), left, top, right, bottom, px,
+    the last two beyond it; as many in use as ``find_poor`` says.
+    """
+
+    def __init__(self, width: int, height: int, side_px: int) -> None:
+        self.side_px = side_px
+        self.rows, self.columns = -(-height // side_px), -(-width // side_px)
+        self.begin = integers(self.rows * self.columns + 1)
+        self.poor = octets(self.rows * self.columns)
+        self.rectangles = integers(self.rows * self.columns, 4)
+
+
+def count(squares: Squares, pixel: Grid, square: Column) -> None:
+    """How many corners each square has; ``square``, int32 (n,), of each corner, is written."""
+    for s in range(squares.begin.shape[0]):
+        squares.begin[s] = 0
+    for i in range(pixel.shape[0]):
+        square[i] = pixel[i, 1] // squares.side_px * squares.columns + pixel[i, 0] // squares.side_px
+        squares.begin[square[i]] += 1
+
+
+def gather(squares: Squares, square: Column, held: Column) -> None:
+    """List the counted corners by squares: ``held``, int32 (n,), is written."""
+    for s in range(1, squares.begin.shape[0]):
+        squares.begin[s] += squares.begin[s - 1]
+    for i in range(square.shape[0] - 1, -1, -1):
+        squares.begin[square[i]] -= 1
+        held[squares.begin[square[i]]] = i
+
+
+def place_in_square(squares: Squares, s: int, i: int, strength: Column, held: Column, enough: int) -> int:
+    """How many corners of a gathered square are stronger than one of them, or as strong and earlier; or ``enough``."""
+    place = 0
+    for k in range(squares.begin[s], squares.begin[s + 1]):
+        other = held[k]
+        if strength[other] > strength[i] or (strength[other] == strength[i] and other < i):
+            place += 1
+            if place >= enough:
+                break
+    return place
+
+
+def keep_spread(squares: Squares, pixel: Grid, strength: Column, held: Column, place: Column, capacity: int) -> None:
+    """Write to ``place`` which ``capacity`` corners stay, ascending: the strongest of every square, then the second,
+    and on; of the last ones the strongest of all.
+
+    ``held``, ``place``: int32 (n,), written; ``capacity``: n at most.
+    """
+    count(squares, pixel, place)
+    last, fit = 0, 0  # places in a square for which there is room, and corners in them
+    while fit < capacity:
+        last += 1
+        fit = 0
+        for s in range(squares.rows * squares.columns):
+            fit += min(squares.begin[s], last)
+    gather(squares, place, held)
+    room = capacity
+    for i in range(pixel.shape[0]):
+        place[i] = place_in_square(squares, place[i], i, strength, held, last)
+        room -= place[i] < last - 1
+    rivals = 0
+    for i in range(pixel.shape[0]):
+        if place[i] == last - 1:
+            held[rivals] = i
+            rivals += 1
+    for k in range(rivals):
+        stronger = 0
+        for j in range(rivals):
+            more = strength[held[j]] > strength[held[k]]
+            stronger += more or (strength[held[j]] == strength[held[k]] and j < k)
+            if stronger >= room:
+                break
+        if stronger >= room:
+            place[held[k]] = last
+    kept = 0
+    for i in range(pixel.shape[0]):
+        if place[i] < last:
+            place[kept] = i
+            kept += 1
+
+
+def keep_strongest(squares: Squares, pixel: Grid, strength: Column, held: Column, square: Column, share: int) -> int:
+    """Move the ``share`` strongest corners of each square to the front, in the same order. Return how many.
+
+    ``held``, ``square``: int32 (n,), written.
+    """
+    count(squares, pixel, square)
+    gather(squares, square, held)
+    for i in range(pixel.shape[0]):
+        s = square[i]
+        if squares.begin[s + 1] - squares.begin[s] > share:  # where there are fewer, all stay
+            leaves = place_in_square(squares, s, i, strength, held, share) >= share
+            square[i] = LEAVES if leaves else s
+    kept = 0
+    for i in range(pixel.shape[0]):
+        if square[i] != LEAVES:
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            kept += 1
+    return kept
+
+
+def find_poor(squares: Squares, pixel: Grid, square: Column, few: int, among: Grid, first_row: int) -> int:
+    """Mark the squares that have less than ``few`` corners, and make rectangles of them.
+
+    ``square``: int32 (n,), written. ``among``: uint8 (rows, columns), 0: not this one; nor those above ``first_row``.
+    Neighbours in a row are one rectangle, and so are rows with the same ones below each other. Return how many there
+    are.
+    """
+    count(squares, pixel, square)
+    for row in range(squares.rows):
+        for column in range(squares.columns):
+            s = row * squares.columns + column
+            squares.poor[s] = squares.begin[s] < few and row >= first_row and among[row, column] != 0
+    found = 0
+    for row in range(squares.rows):
+        column = 0
+        while column < squares.columns:
+            left = column
+            while column < squares.columns and squares.poor[row * squares.columns + column]:
+                column += 1
+            if column > left:
+                found = add_rectangle(squares, found, left, column, row)
+            column += 1
+    return found
+
+
+def add_rectangle(squares: Squares, found: int, left: int, right: int, row: int) -> int:
+    """Add the squares from ``left`` to before ``right`` to the rectangle of those above them, or as a new one.
+
+    Return how many rectangles there are.
+    """
+    side = squares.side_px
+    for k in range(found - 1, -1, -1):
+        below = squares.rectangles[k, 3] == row * side
+        if below and squares.rectangles[k, 0] == left * side and squares.rectangles[k, 2] == right * side:
+            squares.rectangles[k, 3] += side
+            return found
+    squares.rectangles[found, 0], squares.rectangles[found, 1] = left * side, row * side
+    squares.rectangles[found, 2], squares.rectangles[found, 3] = right * side, (row + 1) * side
+    return found + 1
+
+
+def leave_poor(squares: Squares, pixel: Grid, strength: Column, square: Column) -> int:
+    """Move the corners outside the poor squares to the front, in the same order. Return how many.
+
+    ``square``: as ``find_poor`` has written it.
+    """
+    kept = 0
+    for i in range(pixel.shape[0]):
+        if not squares.poor[square[i]]:
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            kept += 1
+    return kept

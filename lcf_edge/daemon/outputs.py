@@ -1,0 +1,85 @@
+"""All sinks of a running daemon as one."""
+
+import time
+from collections.abc import Callable, Sequence
+
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Config
+from lcf_edge.daemon.log import LOGGER
+from lcf_edge.daemon.memory import Shedding
+from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.messages import PipelineScene, View
+from lcf_edge.sinks import SinkError
+from lcf_edge.sinks.sink import Sink
+
+
+class Outputs:
+    """Hands on to each sink. One that fails is left out from then on, and the diagnostics tell why."""
+
+    def __init__(self, sinks: Sequence[Sink]) -> None:
+        self._sinks = tuple(sinks)
+        self._working = self._sinks
+        self._errors: dict[str, SinkError] = {}
+
+    def start(self) -> None:
+        """Start the threads of those that have some."""
+        for sink in self._sinks:
+            sink.start()
+
+    def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> int:
+        """Hand a frame and its scene to each. Return when the first had it, monotonic ns."""
+        first_ns: int | None = None
+        for sink in self._working:
+            try:
+                sink.put(frame, scene, view)
+            except SinkError as error:
+                self._leave_out(sink, error)
+            if first_ns is None:
+                first_ns = time.monotonic_ns()
+        return first_ns or time.monotonic_ns()
+
+    def put_sample(self, sample: ImuSample | SpeedSample) -> None:
+        """Hand a sample to each."""
+        for sink in self._working:
+            sink.put_sample(sample)
+
+    def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
+        """Hand each how the parts of the daemon are, as of ``stamp_ns`` of the monotonic clock."""
+        for sink in self._working:
+            sink.put_diagnostics(stamp_ns, statuses)
+
+    def show_config(self, config: Config) -> None:
+        """Tell each the configuration after a reload."""
+        for sink in self._working:
+            sink.show_config(config)
+
+    def statuses(self) -> list[DeviceStatus]:
+        """Return how each is, of those that have something to tell."""
+        working = [sink.status() for sink in self._working]
+        failed = [DeviceStatus(name, Level.ERROR, str(error)) for name, error in self._errors.items()]
+        return [*(status for status in working if status is not None), *failed]
+
+    def sheddings(self) -> list[Shedding]:
+        """Return what they can give up when memory is short, in order."""
+        return [Shedding(sink.sheds, sink.shed) for sink in self._sinks if sink.sheds]
+
+    def close(self) -> None:
+        """Nothing more comes. Returns soon; ``join`` waits for the rest."""
+        for sink in self._sinks:
+            try:
+                sink.close()
+            except SinkError as error:
+                if sink.name not in self._errors:
+                    self._leave_out(sink, error)
+
+    def join(self, timeout_s: float) -> None:
+        """Wait until all have ended; those that do not in time are left behind, and named in the log."""
+        deadline_s = time.monotonic() + timeout_s
+        for sink in self._sinks:
+            if not sink.join(max(deadline_s - time.monotonic(), 0)):
+                LOGGER.warning("%s: does not end in time; left behind", sink.name)
+
+    def _leave_out(self, sink: Sink, error: SinkError) -> None:
+        LOGGER.error("%s: %s; the daemon goes on without it", sink.name, error)
+        self._errors[sink.name] = error
+        self._working = tuple(other for other in self._working if other is not sink)

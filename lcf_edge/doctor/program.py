@@ -1,0 +1,20 @@
+"""The words with which this very program can be called again, by its user and with ``sudo``."""
+
+import shlex
+import shutil
+import sys
+from pathlib import Path
+
+SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
+"""Where ``sudo`` looks for commands; an environment that is active is not among them."""
+
+
+def program(environment: Path = Path(sys.prefix), path: str = SYSTEM_PATH) -> str:
+    """For a shell: ``lcf-edge`` where that name on ``path`` is the program of ``environment``, else its full path."""
+    script = environment / "bin" / "lcf-edge"
+    named = shutil.which("lcf-edge", path=path)
+    if named and script.exists() and Path(named).samefile(script):
+        return "lcf-edge"
+    if script.exists():
+        return shlex.quote(str(script))
+    return f"{shlex.quote(sys.executable)} -m lcf_edge"

@@ -1,0 +1,422 @@
+"""Ego-motion: how the camera turned and how fast the vehicle drove between two exposures.
+
+Camera axes: x right, y down, z forward (taken for the vehicle's forward). With body rates ω the camera's
+orientation follows Ṙ = R·[ω]×, so a direction that stands still turns by exp(-[ω]× dt) in the camera's axes.
+No clock, no I/O; memory is two fixed rings of samples.
+"""
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from itertools import islice
+from math import exp, expm1, hypot, inf, isfinite, nan, sqrt
+
+import numpy as np
+import numpy.typing as npt
+
+from drivers.samples import ImuSample, SpeedSample
+from lcf_edge.config import Imu, Vehicle
+from lcf_edge.ego_motion.gyro_bias import GyroBias
+from lcf_edge.ego_motion.inertial_speed import GRAVITY_MPS2, MAX_SPEED_MPS, InertialSpeed
+from lcf_edge.ego_motion.sample_ring import Ring, Span, Track, Window
+from lcf_edge.filter.ground_speed import GroundSpeed
+from lcf_edge.filter.inputs import Motion
+
+Floats = npt.NDArray[np.float64]
+
+IMU_CAPACITY = 1024
+SPEED_CAPACITY = 256
+MIN_DT_S = 5e-3  # of a first frame, or of two with one stamp
+
+# What no small vehicle does.
+_MAX_GYRO_RADPS = 40.0
+_MAX_ACCEL_MPS2 = 200.0
+
+_GAP_S = 0.05  # or five sample intervals: longer without a sample is a gap
+_FRESH_S = 0.5  # older odometry is stale
+
+# Standing still, for this long.
+_REST_NS = 500_000_000
+_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when nothing but a quiet IMU tells it
+_REST_GYRO_RADPS = 0.1  # then, the largest bias that is believed
+_SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # when odometry or the picture tells it: motors shake it
+_REST_GRAVITY_ERROR_MPS2 = 0.8
+_REST_SPEED_MPS = 0.02
+_REST_YAW_RADPS = 0.02
+_REST_TURN_RADPS = 0.02  # what the mean rate may differ within the rest, and from a known bias
+_REST_SIGMA_RADPS = 1e-3  # 1 sigma of how still a rest is
+
+# Rotation, 1 sigma of the rate where nothing measures it.
+_SIGMA_HELD_RADPS = 0.05  # the last sample is held
+_SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
+_SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
+_GUESS_TIME_S = 0.5  # over which that is averaged
+_GUESS_MIN_RADPS, _GUESS_MAX_RADPS = 0.04, 2.0
+_STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value for so long and so often, is stuck
+_NOISY_SHARE = 0.5  # of the samples, at most, are repeated by one with noise
+_WANTED_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
+_LAG_SHARE = 0.5  # of what the flow takes out, that may be left from before: tracks follow late
+_TURN_SHARE = 0.05  # of the rate, that scale and time of the gyro, and the shaken focus, put into the difference
+_ROLL_SHARE = 0.5  # roll moves the picture's edge by so much of what yaw moves it by
+
+_SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
+
+
+@dataclass(frozen=True, slots=True)
+class EgoMotion:
+    """Motion between the previous exposure and the present one."""
+
+    dt_s: float
+    rotation: Floats  # (3, 3), a direction in the previous camera axes → in the present ones
+    rotation_sigma_rad: float  # 1 sigma of the rotation's angle
+    speed_mps: float  # forward, mean over the interval, NaN: unknown
+    yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
+    path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
+    gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: never stood still yet
+    notes: tuple[str, ...]  # what degrades it; docs/replay.md lists them
+
+    def to_motion(self) -> Motion:
+        """Return what a step of the filter takes of it."""
+        dt_s = max(self.dt_s, MIN_DT_S)
+        return Motion(dt_s, self.rotation, self.rotation_sigma_rad, self.speed_mps, self.path_yaw_rate_radps)
+
+
+@dataclass(slots=True)
+class _Interval:
+    """What is measured over the interval between two exposures."""
+
+    span: Span
+    rates: Track  # as the gyro, or in its place odometry, shows them, in its first columns
+    measured: bool  # by a gyro that lives
+    odometry_mps: float
+    odometry_yaw_radps: float
+    path_yaw_before_radps: float
+    notes: list[str] = field(default_factory=list)
+    mean_radps: Sequence[float] = (0.0, 0.0, 0.0)  # of the rates
+
+
+class EgoMotionEstimator:
+    """Takes IMU and odometry samples; gives the motion from each exposure to the next.
+
+    ``refused`` counts the samples that were not used, or not trusted, by sensor and reason. ``bias``: the gyro's,
+    learnt at rest and from what the pictures show.
+    """
+
+    def __init__(self, imu: Imu, vehicle: Vehicle) -> None:
+        self.refused: Counter[str] = Counter()
+        self.bias = GyroBias()
+        self._vehicle = vehicle
+        self._axes = imu.axes
+        self._offset_ns = round(imu.time_offset_s * 1e9)
+        self._noise_radps = imu.gyro_noise_radps
+        self._imu = Ring("imu", IMU_CAPACITY, 7, self.refused)  # gyro, specific force, whether saturated
+        self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
+        self._inertial = InertialSpeed(imu.gyro_noise_radps)
+        self._path_yaw_radps = 0.0
+        self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
+        self._noisy = False  # as a real gyro; made-up samples have no noise
+        self._speed_mps = nan
+        self._stamp_ns: int | None = None
+        self._samples = Track(IMU_CAPACITY + 2, self._imu.columns)
+        self._speeds = Track(SPEED_CAPACITY + 2, self._odometry.columns)
+        self._guessed = Track(2, 3)
+        self._window = Window()
+        self._interval = _Interval(Span(0, 0), self._guessed, False, nan, nan, 0.0)
+        self._error_radps = [0.0, 0.0, 0.0]
+
+    def add_imu(self, sample: ImuSample) -> None:
+        """Take a sample, in time order; one that is not finite, absurd or late is refused and counted."""
+        values: tuple[float, ...] = (*sample.gyro, *sample.accel)
+        if not all(map(isfinite, values)):
+            self._imu.refuse("not finite")
+        elif hypot(*sample.gyro) > _MAX_GYRO_RADPS or hypot(*sample.accel) > _MAX_ACCEL_MPS2:
+            self._imu.refuse("out of range")
+        else:
+            if sample.saturated:
+                self._imu.refuse("saturated")
+            if self._axes:
+                values = (*_in_camera_axes(self._axes, sample.gyro), *_in_camera_axes(self._axes, sample.accel))
+            self._imu.add(sample.stamp_ns + self._offset_ns, (*values, sample.saturated))
+
+    def add_speed(self, sample: SpeedSample) -> None:
+        """Take a sample, in time order; one that is not finite, absurd or late is refused and counted."""
+        if not isfinite(sample.speed_mps):
+            self._odometry.refuse("not finite")
+        elif abs(sample.speed_mps) > MAX_SPEED_MPS or abs(sample.yaw_rate_radps) > _MAX_GYRO_RADPS:
+            self._odometry.refuse("out of range")
+        else:
+            self._odometry.add(sample.stamp_ns, (sample.speed_mps, sample.yaw_rate_radps))
+
+    def advance(self, stamp_ns: int, still: bool | None = None) -> EgoMotion:
+        """The motion over (previous stamp, ``stamp_ns``], from the samples taken so far.
+
+        ``still``: whether the picture has stood still for half a second, None: it does not tell. The first frame has
+        no interval; neither has one whose stamp goes back, which is counted.
+
+        ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
+        interval) (white noise), and stated rates over what was held, missed or saturated. Without a gyro: by how much
+        rates were lately guessed wrong.
+        """
+        notes: list[str] = []
+        if self._stamp_ns is None:
+            notes.append("first frame")
+            self._stamp_ns = stamp_ns
+        if stamp_ns < self._stamp_ns:
+            self.refused["frame stamp goes back"] += 1
+            stamp_ns = self._stamp_ns
+        span = Span(self._stamp_ns, stamp_ns)
+        self._stamp_ns = self._imu.used_ns = self._odometry.used_ns = stamp_ns
+
+        odometry_mps, odometry_yaw_radps = nan, nan
+        if self._odometry.age_s(stamp_ns) <= _FRESH_S:
+            self._odometry.between(span, self._speeds)
+            odometry_mps, odometry_yaw_radps = self._speeds.mean()
+        interval = _Interval(span, self._guessed, False, odometry_mps, odometry_yaw_radps, self._path_yaw_radps, notes)
+        self._interval = interval
+        gap_limit_s = max(_GAP_S, 5 * self._imu.period_s())
+        if self._imu.covers(span, gap_limit_s):
+            may_rest = still is not False and self._stands(stamp_ns, odometry_mps, still) is not False
+            force_mps2, gap_s, sigma_radps = self._measure(interval, gap_limit_s, may_rest)
+        else:
+            interval.notes.append("no imu")
+        if interval.measured:
+            self.bias.advance(span.dt_s, (sigma_radps, sigma_radps, sigma_radps), True)
+        else:
+            self._guess(interval)
+            self.bias.advance(span.dt_s, [sqrt(variance) for variance in self._guess_variance], False)
+        rest_mps2 = self._learn_rest(span, gap_limit_s, odometry_mps, still) if interval.measured else None
+        rotation = self._rotation()
+        if not interval.measured:
+            self._inertial.lose()
+        elif rest_mps2 is not None:
+            self._inertial.rest(rest_mps2, span.dt_s, force_mps2, rotation)
+        else:
+            self._inertial.advance(span.dt_s, force_mps2, rotation, gap_s)
+        if interval.measured and not self.bias.known:
+            interval.notes.append("gyro bias unknown")
+        self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
+        return self._answer(rotation)
+
+    def _measure(self, interval: _Interval, gap_limit_s: float, may_rest: bool) -> tuple[list[float], float, float]:
+        """Take in the IMU's samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates."""
+        span, imu, period_s = interval.span, self._imu, self._imu.period_s()
+        held_s, gap_s = imu.held_s(span), imu.gap_s(span, gap_limit_s)
+        if held_s > gap_limit_s:
+            held_s, gap_s = 0.0, gap_s + held_s
+        if gap_s > 0:
+            interval.notes.append("imu gap")
+        imu.between(span, self._samples)
+        whole = self._samples.mean()
+        interval.rates, interval.mean_radps = self._samples, whole[:3]
+        saturated_s = whole[6] * span.dt_s
+        if saturated_s > 0:
+            interval.notes.append("imu saturated")
+        left_radps = sqrt(max(0.0, self._noise_radps**2 - max(self.bias.sigmas()) ** 2))
+        sigma_rad = left_radps * span.dt_s + self._noise_radps * sqrt(span.dt_s * period_s)
+        sigma_rad += _SIGMA_HELD_RADPS * held_s + _SIGMA_UNKNOWN_RADPS * gap_s
+        sigma_rad += _SIGMA_SATURATED_RADPS * saturated_s
+        interval.measured = not self._stuck(span.end_ns, gap_limit_s, period_s, may_rest)
+        if not interval.measured:
+            interval.notes.append("gyro stuck")
+        return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
+
+    def _guess(self, interval: _Interval) -> None:
+        """Rates that no gyro measures: odometry's yaw, or else it goes on as it went."""
+        yaw_radps = self._path_yaw_radps
+        if isfinite(interval.odometry_yaw_radps):
+            interval.notes.append("rotation from odometry")
+            yaw_radps = interval.odometry_yaw_radps
+        interval.rates, interval.mean_radps = self._guessed, (0.0, -yaw_radps, 0.0)
+        self._guessed.hold(interval.span.dt_s, interval.mean_radps)
+
+    def wants_picture(self, sigma_rad: float) -> bool:
+        """Whether a picture that tells the rotation to ``sigma_rad`` would help in the present interval."""
+        interval = self._interval
+        if not interval.measured or interval.span.dt_s == 0:
+            return True
+        return max(self.bias.error_sigmas()[:2]) * interval.span.dt_s > _WANTED_SHARE * sigma_rad
+
+    def see_picture(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
+        """The motion of the present interval, knowing besides how the whole picture turned.
+
+        A gyro that lives, and whose bias is known, is believed more than a picture that contradicts it; whatever else
+        is said of the rotation is not. ``turn_rad``: rotation vector (3,) of directions, as in
+        ``EgoMotion.rotation``; ``sigma_rad``: (3,).
+        """
+        interval, bias = self._interval, self.bias
+        dt_s = interval.span.dt_s
+        if dt_s == 0:
+            return self._answer(self._rotation())
+        error_radps, sigma_radps = self._less_rates(turn_rad), [sigma / dt_s for sigma in sigma_rad.tolist()]
+        trusted = interval.measured and bias.known
+        if not (bias.see_picture(error_radps, sigma_radps) or trusted):
+            bias.doubt()
+            bias.see_picture(error_radps, sigma_radps)
+            interval.notes.append("rotation from pictures")
+        return self._answer(self._rotation())
+
+    def _less_rates(self, turn_rad: Floats) -> list[float]:
+        """By how much the rates are mistaken if the picture turned so in the present interval, (3,) rad/s."""
+        interval = self._interval
+        both = zip(interval.mean_radps, turn_rad.tolist(), strict=True)
+        return [mean + turned / interval.span.dt_s for mean, turned in both]
+
+    def correct(self, turn_rad: Floats, sigma_rad: Floats, expansion_hz: float = 0.0) -> None:
+        """What the flow took out of the present interval besides: the bias learns from it.
+
+        ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
+        ``expansion_hz``: mean V/Z of what is seen.
+        """
+        interval = self._interval
+        dt_s = interval.span.dt_s
+        if dt_s == 0:
+            return
+        turned_rad = turn_rad.tolist()
+        error_radps = [error + turn / dt_s for error, turn in zip(self._error_radps, turned_rad, strict=True)]
+        if interval.measured:
+            rate_radps = hypot(*(mean - error for mean, error in zip(interval.mean_radps, error_radps, strict=True)))
+            doubt_radps = hypot(_LAG_SHARE * hypot(*turned_rad) / dt_s, _TURN_SHARE * rate_radps)
+            sigma_radps = [hypot(sigma / dt_s, doubt_radps) for sigma in sigma_rad.tolist()]
+            self.bias.see_flow(error_radps, sigma_radps, expansion_hz)
+        else:
+            self._follow_path(error_radps)
+            kept = exp(-dt_s / _GUESS_TIME_S)
+            for k, error in enumerate(error_radps):
+                variance = kept * self._guess_variance[k] + (1 - kept) * error**2
+                self._guess_variance[k] = min(max(variance, _GUESS_MIN_RADPS**2), _GUESS_MAX_RADPS**2)
+
+    def see_ground(self, ground: GroundSpeed) -> None:
+        """Take the speed that the ground shows in the present interval, where nothing measures it.
+
+        Windows overlap: each tells only what is new in it.
+        """
+        interval = self._interval
+        if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
+            return
+        again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
+        self._inertial.see_ground(ground.speed_mps - ground.told_mps, ground.sigma_mps * sqrt(again))
+
+    def _rotation(self) -> Floats:
+        """Of directions, over the interval."""
+        rotation = np.empty((3, 3))
+        x, y, z = self.bias.errors()
+        self._interval.rates.turn(x, y, z, rotation)
+        return rotation
+
+    def _answer(self, rotation: Floats) -> EgoMotion:
+        interval, dt_s = self._interval, self._interval.span.dt_s
+        self._error_radps = self.bias.errors()
+        sigma_x, sigma_y, sigma_z = self.bias.error_sigmas()
+        yaw_rate_radps = self._follow_path(self._error_radps)
+        return EgoMotion(
+            dt_s,
+            rotation,
+            max(sigma_x, sigma_y, _ROLL_SHARE * sigma_z) * dt_s,
+            self._speed_mps,
+            yaw_rate_radps,
+            self._path_yaw_radps,
+            self._inertial.pitch_rad,
+            tuple(interval.notes),
+        )
+
+    def _follow_path(self, error_radps: Sequence[float]) -> float:
+        """The camera's yaw rate if the rates are mistaken by ``error_radps``; the path's follows it."""
+        interval = self._interval
+        yaw_rate_radps = error_radps[1] - interval.mean_radps[1]
+        if isfinite(interval.odometry_yaw_radps):
+            self._path_yaw_radps = interval.odometry_yaw_radps
+        else:
+            before_radps = interval.path_yaw_before_radps
+            share = -expm1(-interval.span.dt_s / _SHAKE_S)
+            self._path_yaw_radps = before_radps + share * (yaw_rate_radps - before_radps)
+        return yaw_rate_radps
+
+    def _stuck(self, stamp_ns: int, gap_limit_s: float, period_s: float, may_rest: bool) -> bool:
+        """Whether the gyro, which had noise, repeats one value; made-up samples may do so at rest, all six."""
+        imu, window = self._imu, self._window
+        if not imu.find_latest(window, stamp_ns, round(max(_STUCK_S, _STUCK_SAMPLES * period_s) * 1e9), gap_limit_s):
+            return False
+        pairs = window.last - window.first - 1
+        repeated = imu.repeats(window, 0, 3)
+        self._noisy = self._noisy or repeated < _NOISY_SHARE * pairs
+        if not (self._noisy and repeated == pairs):
+            return False
+        return not (may_rest and imu.repeats(window, 3, 6) == pairs and self._near_bias(imu.newest(window)))
+
+    def _near_bias(self, rate_radps: Sequence[float]) -> bool:
+        """Whether a rate at rest, in the first three, may be this."""
+        known = zip(rate_radps, self.bias.means(), self.bias.sigmas(), strict=False)
+        return all(abs(rate - mean) <= _REST_TURN_RADPS + 3 * sigma for rate, mean, sigma in known)
+
+    def _learn_rest(
+        self, span: Span, gap_limit_s: float, odometry_mps: float, still: bool | None
+    ) -> list[float] | None:
+        """The mean specific force (3,), which is up, if the vehicle stands still; the gyro's mean is its bias then."""
+        stands = self._stands(span.end_ns, odometry_mps, still)
+        if stands is False or not self._imu.find_latest(self._window, span.end_ns, _REST_NS, gap_limit_s):
+            return None
+        imu, first, last = self._imu, self._window.first, self._window.last
+        rows = last - first
+        at = imu.average(first, last)
+        std = imu.deviation(self._window, at)
+        gyro_std, accel_std = max(std[:3]), max(std[3:6])
+        if not self._near_bias(at[:3]):
+            return None
+        level = abs(hypot(*at[3:6]) - GRAVITY_MPS2) <= _REST_GRAVITY_ERROR_MPS2
+        if stands:
+            halves = zip(imu.average(first, first + rows // 2), imu.average(first + rows // 2, last), std, strict=True)
+            steady = all(
+                abs(one - other) <= _REST_TURN_RADPS + 3 * sigma * sqrt(4 / rows)
+                for one, other, sigma in islice(halves, 3)
+            )
+            rests = steady and gyro_std <= _SHAKEN_GYRO_STD_RADPS and accel_std <= _SHAKEN_ACCEL_STD_MPS2
+        else:
+            quiet = gyro_std <= _REST_GYRO_STD_RADPS and accel_std <= _REST_ACCEL_STD_MPS2
+            rests = quiet and level and (self.bias.known or hypot(*at[:3]) <= _REST_GYRO_RADPS)
+        if not rests:
+            return None
+        rate_radps = at[:3]
+        if self.bias.known:  # the window's other samples have been used
+            rate_radps = list(self._interval.mean_radps)
+            rows = self._interval.rates.count
+        self.bias.see_rest(rate_radps, _REST_SIGMA_RADPS + 2 * gyro_std / sqrt(rows))
+        return at[3:6] if level else None
+
+    def _stands(self, stamp_ns: int, odometry_mps: float, still: bool | None) -> bool | None:
+        """Whether the picture or odometry says that it stands; None: it may."""
+        if still:
+            return True
+        if isfinite(odometry_mps):
+            if abs(odometry_mps) > _REST_SPEED_MPS:
+                return False
+            odometry, window = self._odometry, self._window
+            return (
+                odometry.find_latest(window, stamp_ns, _REST_NS, inf)
+                and odometry.largest(window, 0) <= _REST_SPEED_MPS
+                and not odometry.largest(window, 1) > _REST_YAW_RADPS  # NaN: unknown
+            )
+        if still is False and not self.bias.known:
+            return False  # what moves in it may be others, but nothing else speaks for rest
+        return None if self._inertial.may_stand() else False
+
+    def _choose_speed(self, span: Span, odometry_mps: float, notes: list[str]) -> float:
+        """Mean speed over the interval by ``vehicle.speed_source``, m/s; NaN: unknown."""
+        source, constant_mps = self._vehicle.speed_source, self._vehicle.speed_mps
+        if source in ("auto", "odometry", "zenoh") and isfinite(odometry_mps):
+            if self._odometry.age_s(span.end_ns) <= span.dt_s:  # not one that is only held
+                self._inertial.correct(odometry_mps)
+            return odometry_mps
+        if source in ("auto", "constant") and constant_mps is not None:
+            return constant_mps
+        if source in ("auto", "imu") and isfinite(self._inertial.mean_mps):
+            if self._inertial.sigma_mps > 0:
+                notes.append("speed drifts")
+            return self._inertial.mean_mps
+        notes.append("no speed")
+        return nan
+
+
+def _in_camera_axes(axes: Sequence[Sequence[float]], vector: Sequence[float]) -> tuple[float, ...]:
+    """``axes``: (3, 3), of ``imu.axes``."""
+    x, y, z = vector
+    return tuple(row[0] * x + row[1] * y + row[2] * z for row in axes)

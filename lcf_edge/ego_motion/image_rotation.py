@@ -1,0 +1,101 @@
+"""By how much the camera turned between two pictures, by the pictures alone.
+
+Phase correlation of small pictures, their brightness levelled: the shift that most of the picture shares, found at
+once, however far it went. What is near or moves by itself shifts otherwise, and does not agree with the rest. Good to
+a few pixels, which is near enough for corners to be matched; no clock, no I/O.
+"""
+
+from dataclasses import dataclass
+from math import hypot, log2, pi
+from typing import Any
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.lens import Lens
+
+Grey = npt.NDArray[np.uint8]
+Floats = npt.NDArray[np.float64]
+
+_AREA_PX = 4800  # of a small picture, about
+_LEVEL_PX = 9  # over which brightness is levelled
+_MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a small picture: a plain one shows no shift
+_MIN_RESPONSE = 0.3  # share of the correlation in its peak
+_SIGMA_PX = 0.35  # 1 sigma of the shift of small pictures
+_SIGMA_SHARE = 0.03  # and of its size: roll, and the corners of the picture
+_ROLL_SIGMA_RAD = pi  # unknown
+_STEP_RAD = 1e-3
+_GRID = 24
+_MIN_GAIN_PX = 1.0  # a rad; lenses that no camera has give less
+
+
+@dataclass(frozen=True, slots=True)
+class Turn:
+    """``turn_rad``: rotation vector (3,) of directions in camera axes; ``sigma_rad``: (3,), 1 sigma."""
+
+    turn_rad: Floats
+    sigma_rad: Floats
+
+
+class ImageRotation:
+    """For pictures of one size and ``lens``. ``sigma_rad``: how well it tells pitch and yaw at best."""
+
+    def __init__(self, lens: Lens) -> None:
+        self._before: npt.NDArray[np.float32] | None = None
+        self._halvings = max(0, round(log2(lens.width * lens.height / _AREA_PX) / 2))
+        side = 2**self._halvings
+        self._width, self._height = lens.width // side, lens.height // side
+        if min(self._width, self._height) < 2:
+            self._halvings, self._width, self._height = 0, lens.width, lens.height
+        self._window = np.outer(np.hanning(self._height), np.hanning(self._width)).astype(np.float32)
+        self._px_per_rad = _gain(lens) / 2**self._halvings
+        self.sigma_rad = _SIGMA_PX / float(self._px_per_rad.min())
+
+    def forget(self) -> None:
+        """The next picture does not follow the last one."""
+        self._before = None
+
+    def turn(self, image: Grey) -> Turn | None:
+        """From the last picture to this one, (height, width); None: they do not tell."""
+        before, self._before = self._before, self._small(image)
+        if before is None or self._before is None:
+            return None
+        (right_px, down_px), response = cv2.phaseCorrelate(before, self._before, self._window)
+        if not response >= _MIN_RESPONSE:
+            return None
+        yaw_gain, pitch_gain = self._px_per_rad.tolist()
+        sigma_px = _SIGMA_PX + _SIGMA_SHARE * hypot(right_px, down_px)
+        return Turn(
+            np.array([-down_px / pitch_gain, right_px / yaw_gain, 0.0]),
+            np.array([sigma_px / pitch_gain, sigma_px / yaw_gain, _ROLL_SIGMA_RAD]),
+        )
+
+    def _small(self, image: Grey) -> npt.NDArray[np.float32] | None:
+        """The picture in small, without its slow changes of brightness; None: it is plain."""
+        side = 2**self._halvings
+        small: npt.NDArray[Any] = image[: self._height * side, : self._width * side]
+        for _ in range(self._halvings):
+            small = cv2.resize(small, (small.shape[1] // 2, small.shape[0] // 2), interpolation=cv2.INTER_AREA)
+        level = small.astype(np.float32)
+        level -= cv2.blur(level, (_LEVEL_PX, _LEVEL_PX))
+        return level if cv2.norm(level) > _MIN_CONTRAST * level.size**0.5 else None
+
+
+def _gain(lens: Lens) -> Floats:
+    """By how many px the picture shifts to the right for 1 rad about y, and up for 1 rad about x, in its middle."""
+    x, y = np.meshgrid(np.linspace(0, lens.width - 1, _GRID), np.linspace(0, lens.height - 1, _GRID))
+    weight = np.outer(np.hanning(_GRID), np.hanning(_GRID)).ravel() ** 2
+    placed = np.stack([x.ravel(), y.ravel()], axis=1).astype(np.float32)
+    u, v = ((lens.undistort(placed) - (lens.cx, lens.cy)) / (lens.fx, lens.fy)).T.astype(np.float64)
+    yawed = np.stack([u + _STEP_RAD * (1 + u * u), v + _STEP_RAD * u * v], axis=1)
+    pitched = np.stack([u - _STEP_RAD * u * v, v - _STEP_RAD * (1 + v * v)], axis=1)
+    gains = []
+    for moved, axis, sign in ((yawed, 0, 1), (pitched, 1, -1)):
+        there = lens.distort((moved * (lens.fx, lens.fy) + (lens.cx, lens.cy)).astype(np.float32))
+        shift = sign * (there - placed)[:, axis] / _STEP_RAD
+        seen = np.isfinite(shift)
+        total = float(weight[seen].sum())
+        gain = float(shift[seen] @ weight[seen]) / total if total > 0 else lens.fx
+        gains.append(max(gain, _MIN_GAIN_PX))
+    return np.array(gains)

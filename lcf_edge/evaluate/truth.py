@@ -1,0 +1,67 @@
+"""What is known of the pictures of a recording: the file ``truth.jsonl`` (docs/evaluate.md)."""
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import msgspec
+
+from lcf_edge.errors import RecordingError
+
+MIN_BOX_PX = 12.0  # smaller threats need not be found yet
+GROWN_SHARE, GROWN_PX = 0.25, 8.0  # of a box, on each side, within which a circle is on it
+MAX_BYTES = 256 * 2**20
+
+
+class Known(msgspec.Struct, frozen=True):
+    """Something in a picture. ``box``: x0, y0, x1, y1, px. ``threat``: it is in the way, straight ahead."""
+
+    name: str
+    box: tuple[float, float, float, float]
+    threat: bool = False
+
+    @property
+    def is_due(self) -> bool:
+        """A threat, and large enough to be found."""
+        return self.threat and min(self.box[2] - self.box[0], self.box[3] - self.box[1]) >= MIN_BOX_PX
+
+    def holds(self, x: float, y: float) -> bool:
+        """Whether a circle with its centre there is on it."""
+        left, top, right, bottom = self.box
+        across, down = GROWN_SHARE * (right - left) + GROWN_PX, GROWN_SHARE * (bottom - top) + GROWN_PX
+        return left - across <= x <= right + across and top - down <= y <= bottom + down
+
+
+class _Line(msgspec.Struct, frozen=True):
+    stamp_ns: int
+    objects: list[Known] = []
+
+
+class Truth:
+    """What is known, picture by picture. Of a recording without truth: that nothing in it moves or is met."""
+
+    def __init__(self, pictures: Mapping[int, Sequence[Known]] | None) -> None:
+        self._pictures = pictures
+
+    @property
+    def is_known(self) -> bool:
+        """Whether somebody has said it."""
+        return self._pictures is not None
+
+    def of(self, stamp_ns: int) -> Sequence[Known] | None:
+        """What is in the picture of this stamp; None: it is not to be scored."""
+        return () if self._pictures is None else self._pictures.get(stamp_ns)
+
+
+def read_truth(path: Path | None) -> Truth:
+    """Read a file of truth; None: there is none. Raises ``RecordingError``."""
+    if path is None:
+        return Truth(None)
+    try:
+        if path.stat().st_size > MAX_BYTES:
+            raise RecordingError(f"{path}: too large for a file of truth; one line a picture is enough")
+        lines = msgspec.json.Decoder(_Line).decode_lines(path.read_bytes())
+    except OSError as error:
+        raise RecordingError(f"{path}: cannot be read ({error.strerror}); name another file of truth") from error
+    except (msgspec.MsgspecError, UnicodeDecodeError) as error:
+        raise RecordingError(f"{path}: {error}; docs/evaluate.md tells what a line of truth holds") from error
+    return Truth({line.stamp_ns: line.objects for line in lines})

@@ -1,0 +1,143 @@
+"""Who does the work: processes on this computer, or the workers of a Dask cluster."""
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Executor, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from lcf_edge import __version__
+from lcf_edge.errors import LcfError
+from lcf_edge.evaluate.one_recording import Done, Task, evaluate
+
+if TYPE_CHECKING:
+    from distributed import Client
+
+PATIENCE_S = 10.0  # of reaching a scheduler
+ANXIETY_S = 30.0  # without a result, after which the cluster is looked at
+
+Outcome = tuple[Task, Done | str]
+"""A task and what became of it; text: why it failed."""
+
+Say = Callable[[str], None]
+
+
+def by_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Outcome]:
+    """Have it done by processes on this computer; yield in the order in which they end.
+
+    A recording that ends its process, by a fault in a decoder say, is told as failed, and no other one with it.
+    """
+    waiting = deque(tasks)
+    while waiting:
+        suspects: list[Task] = []
+        with _pool(jobs) as pool:
+            for task, future in _ended(pool, 2 * jobs, waiting):
+                if isinstance(future.exception(), BrokenProcessPool):
+                    suspects.append(task)
+                else:
+                    yield task, _result(future)
+        for task in suspects:
+            with _pool(1) as pool:
+                with _interrupts_held():
+                    future = pool.submit(evaluate, task, task.frames_before())
+                yield task, _result(future)
+
+
+@contextmanager
+def _pool(jobs: int) -> Iterator[Executor]:
+    fresh = multiprocessing.get_context("spawn")  # nothing of this process's threads and locks goes with them
+    pool = ProcessPoolExecutor(jobs, mp_context=fresh, initializer=_end_by_interrupt)
+    try:
+        yield pool
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Around the start of a worker, which inherits it: Ctrl-C before it is ready would make it print a traceback."""
+    signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def _end_by_interrupt() -> None:
+    """Ctrl-C reaches the workers too; they end without a word."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+
+
+def by_cluster(tasks: Sequence[Task], endpoint: str, say: Say) -> Iterator[Outcome]:
+    """Have it done by the workers of a Dask scheduler, which see the recordings under the same paths.
+
+    What a worker had when it was lost, another one does. Raises ``LcfError`` when there is no scheduler, or none of its
+    workers has this version of the program.
+    """
+    try:
+        from distributed import Client  # noqa: PLC0415  # an extra
+    except ImportError as error:
+        raise LcfError(
+            "--scheduler needs the package distributed; install it: pip install 'lcf-edge[cluster]'"
+        ) from error
+    try:
+        client = Client(endpoint, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, TypeError) as error:
+        raise LcfError(f"{endpoint}: no Dask scheduler there ({error}); start one: dask scheduler") from error
+    with client:
+        _refuse_strangers(client, endpoint)
+
+        def look() -> None:
+            if not client.nthreads():
+                say(f"{endpoint}: no worker is left; start one: dask worker {endpoint}")
+
+        width = 2 * sum(client.nthreads().values())
+        for task, future in _ended(client.get_executor(pure=False), width, deque(tasks), look):
+            yield task, _result(future)
+
+
+def _refuse_strangers(client: "Client", endpoint: str) -> None:
+    """Workers of another version would find something else."""
+    if not client.nthreads():
+        raise LcfError(f"{endpoint}: the scheduler has no workers; start one: dask worker {endpoint}")
+    for worker, version in client.run(_version, on_error="return").items():
+        if version != __version__:
+            found = f"lcf-edge {version}" if isinstance(version, str) else "no lcf-edge that works"
+            raise LcfError(f"{worker}: {found} there, {__version__} here; install the same at all workers")
+
+
+def _version() -> str:
+    return __version__
+
+
+def _ended(
+    executor: Executor, width: int, waiting: deque[Task], look: Callable[[], None] = lambda: None
+) -> Iterator[tuple[Task, Future[Done]]]:
+    """Hand out tasks, ``width`` at a time, until there are none or the executor is broken. ``look``: nothing came."""
+    running: dict[Future[Done], Task] = {}
+    is_broken = False
+    while running or (waiting and not is_broken):
+        while waiting and len(running) < width and not is_broken:
+            try:
+                with _interrupts_held():
+                    future = executor.submit(evaluate, waiting[0], waiting[0].frames_before())
+                running[future] = waiting.popleft()
+            except BrokenProcessPool:
+                is_broken = True
+        done, _ = wait(running, timeout=ANXIETY_S, return_when=FIRST_COMPLETED)
+        if not done:
+            look()
+        for future in done:
+            is_broken |= isinstance(future.exception(), BrokenProcessPool)
+            yield running.pop(future), future
+
+
+def _result(future: Future[Done]) -> Done | str:
+    error = future.exception()
+    if error is None:
+        return future.result()
+    return f"its process ended ({type(error).__name__}: {' '.join(str(error).split())[:300]})"

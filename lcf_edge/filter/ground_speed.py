@@ -1,0 +1,110 @@
+"""How fast the vehicle is, as the ground tells that is seen below the horizon.
+
+The ground at a row b px below the horizon lies at Z = h·f/b. A point of it that has gone outwards by μ of its distance
+from O over a time T says V = μ·Z/T. What stands above the ground is nearer than the ground in its row and says more;
+what is farther, or moves along, says less. The ground is one plane: most of what is below the horizon agrees.
+"""
+
+import math
+
+from lcf_edge.filter import rounding
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.memory import integers
+from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.situation import Situation
+
+BINS = 60  # of the speed, in equal ratios
+SLOWEST_MPS = 0.05
+BIN_RATIO = 0.125  # of the logarithm of the speed
+SPREAD = 0.15  # within which what is on the ground agrees, of the logarithm
+MIN_EDGES = 12
+MIN_SHARE = 0.3  # of the edges below the horizon, that agree
+MIN_BELOW = 0.06  # px below the horizon for each px of the focal length; farther off a row has no range
+OUTWARD_SIGMAS = 3.0  # by which a way outwards is above its noise
+SLOPE_SIGMA_RAD = 0.02  # 1 sigma of the ground against the horizon, with the camera's pitch
+MIN_SIGMA = 0.06  # of the logarithm
+NAN = float("nan")
+
+
+class GroundSpeed:
+    """``speed_mps``: V, over the time of the window, NaN: not told, with ``sigma_mps``; ``told_mps``: what was told.
+
+    ``elapsed_s``: the window. ``votes``: (BINS,).
+    """
+
+    def __init__(self) -> None:
+        self.speed_mps = self.sigma_mps = self.told_mps = NAN
+        self.elapsed_s = 0.0
+        self.votes = integers(BINS)
+        self.count = 0
+        self.below = self.sum = self.told = self.elapsed = 0.0
+
+
+def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> float:
+    """V by one edge, if it is on the ground, m/s; 0: it tells nothing."""
+    below = edges.y[verdicts.row[j]] - around.horizon_y
+    if below < MIN_BELOW * around.pinhole.focal:
+        return 0.0
+    slot = verdicts.slot[j]
+    outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # of one told to go back
+    if outward < OUTWARD_SIGMAS * (verdicts.sigma[j] + around.noise_px) or verdicts.r[j] <= 0:
+        return 0.0
+    range_m = around.camera_height_m * around.pinhole.focal / below
+    return outward / verdicts.r[j] * range_m / baselines.elapsed_s[slot]
+
+
+def bin_of(speed_mps: float) -> int:
+    """Bin of a speed, -1: none."""
+    if not speed_mps > SLOWEST_MPS:
+        return -1
+    k = rounding.whole(math.log(speed_mps / SLOWEST_MPS) / BIN_RATIO)
+    return k if k < BINS else -1
+
+
+def fullest(ground: GroundSpeed) -> int:
+    """The bin that most edges lie in and beside, -1: too few do."""
+    most = best = -1
+    for k in range(1, BINS - 1):
+        votes = ground.votes[k - 1] + ground.votes[k] + ground.votes[k + 1]
+        if votes > most:
+            most, best = votes, k
+    return best if most >= MIN_EDGES and most >= MIN_SHARE * ground.count else -1
+
+
+def measure(
+    ground: GroundSpeed, edges: EdgeColumns, verdicts: Verdicts, baselines: Baselines, around: Situation
+) -> None:
+    """What the ground tells in this frame."""
+    ground.speed_mps = ground.sigma_mps = ground.told_mps = NAN
+    if not around.camera_height_m > 0:
+        return
+    ground.count = 0
+    for k in range(BINS):
+        ground.votes[k] = 0
+    for j in range(verdicts.count):
+        k = bin_of(says_mps(verdicts, j, edges, baselines, around))
+        if k >= 0:
+            ground.votes[k] += 1
+            ground.count += 1
+    best = fullest(ground)
+    if best < 0:
+        return
+    middle = math.log(SLOWEST_MPS) + (best + 0.5) * BIN_RATIO
+    n = 0
+    ground.below = ground.sum = ground.told = ground.elapsed = 0.0
+    for j in range(verdicts.count):
+        says = says_mps(verdicts, j, edges, baselines, around)
+        if says > SLOWEST_MPS and math.fabs(math.log(says) - middle) < SPREAD:
+            slot = verdicts.slot[j]
+            n += 1
+            ground.sum += math.log(says)
+            ground.below += edges.y[verdicts.row[j]] - around.horizon_y
+            ground.told += baselines.depth_m[slot] / baselines.elapsed_s[slot]
+            ground.elapsed += baselines.elapsed_s[slot]
+    if n < MIN_EDGES:
+        return
+    ground.speed_mps = math.exp(ground.sum / n)
+    tilt = SLOPE_SIGMA_RAD * around.pinhole.focal / (ground.below / n)
+    ground.sigma_mps = ground.speed_mps * math.sqrt(MIN_SIGMA * MIN_SIGMA + tilt * tilt)
+    ground.told_mps, ground.elapsed_s = ground.told / n, ground.elapsed / n

@@ -1,0 +1,166 @@
+"""How edges that go together move in the picture: mean velocity and rate of expansion, by weighted least squares.
+
+An edge that was at x' a time T ago and is at x now has the velocity v = (x - x')/T halfway between, with the standard
+deviation √2·σ/T of two places. What its rotation leaves uncertain is common to all and added once. Of a set of edges
+v = v̄ + e·(x - x̄): an object that comes nearer expands by e in all directions, one that goes to the side does not.
+"""
+
+import math
+
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.memory import doubles, integers
+from lcf_edge.filter.patches import Patches
+from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.situation import Situation
+
+FAR_PX = 1e9
+MIN_SPREAD = 1e-9
+MIN_GROUND = 4  # edges that tell a plane from what stands upright
+LIKE_GROUND = 0.25  # of the logarithm of a speed: moves no otherwise than the ground does
+GROUND_GAIN = 16.0  # χ² that it must gain, in mean squares of what it leaves
+
+
+class MotionSums:
+    """Sums over the edges of a circle or an object, a row each; the sums of parts add up to those of the whole.
+
+    ``count``: edges. With the weight w = 1/σ_v² of each edge, s²/px²: ``weight`` Σw; ``x``, ``y`` Σw·x of the places
+    halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``square`` Σw·(x² + y²); ``along`` Σw·(x·v_x + y·v_y); ``focus_x``,
+    ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common`` Σw·σ of the
+    rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y, ``b2v1``
+    Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self.count = integers(capacity)
+        self.weight, self.x, self.y, self.vx, self.vy = (doubles(capacity) for _ in range(5))
+        self.square, self.along, self.focus_x, self.focus_y = (doubles(capacity) for _ in range(4))
+        self.forward, self.elapsed, self.common = (doubles(capacity) for _ in range(3))
+        self.b2v0, self.b4v0, self.b1v1, self.b2v1, self.b0v2 = (doubles(capacity) for _ in range(5))
+        self.left, self.top, self.right, self.bottom = (doubles(capacity) for _ in range(4))
+
+
+def clear(sums: MotionSums, k: int) -> None:
+    """No edges."""
+    sums.count[k] = 0
+    sums.weight[k] = sums.x[k] = sums.y[k] = sums.vx[k] = sums.vy[k] = 0.0
+    sums.square[k] = sums.along[k] = sums.focus_x[k] = sums.focus_y[k] = 0.0
+    sums.forward[k] = sums.elapsed[k] = sums.common[k] = 0.0
+    sums.b2v0[k] = sums.b4v0[k] = sums.b1v1[k] = sums.b2v1[k] = sums.b0v2[k] = 0.0
+    sums.left[k] = sums.top[k] = FAR_PX
+    sums.right[k] = sums.bottom[k] = -FAR_PX
+
+
+def add_motion(sums: MotionSums, k: int, weight: float, x: float, y: float, vx: float, vy: float) -> None:
+    """Take the velocity of one place."""
+    sums.weight[k] += weight
+    sums.x[k] += weight * x
+    sums.y[k] += weight * y
+    sums.vx[k] += weight * vx
+    sums.vy[k] += weight * vy
+    sums.square[k] += weight * (x * x + y * y)
+    sums.along[k] += weight * (x * vx + y * vy)
+
+
+def add_edge(
+    sums: MotionSums, k: int, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
+) -> None:
+    """Take one edge, as it moved since the key frame that its verdict looks back to."""
+    i, slot = verdicts.row[j], verdicts.slot[j]
+    elapsed_s = baselines.elapsed_s[slot]
+    weight = elapsed_s * elapsed_s / (2 * around.noise_px * around.noise_px)
+    vx, vy = (edges.x[i] - verdicts.x[j]) / elapsed_s, (edges.y[i] - verdicts.y[j]) / elapsed_s
+    x, y = 0.5 * (edges.x[i] + verdicts.x[j]), 0.5 * (edges.y[i] + verdicts.y[j])
+    sums.count[k] += 1
+    add_motion(sums, k, weight, x, y, vx, vy)
+    sums.focus_x[k] += weight * baselines.focus_x[slot]
+    sums.focus_y[k] += weight * baselines.focus_y[slot]
+    sums.forward[k] += weight * baselines.depth_m[slot] / elapsed_s
+    sums.elapsed[k] += weight * elapsed_s
+    sums.common[k] += weight * verdicts.sigma[j] / elapsed_s
+    below = y - around.horizon_y
+    sums.b2v0[k] += weight * below * below
+    sums.b4v0[k] += weight * below * below * below * below
+    sums.b1v1[k] += weight * below * vy
+    sums.b2v1[k] += weight * below * below * vy
+    sums.b0v2[k] += weight * vy * vy
+    sums.left[k], sums.right[k] = min(sums.left[k], edges.x[i]), max(sums.right[k], edges.x[i])
+    sums.top[k], sums.bottom[k] = min(sums.top[k], edges.y[i]), max(sums.bottom[k], edges.y[i])
+
+
+def add_patch(sums: MotionSums, k: int, patches: Patches, p: int, around: Situation) -> None:
+    """Take a patch, as four edges that grow as it does and move with its middle."""
+    elapsed_s, half = patches.elapsed_s[p], patches.half_px[p]
+    then, now = half, half * patches.scale[p]
+    reach, sigma = 0.5 * (then + now), patches.sigma[p] * half / elapsed_s
+    weight = 0.25 / (sigma * sigma)
+    sums.count[k] += 4
+    for corner in range(4):
+        across, down = (1.0 if corner % 2 else -1.0), (1.0 if corner // 2 else -1.0)
+        x = 0.5 * (patches.x[p] + patches.first_x[p]) + across * reach
+        y = 0.5 * (patches.y[p] + patches.first_y[p]) + down * reach
+        vx = (patches.x[p] - patches.first_x[p] + across * (now - then)) / elapsed_s
+        vy = (patches.y[p] - patches.first_y[p] + down * (now - then)) / elapsed_s
+        add_motion(sums, k, weight, x, y, vx, vy)
+    sums.focus_x[k] += 4 * weight * around.focus_x
+    sums.focus_y[k] += 4 * weight * around.focus_y
+    sums.forward[k] += 4 * weight * patches.depth_m[p] / elapsed_s
+    sums.elapsed[k] += 4 * weight * elapsed_s
+    sums.left[k], sums.right[k] = min(sums.left[k], patches.x[p] - now), max(sums.right[k], patches.x[p] + now)
+    sums.top[k], sums.bottom[k] = min(sums.top[k], patches.y[p] - now), max(sums.bottom[k], patches.y[p] + now)
+
+
+def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
+    """Take all edges of a part."""
+    sums.count[k] += part.count[c]
+    sums.weight[k] += part.weight[c]
+    sums.x[k] += part.x[c]
+    sums.y[k] += part.y[c]
+    sums.vx[k] += part.vx[c]
+    sums.vy[k] += part.vy[c]
+    sums.square[k] += part.square[c]
+    sums.along[k] += part.along[c]
+    sums.focus_x[k] += part.focus_x[c]
+    sums.focus_y[k] += part.focus_y[c]
+    sums.forward[k] += part.forward[c]
+    sums.elapsed[k] += part.elapsed[c]
+    sums.common[k] += part.common[c]
+    sums.b2v0[k] += part.b2v0[c]
+    sums.b4v0[k] += part.b4v0[c]
+    sums.b1v1[k] += part.b1v1[c]
+    sums.b2v1[k] += part.b2v1[c]
+    sums.b0v2[k] += part.b0v2[c]
+    sums.left[k], sums.right[k] = min(sums.left[k], part.left[c]), max(sums.right[k], part.right[c])
+    sums.top[k], sums.bottom[k] = min(sums.top[k], part.top[c]), max(sums.bottom[k], part.bottom[c])
+
+
+def spread(sums: MotionSums, k: int) -> float:
+    """Σw·|x - x̄|², s²: 1/σ² of the expansion."""
+    middle = (sums.x[k] * sums.x[k] + sums.y[k] * sums.y[k]) / sums.weight[k]
+    return max(sums.square[k] - middle, MIN_SPREAD)
+
+
+def expansion(sums: MotionSums, k: int) -> float:
+    """e, 1/s: Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|²."""
+    middle = (sums.x[k] * sums.vx[k] + sums.y[k] * sums.vy[k]) / sums.weight[k]
+    return (sums.along[k] - middle) / spread(sums, k)
+
+
+def is_ground(sums: MotionSums, k: int, around: Situation) -> bool:
+    """Whether edges move as a level plane does, rather than as what stands upright on it.
+
+    All of an upright thing is equally far: its edges move by v_y = m·b. Those of a plane are the nearer the lower they
+    are seen: v_y = κ·b². Neither m nor κ need be known, nor the vehicle's speed; the better fit tells, by χ². Nor is it
+    upright where κ is that of the ground all around.
+    """
+    if sums.top[k] <= around.horizon_y or not sums.b2v0[k] > 0:
+        return False
+    per_mps = around.camera_height_m * around.pinhole.fy * sums.b2v1[k] / sums.b4v0[k]
+    if around.ground_mps > 0 and per_mps > 0 and math.fabs(math.log(per_mps / around.ground_mps)) < LIKE_GROUND:
+        return True
+    if sums.count[k] < MIN_GROUND:
+        return False
+    upright = sums.b1v1[k] * sums.b1v1[k] / sums.b2v0[k]
+    level = sums.b2v1[k] * sums.b2v1[k] / sums.b4v0[k]
+    left = max(sums.b0v2[k] - level, sums.count[k])  # of χ², by the level plane
+    return level - upright > GROUND_GAIN * left / sums.count[k]

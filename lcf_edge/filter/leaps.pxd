@@ -1,0 +1,35 @@
+cimport cython
+from libc.stdlib cimport abs
+from lcf_edge.filter cimport image_plane, matching, rounding
+from lcf_edge.filter.columns cimport CornerColumns, EdgeColumns
+from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.matching cimport CornerIndex
+from lcf_edge.filter.settings cimport Settings
+
+cdef int COLUMNS
+cdef int ROWS
+cdef double REACH_SHARE
+cdef int BINS
+cdef int MIN_LOST
+cdef double LOST_SHARE
+cdef int MIN_VOTES
+cdef double AGREEING_SHARE
+cdef double RIVAL_SHARE
+cdef int MAX_ASKING
+
+cdef class Leaps:
+    cdef readonly int[::1] part, seen, lost
+    cdef readonly double[::1] u, v
+    cdef readonly int[:, ::1] votes, voter
+    cdef public int across, down, most, rival
+
+cdef void ask(Leaps leaps, ImagePlane plane, EdgeColumns edges) noexcept nogil
+cdef bint is_lost(Leaps leaps, int part) noexcept nogil
+@cython.locals(astray=bint, across=int, down=int, a=int, b=int)
+cdef void vote(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
+@cython.locals(near=bint, a=int, b=int)
+cdef void count(Leaps leaps) noexcept nogil
+@cython.locals(best=int)
+cdef int take(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
+@cython.locals(agree=bint, part=int, i=int, a=int, b=int)
+cpdef int find(Leaps leaps, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, Settings settings) noexcept nogil

@@ -1,0 +1,215 @@
+"""C_r from patches: what stands in the way and grows, though no corner of it tells so.
+
+Two patches at least must agree. Their circle is *incoming*; one that rebels show already is left to them.
+"""
+
+import math
+
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import edge_equations, flow, path
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.memory import Bytes, octets
+from lcf_edge.filter.patches import Patches
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause
+
+MIN_ELAPSED_S = 0.5  # before that, a patch has not grown enough to be believed
+MIN_SIGMAS = 4.0  # by which the inverse range of what will be met is above zero,
+ALIKE_SIGMAS = 3.0  # and that of a patch that agrees
+SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
+SMALL_TURN_RAD = 0.25  # of the path on the way to what is met, which may as well not come
+HALF_SHARE = 0.6  # of half a side, by which what a patch shows reaches to the side at least
+GROUND_MARGIN = 0.3  # share by which the ground may be misjudged
+LOWEST_SHARE = 0.8  # of the camera's height; what is lower is the ground
+DRIFT_RAD = 0.004  # by which a patch may leave its flow line to the side, and still stand,
+PITCH_RAD = 0.02  # and up or down: pitch is known less well;
+DRIFT_PX = 0.7  # more than either by this
+AGREE_SIGMAS = 2.0  # by which inverse ranges of one thing differ,
+AGREE_SHARE = 0.1  # besides this share,
+AGREE_AT_MOST = 0.25  # and no more than this one
+MIN_RANGE_M = 0.01
+SIDE_SIDES = 3.0  # half sides within which patches beside each other may be of one thing,
+STACK_SIDES = 4.0  # and one above the other
+INCOMING = int(Cause.INCOMING)
+INFINITY = float("inf")
+
+
+class PatchGroups:
+    """Patches that show one thing; a row a patch, by which the group was found.
+
+    ``threat``: whether a patch will be met; ``taken``: whether it is of a group already. ``members``: as those of
+    circles, of the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m.
+    """
+
+    def __init__(self, patches: int) -> None:
+        self.threat, self.taken = (octets(max(patches, 1)) for _ in range(2))
+        self.members = Members(max(patches, 1))
+        self.left = self.top = self.right = self.bottom = self.weight = self.inverse = 0.0
+
+
+def least_miss(right_m: float, range_m: float, around: Situation) -> float:
+    """Lateral miss of the path, m: of its arc, or of the straight line where so small a turn may soon be over."""
+    arc_m = path.miss(right_m, range_m, around)
+    turn_rad = math.fabs(around.yaw_rate_radps) * range_m / around.speed_mps
+    return right_m if turn_rad < SMALL_TURN_RAD and math.fabs(right_m) < math.fabs(arc_m) else arc_m
+
+
+def stands(patches: Patches, p: int, around: Situation) -> bool:
+    """Whether a patch stays on its flow line."""
+    drift_x = patches.x[p] - around.focus_x - patches.scale[p] * (patches.first_x[p] - around.focus_x)
+    drift_y = patches.y[p] - around.focus_y - patches.scale[p] * (patches.first_y[p] - around.focus_y)
+    across, down = DRIFT_RAD * around.pinhole.fx + DRIFT_PX, PITCH_RAD * around.pinhole.fy + DRIFT_PX
+    return math.fabs(drift_x) < across and math.fabs(drift_y) < down
+
+
+def is_threat(patches: Patches, p: int, around: Situation) -> bool:
+    """Whether what a patch shows stands in the way, above the ground, within the horizon."""
+    inverse, doubt = patches.inverse[p], patches.doubt[p]
+    reach_m = around.speed_mps * around.horizon_s
+    if not inverse > MIN_SIGMAS * doubt or not (inverse - doubt) * SLOWER_HORIZONS * reach_m > 1:
+        return False
+    range_m = 1 / inverse
+    half = patches.half_px[p] * patches.scale[p]
+    right_m = (patches.x[p] - around.focus_x) / around.pinhole.fx * range_m
+    up_m = (around.horizon_y - patches.y[p]) / around.pinhole.fy * range_m
+    beside_m = HALF_SHARE * half / around.pinhole.fx * range_m
+    if path.way_to(right_m, range_m, around) >= reach_m or not stands(patches, p, around):
+        return False
+    if math.fabs(least_miss(right_m, range_m, around)) >= around.half_width_m + beside_m:
+        return False
+    if not around.camera_height_m > 0:
+        return up_m < around.height_m
+    below = patches.y[p] + 0.5 * half - around.horizon_y
+    ground = max(below, 0.0) / around.pinhole.fy / around.camera_height_m
+    above_m = up_m + around.camera_height_m
+    return (
+        inverse > (1 + GROUND_MARGIN) * ground + doubt
+        and above_m < around.height_m
+        and above_m > (1 - LOWEST_SHARE) * around.camera_height_m
+    )
+
+
+def agree(patches: Patches, p: int, q: int) -> bool:
+    """Whether two patches show one thing: near each other, and as far off."""
+    if p == q or not patches.active[q] or patches.misses[q] or patches.elapsed_s[q] < MIN_ELAPSED_S:
+        return False
+    half = patches.half_px[p] * patches.scale[p]
+    if math.fabs(patches.x[p] - patches.x[q]) >= SIDE_SIDES * half:
+        return False
+    if math.fabs(patches.y[p] - patches.y[q]) >= STACK_SIDES * half:
+        return False
+    one, other = patches.inverse[p], patches.inverse[q]
+    doubt = flow.length(patches.doubt[p], patches.doubt[q])
+    apart = math.fabs(one - other)
+    return (
+        other > ALIKE_SIGMAS * patches.doubt[q]
+        and apart < AGREE_SIGMAS * doubt + AGREE_SHARE * one
+        and apart < AGREE_AT_MOST * one
+    )
+
+
+def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
+    """Take a patch into a group."""
+    half = patches.half_px[p] * patches.scale[p]
+    weight = 1 / (patches.doubt[p] * patches.doubt[p])
+    groups.taken[p] = 1
+    groups.members.size[g] += 1
+    groups.left, groups.right = min(groups.left, patches.x[p] - half), max(groups.right, patches.x[p] + half)
+    groups.top, groups.bottom = min(groups.top, patches.y[p] - half), max(groups.bottom, patches.y[p] + half)
+    groups.weight += weight
+    groups.inverse += weight * patches.inverse[p]
+
+
+def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
+    """The group of a patch and those that agree with it; False: none does."""
+    shared.clear(groups.members, p)
+    groups.left = groups.top = INFINITY
+    groups.right = groups.bottom = -INFINITY
+    groups.weight = groups.inverse = 0.0
+    for q in range(patches.capacity):
+        if agree(patches, p, q):
+            add(groups, p, patches, q)
+    if groups.members.size[p] == 0:
+        return False
+    add(groups, p, patches, p)
+    groups.inverse /= groups.weight
+    across, down = groups.right - groups.left, groups.bottom - groups.top
+    groups.members.x[p], groups.members.y[p] = groups.left + 0.5 * across, groups.top + 0.5 * down
+    groups.members.variance_x[p] = across * across / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
+    groups.members.variance_y[p] = down * down / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
+    return True
+
+
+def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Settings) -> int:
+    """The circle that shows the same, the nearest; -1: none."""
+    nearest, least = -1, INFINITY
+    half = 0.5 * max(groups.right - groups.left, groups.bottom - groups.top)
+    for c in range(circles.capacity):
+        if not circles.active[c]:
+            continue
+        away = flow.length(circles.x[c] - groups.members.x[g], circles.y[c] - groups.members.y[g])
+        if away < max(circles.radius[c], half) + settings.member_margin_px and away < least:
+            nearest, least = c, away
+    return nearest
+
+
+def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
+    """Cause, motion, time to contact, range and lateral miss of a circle, from the range of its patches."""
+    range_m = 1 / groups.inverse
+    right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
+    rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
+    if math.isfinite(circles.ttc[c]) and circles.ttc[c] > around.dt_s:
+        rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, 1 / circles.ttc[c], rate)
+    circles.cause[c] = INCOMING
+    circles.ttc[c], circles.range[c] = 1 / rate, range_m
+    circles.lateral[c] = least_miss(right_m, range_m, around)
+    dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
+    circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * flow.length(dx, dy)
+
+
+def update(
+    groups: PatchGroups,
+    patches: Patches,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    updated: Bytes,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """Circles of what patches show to be in the way; return evictions.
+
+    ``updated``: which circles rebels have updated; those that patches update are marked too.
+    """
+    evicted = 0
+    if not around.speed_mps > 0:
+        return evicted
+    for p in range(patches.capacity):
+        seen = patches.active[p] and not patches.misses[p] and patches.elapsed_s[p] >= MIN_ELAPSED_S
+        groups.threat[p] = 1 if seen and is_threat(patches, p, around) else 0
+        groups.taken[p] = 0
+    for p in range(patches.capacity):
+        if not groups.threat[p] or groups.taken[p] or not gather(groups, p, patches):
+            continue
+        c = circle_of(groups, p, circles, settings)
+        if c >= 0 and updated[c]:
+            continue
+        if c < 0:
+            c = shared.free_row(circles)
+            if c < 0:
+                evicted += 1
+                c = shared.make_room(edges, circles, True, settings)
+            if c < 0:
+                continue
+            shared.give_birth(circles, c, groups.members, p, settings, ids)
+        else:
+            shared.blend(circles, c, groups.members, p, settings)
+            circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+        updated[c] = 1
+        tell(groups, p, circles, c, around, settings)
+        for q in range(patches.capacity):
+            if q == p or agree(patches, p, q):
+                patches.circle[q] = c
+    return evicted

@@ -1,0 +1,386 @@
+"""Patches: pieces of the picture near the path, followed for seconds; how much they grew tells how far off they are.
+
+Near the focus, where what is ahead appears, a corner hardly moves within the window of key frames, and it seldom lives
+longer. A piece of the picture around it does: it is found again by shift and scale, to a small part of a pixel, against
+the picture in which it was first seen (inverse compositional Lucas-Kanade: Baker and Matthews 2004). What stands still
+at Z was seen ΔZ farther off, so it has grown by s = (Z + ΔZ)/Z.
+"""
+
+import math
+
+from lcf_edge.filter import flow, image_plane, path, rounding
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.flow import Homography
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import Bytes, doubles, integers, octets
+from lcf_edge.filter.situation import Situation
+
+SIDE = 16  # samples along a side of a patch
+SAMPLES = 256
+SHARPNESS = 1.5  # weight exp(-SHARPNESS·r²), r in half sides: the rim is seldom of the same thing
+EFFECTIVE_SHARE = 0.4  # of the samples, which that weighing leaves
+MIN_HALF_PX = 7.0  # half a side, at birth, at least
+MAX_HALF_PX = 16.0  # and at most
+HALF_WIDTH_SHARE = 0.4  # of the vehicle's half width, as far off as it is in half a horizon, that half a side is
+BESIDE = 1.2  # half widths from the path there, within which patches are born,
+BESIDE_HALVES = 1.5  # or so many half sides
+NEAREST_S = 1.0  # ground that is reached sooner is too low in the picture
+ROW_SHARE = 1.0  # of a distance in height that counts when the place nearest to the path is chosen
+APART = 1.1  # half sides that lie between patches
+BIRTHS = 3  # in one frame, at most
+MIN_CONTRAST_GREY = 6.0
+NOISE_GREY = 2.0  # 1 sigma of a sample, at least
+MAX_SCALE_SIGMA = 0.0125  # of a newborn; what does not show its scale is of no use
+MIN_SCALE_SIGMA = 0.01  # what a patch shows is not flat
+FAR_PX = 1e9
+ROUNDS = 4
+SMALL_PX = 0.03  # a change by less ends the search,
+SMALL_SHARE = 0.003  # and by less of the scale
+STEP_SHARE = 0.33  # of half a side, and
+STEP_SCALE = 0.1  # by which one round changes place and scale at most
+LIKENESS = 0.95  # normalised correlation; below, it is not the same thing any more
+MAX_MISSES = 4
+MIN_SCALE = 0.8
+MAX_SCALE = 2.2
+LIFE_S = 2.5  # then what is around a thing has changed too much
+MIN_SPEED_MPS = 0.05
+
+
+class Patches:
+    """A row a patch.
+
+    ``x``, ``y``: its middle, px; ``first_x``, ``first_y``: where that was first seen, derotated to now, px;
+    ``half_px``: half a side when it was first seen; ``scale``: s since then, and ``sigma`` of it; ``elapsed_s``;
+    ``depth_m``: ΔZ;
+    ``misses``: frames in a row that did not show it; ``inverse``, ``doubt``: 1/Z as if it stood still, and its sigma,
+    1/m; ``circle``: row of C_r that it supports in this frame, -1: none.
+
+    The template, over its samples: ``grey``, less its mean; ``across``, ``down``, ``growing``: what shift and scale
+    change of it, weighed; ``sums`` of these and their products with ``grey`` (6); ``inverted``, of the normal
+    equations (9); ``contrast``: 1 sigma of ``grey``; ``unit``: sigma of the scale for a noise of one grey level.
+
+    ``weight`` of the samples. ``tried``: how far from the path a place was tried, px. The rest is what one comparison
+    gives.
+    """
+
+    def __init__(self, capacity: int) -> None:
+        self.capacity = capacity
+        self.active = octets(max(capacity, 1))
+        self.misses, self.circle = (integers(max(capacity, 1)) for _ in range(2))
+        self.x, self.y, self.first_x, self.first_y = (doubles(max(capacity, 1)) for _ in range(4))
+        self.half_px, self.scale, self.sigma, self.elapsed_s = (doubles(max(capacity, 1)) for _ in range(4))
+        self.depth_m, self.inverse, self.doubt = (doubles(max(capacity, 1)) for _ in range(3))
+        self.contrast, self.unit = (doubles(max(capacity, 1)) for _ in range(2))
+        self.grey, self.across, self.down, self.growing = (doubles(max(capacity, 1), SAMPLES) for _ in range(4))
+        self.sums, self.inverted = doubles(max(capacity, 1), 6), doubles(max(capacity, 1), 9)
+        self.weight, self.seen = doubles(SAMPLES), doubles(SAMPLES)
+        self.u = self.v = self.right_u = self.right_v = self.down_u = self.down_v = 0.0
+        self.mean = self.square = self.shared = self.on_across = self.on_down = self.on_growing = 0.0
+        self.tried = 0.0
+        weigh(self)
+
+
+def weigh(patches: Patches) -> None:
+    """A bell over the samples, their sum 1."""
+    total = 0.0
+    for k in range(SAMPLES):
+        x, y = offset(k % SIDE), offset(k // SIDE)
+        patches.weight[k] = math.exp(-SHARPNESS * (x * x + y * y))
+        total += patches.weight[k]
+    for k in range(SAMPLES):
+        patches.weight[k] /= total
+
+
+def offset(k: int) -> float:
+    """Place of a row or column of samples, in half sides from the middle."""
+    return (2.0 * k - (SIDE - 1)) / (SIDE - 1)
+
+
+# Where patches are
+
+
+def derotate(patches: Patches, h: Homography) -> None:
+    """H = K·R·K⁻¹ on where patches are and were."""
+    for p in range(patches.capacity):
+        if patches.active[p]:
+            flow.warp(h, patches.x[p], patches.y[p])
+            patches.x[p], patches.y[p] = h.x, h.y
+            flow.warp(h, patches.first_x[p], patches.first_y[p])
+            patches.first_x[p], patches.first_y[p] = h.x, h.y
+
+
+def predict(patches: Patches, around: Situation) -> None:
+    """Each patch grows from O as what stands still does; without a speed nothing can be told, and they end."""
+    for p in range(patches.capacity):
+        if not math.isfinite(around.speed_mps):
+            patches.active[p] = 0
+        if not patches.active[p]:
+            continue
+        ahead_m = around.speed_mps * around.dt_s
+        growth = 1 + patches.inverse[p] * ahead_m
+        patches.x[p] = around.focus_x + (patches.x[p] - around.focus_x) * growth
+        patches.y[p] = around.focus_y + (patches.y[p] - around.focus_y) * growth
+        patches.scale[p] *= growth
+        patches.elapsed_s[p] += around.dt_s
+        patches.depth_m[p] += ahead_m
+
+
+# Looking
+
+
+def locate(patches: Patches, plane: ImagePlane, x: float, y: float, half: float) -> bool:
+    """Where the lens shows a patch: its middle and half its sides, px of the frame; False: not all of it is seen."""
+    if not image_plane.project(plane, x, y):
+        return False
+    patches.u, patches.v = plane.u, plane.v
+    if not image_plane.project(plane, x + half, y):
+        return False
+    patches.right_u, patches.right_v = plane.u - patches.u, plane.v - patches.v
+    if not image_plane.project(plane, x, y + half):
+        return False
+    patches.down_u, patches.down_v = plane.u - patches.u, plane.v - patches.v
+    across = math.fabs(patches.right_u) + math.fabs(patches.down_u)
+    down = math.fabs(patches.right_v) + math.fabs(patches.down_v)
+    return (
+        patches.u - across >= 0
+        and patches.v - down >= 0
+        and patches.u + across < plane.width - 1
+        and patches.v + down < plane.height - 1
+    )
+
+
+def look(patches: Patches, picture: Bytes, width: int) -> None:
+    """The samples where the patch was placed, between four pixels each."""
+    for row in range(SIDE):
+        y = offset(row)
+        for column in range(SIDE):
+            x = offset(column)
+            u = patches.u + x * patches.right_u + y * patches.down_u
+            v = patches.v + x * patches.right_v + y * patches.down_v
+            left, top = rounding.whole(u), rounding.whole(v)
+            at = top * width + left
+            share, below = u - left, v - top
+            upper = picture[at] + share * (picture[at + 1] - picture[at])
+            lower = picture[at + width] + share * (picture[at + width + 1] - picture[at + width])
+            patches.seen[row * SIDE + column] = upper + below * (lower - upper)
+
+
+def compare(patches: Patches, p: int) -> None:
+    """Sums over the samples that matching takes."""
+    patches.mean = patches.square = patches.shared = 0.0
+    patches.on_across = patches.on_down = patches.on_growing = 0.0
+    for k in range(SAMPLES):
+        grey = patches.seen[k]
+        weighed = patches.weight[k] * grey
+        patches.mean += weighed
+        patches.square += weighed * grey
+        patches.shared += weighed * patches.grey[p, k]
+        patches.on_across += patches.across[p, k] * grey
+        patches.on_down += patches.down[p, k] * grey
+        patches.on_growing += patches.growing[p, k] * grey
+
+
+def bounded(value: float, most: float) -> float:
+    """The value, no more than so much either way."""
+    return min(max(value, -most), most)
+
+
+def step(patches: Patches, p: int, gain: float) -> float:
+    """One round of the search: shift and scale that make the samples, times ``gain``, like the template.
+
+    Return by how much that changed the patch, in shares of what ends the search.
+    """
+    across = gain * (patches.on_across - patches.mean * patches.sums[p, 0]) - patches.sums[p, 3]
+    down = gain * (patches.on_down - patches.mean * patches.sums[p, 1]) - patches.sums[p, 4]
+    growing = gain * (patches.on_growing - patches.mean * patches.sums[p, 2]) - patches.sums[p, 5]
+    most = STEP_SHARE * patches.half_px[p]
+    x = patches.inverted[p, 0] * across + patches.inverted[p, 1] * down + patches.inverted[p, 2] * growing
+    y = patches.inverted[p, 3] * across + patches.inverted[p, 4] * down + patches.inverted[p, 5] * growing
+    grown = patches.inverted[p, 6] * across + patches.inverted[p, 7] * down + patches.inverted[p, 8] * growing
+    x, y, grown = bounded(x, most), bounded(y, most), bounded(grown, STEP_SCALE)
+    patches.x[p] -= patches.scale[p] * x
+    patches.y[p] -= patches.scale[p] * y
+    patches.scale[p] /= 1 + grown
+    return max((math.fabs(x) + math.fabs(y)) / SMALL_PX, math.fabs(grown) / SMALL_SHARE)
+
+
+def find(patches: Patches, p: int, picture: Bytes, plane: ImagePlane) -> bool:
+    """Whether a patch is seen near where it was predicted; its place, its scale and their doubt."""
+    change, likeness, rest = 2.0, 0.0, 0.0
+    for _ in range(ROUNDS):
+        if change < 1:
+            break
+        if not locate(patches, plane, patches.x[p], patches.y[p], patches.half_px[p] * patches.scale[p]):
+            return False
+        look(patches, picture, plane.width)
+        compare(patches, p)
+        variance = patches.square - patches.mean * patches.mean
+        if variance < 1:
+            return False
+        likeness = patches.shared / math.sqrt(variance) / patches.contrast[p]
+        gain = patches.shared / variance
+        rest = patches.contrast[p] * patches.contrast[p] - gain * patches.shared
+        change = step(patches, p, gain)
+    noise = max(math.sqrt(max(rest, 0.0)), NOISE_GREY) * patches.unit[p] * patches.scale[p]
+    patches.sigma[p] = flow.length(noise, MIN_SCALE_SIGMA)
+    return likeness >= LIKENESS and MIN_SCALE < patches.scale[p] < MAX_SCALE
+
+
+def follow(patches: Patches, picture: Bytes, plane: ImagePlane) -> None:
+    """Each patch in this picture, or as predicted where that does not show it; too often, and it ends."""
+    for p in range(patches.capacity):
+        if not patches.active[p]:
+            continue
+        x, y, scale = patches.x[p], patches.y[p], patches.scale[p]
+        if find(patches, p, picture, plane):
+            patches.misses[p] = 0
+        else:
+            patches.x[p], patches.y[p], patches.scale[p] = x, y, scale
+            patches.misses[p] += 1
+        patches.circle[p] = -1
+        patches.inverse[p] = patches.doubt[p] = 0.0
+        if patches.depth_m[p] > 0:
+            patches.inverse[p] = (patches.scale[p] - 1) / patches.depth_m[p]
+            patches.doubt[p] = patches.sigma[p] / patches.depth_m[p]
+        if patches.misses[p] > MAX_MISSES or patches.elapsed_s[p] > LIFE_S:
+            patches.active[p] = 0
+
+
+# Birth
+
+
+def half_side(around: Situation) -> float:
+    """Half a side of a newborn, px: a part of the vehicle's width as far off as it is in half a horizon."""
+    halfway_m = max(0.5 * around.speed_mps * around.horizon_s, MIN_SPEED_MPS)
+    half = HALF_WIDTH_SHARE * around.half_width_m * around.pinhole.fx / halfway_m
+    return min(max(half, MIN_HALF_PX), MAX_HALF_PX)
+
+
+def free_row(patches: Patches) -> int:
+    """The first row that is not in use, -1: none."""
+    for p in range(patches.capacity):
+        if not patches.active[p]:
+            return p
+    return -1
+
+
+def is_covered(patches: Patches, x: float, y: float, half: float) -> bool:
+    """Whether a patch is there already."""
+    for p in range(patches.capacity):
+        if not patches.active[p]:
+            continue
+        if math.fabs(patches.x[p] - x) < APART * half and math.fabs(patches.y[p] - y) < APART * half:
+            return True
+    return False
+
+
+def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situation) -> int:
+    """The edge nearest to the path, but for those tried, that may show what is met within the horizon; -1: none.
+
+    In the picture that is the neighbourhood of the path as far off as the vehicle is in half a horizon, from the
+    vehicle's height there down to the ground that is reached in ``NEAREST_S``.
+    """
+    fx, fy = around.pinhole.fx, around.pinhole.fy
+    halfway_m = 0.5 * around.speed_mps * around.horizon_s
+    beside_m = path.miss(0.0, halfway_m, around)
+    middle_x = around.focus_x - fx * beside_m / halfway_m
+    reach = max(BESIDE * around.half_width_m * fx / halfway_m, BESIDE_HALVES * half)
+    top = around.horizon_y - max(around.height_m - around.camera_height_m, 0.0) / halfway_m * fy - half
+    bottom = around.horizon_y + fy * around.camera_height_m / (around.speed_mps * NEAREST_S)
+    if not around.camera_height_m > 0:
+        bottom = around.horizon_y + fy
+    best, least = -1, FAR_PX
+    for i in range(edges.count):
+        x, y = edges.x[i], edges.y[i]
+        away = math.fabs(x - middle_x)
+        if away >= reach or y <= top or y >= bottom or not edges.matched[i]:
+            continue
+        away += ROW_SHARE * math.fabs(y - around.horizon_y)
+        if patches.tried < away < least and not is_covered(patches, x, y, half):
+            best, least = i, away
+    patches.tried = least
+    return best
+
+
+def give_birth(patches: Patches, p: int, x: float, y: float, half: float, picture: Bytes, plane: ImagePlane) -> bool:
+    """A new patch around a place; False: it has too little contrast, or would not show its scale."""
+    if not locate(patches, plane, x, y, half):
+        return False
+    look(patches, picture, plane.width)
+    mean = 0.0
+    for k in range(SAMPLES):
+        mean += patches.weight[k] * patches.seen[k]
+    for k in range(SAMPLES):
+        patches.grey[p, k] = patches.seen[k] - mean
+    patches.half_px[p] = half
+    if not set_template(patches, p):
+        return False
+    patches.active[p], patches.misses[p], patches.circle[p] = 1, 0, -1
+    patches.x[p] = patches.first_x[p] = x
+    patches.y[p] = patches.first_y[p] = y
+    patches.scale[p], patches.sigma[p] = 1.0, MAX_SCALE_SIGMA
+    patches.elapsed_s[p] = patches.depth_m[p] = patches.inverse[p] = patches.doubt[p] = 0.0
+    return True
+
+
+def slope(patches: Patches, p: int, k: int, place: int, stride: int) -> float:
+    """Of the template at sample ``k``, grey levels for each sample; ``place`` along that direction."""
+    if place == 0:
+        return patches.grey[p, k + stride] - patches.grey[p, k]
+    if place == SIDE - 1:
+        return patches.grey[p, k] - patches.grey[p, k - stride]
+    return 0.5 * (patches.grey[p, k + stride] - patches.grey[p, k - stride])
+
+
+def set_template(patches: Patches, p: int) -> bool:
+    """What shift and scale change of the template, and the inverse of its normal equations; False: it is of no use."""
+    half, spacing = patches.half_px[p], 2 * patches.half_px[p] / (SIDE - 1)
+    square = xx = xy = xs = yy = ys = ss = 0.0
+    for k in range(6):
+        patches.sums[p, k] = 0.0
+    for k in range(SAMPLES):
+        row, column = k // SIDE, k % SIDE
+        weight, grey = patches.weight[k], patches.grey[p, k]
+        x, y = slope(patches, p, k, column, 1) / spacing, slope(patches, p, k, row, SIDE) / spacing
+        grows = half * (x * offset(column) + y * offset(row))
+        square += weight * grey * grey
+        xx += weight * x * x
+        xy += weight * x * y
+        xs += weight * x * grows
+        yy += weight * y * y
+        ys += weight * y * grows
+        ss += weight * grows * grows
+        patches.across[p, k], patches.down[p, k], patches.growing[p, k] = weight * x, weight * y, weight * grows
+        patches.sums[p, 0] += weight * x
+        patches.sums[p, 1] += weight * y
+        patches.sums[p, 2] += weight * grows
+        patches.sums[p, 3] += weight * x * grey
+        patches.sums[p, 4] += weight * y * grey
+        patches.sums[p, 5] += weight * grows * grey
+    patches.contrast[p] = math.sqrt(square)
+    xx_minor, xy_minor, xs_minor = yy * ss - ys * ys, xy * ss - ys * xs, xy * ys - yy * xs
+    determinant = xx * xx_minor - xy * xy_minor + xs * xs_minor
+    if patches.contrast[p] < MIN_CONTRAST_GREY or not determinant > 1e-12 * xx * yy * ss:
+        return False
+    patches.inverted[p, 0] = xx_minor / determinant
+    patches.inverted[p, 1] = patches.inverted[p, 3] = -xy_minor / determinant
+    patches.inverted[p, 2] = patches.inverted[p, 6] = xs_minor / determinant
+    patches.inverted[p, 4] = (xx * ss - xs * xs) / determinant
+    patches.inverted[p, 5] = patches.inverted[p, 7] = (xs * xy - xx * ys) / determinant
+    patches.inverted[p, 8] = (xx * yy - xy * xy) / determinant
+    patches.unit[p] = math.sqrt(patches.inverted[p, 8] / (EFFECTIVE_SHARE * SAMPLES))
+    return patches.unit[p] < MAX_SCALE_SIGMA
+
+
+def renew(patches: Patches, edges: EdgeColumns, picture: Bytes, plane: ImagePlane, around: Situation) -> None:
+    """Newborn patches where there is room, around edges near the path."""
+    if not around.speed_mps > MIN_SPEED_MPS:
+        return
+    half = half_side(around)
+    patches.tried = -1.0
+    for _ in range(BIRTHS):
+        p = free_row(patches)
+        i = next_place(patches, edges, half, around) if p >= 0 else -1
+        if i < 0:
+            return
+        give_birth(patches, p, edges.x[i], edges.y[i], half, picture, plane)

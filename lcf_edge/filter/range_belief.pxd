@@ -1,0 +1,72 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport flow, path
+from lcf_edge.filter.situation cimport Situation
+
+cdef int RANGES
+cdef double NEAREST_M
+cdef double FARTHEST_REACHES
+cdef double FARTHEST_M
+cdef double WALKS_MPS
+cdef double TRAFFIC_SHARE
+cdef double CHANGES_MPS
+cdef double FOOT_SHARE
+cdef double HIDDEN_FOOT
+cdef double LIFTED_M
+cdef double MEMORY_SHARE
+cdef double JUMPS_HZ
+cdef double ODDS
+cdef double ALONG_MPS
+cdef double ALONG
+cdef double TINY
+cdef double SUNK_FOOT
+cdef double SMALL_M
+cdef double SMALL_RATIO
+cdef double SPEED_SHARE
+cdef double MIN_SIGMA_HZ
+cdef double MAX_HORIZONS
+cdef double FRONT_SHARE
+cdef double DEPTH_SHARE
+cdef double MIN_DEPTH
+cdef double MIN_WEIGHT
+cdef double MIN_SHARE
+cdef double WIDER
+cdef int RANGE
+cdef int FORWARD
+cdef int RIGHT
+cdef int RATE
+cdef int LATERAL
+cdef int CLOSEST
+cdef int QUANTITIES
+cdef double ROOT_2
+cdef double INFINITY
+cdef double NAN
+
+cdef class Evidence:
+    cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, half_extent, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt
+    cdef public bint is_cut
+
+cdef class Belief:
+    cdef public double stands, log_odds, met, middle, middle_sigma
+    cdef readonly double[::1] weight, mean, sigma, inverse, standing, moving
+    cdef double inner_forward, inner_right, inner_forward_var, inner_right_var, inner_rate, inner_rate_var
+
+cdef double log_normal2(double dm, double dq, double mm, double qq, double mq) noexcept nogil
+cdef double foot_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef double memory_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef double small_log(Evidence evidence, double inverse) noexcept nogil
+cdef double walking_mps(Situation around) noexcept nogil
+@cython.locals(most=double, stands=double, moves=double, inverse=double, place=double)
+cdef void weigh(Belief belief, Evidence evidence, Situation around) noexcept nogil
+cdef void suppose_standing(Belief belief, double inverse, Situation around) noexcept nogil
+cdef void suppose_moving(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef double lateral_at(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef double lateral_var(Belief belief, Evidence evidence, double inverse) noexcept nogil
+cdef double below(double value, double mean, double variance) noexcept nogil
+cdef double met_probability(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef void take(Belief belief, int quantity, double weight, double value, double variance) noexcept nogil
+@cython.locals(time_s=double)
+cdef void suppose(Belief belief, double weight, Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef void conclude(Belief belief) noexcept nogil
+cdef void tell_front(Belief belief, Evidence evidence) noexcept nogil
+cpdef void consider(Belief belief, Evidence evidence, Situation around) noexcept nogil

@@ -1,0 +1,154 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport circles as shared
+from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, path, range_belief
+from lcf_edge.filter.baselines cimport Baselines
+from lcf_edge.filter.circles cimport Ids
+from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.flow cimport Homography
+from lcf_edge.filter.group_motion cimport MotionSums
+from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.patches cimport Patches
+from lcf_edge.filter.range_belief cimport Belief, Evidence
+from lcf_edge.filter.rebel_detection cimport Verdicts
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef int MIN_EDGES
+cdef double SIDE_GAP
+cdef double STACK_GAP
+cdef double WIDE_GAP
+cdef double TOWER_GAP
+cdef double LIKE_SIGMAS
+cdef double LIKE_SHARE
+cdef double VERY_LIKE_SHARE
+cdef double DOUBT_SHARE
+cdef double LIKE_SHARE_OF_LINK
+cdef double STRAY_SIGMAS
+cdef double STRAY_SHARE
+cdef double JOIN_SHARE
+cdef double SIDE_REACH
+cdef double STACK_REACH
+cdef int ALL
+cdef double WANDER_MPS
+cdef double UNSEEN_MPS
+cdef double NOISE_GAIN
+cdef double BODY_SHARE
+cdef double BODY_HZ
+cdef double SWING_SHARE
+cdef double SWING_HZ
+cdef double MAX_LAG
+cdef double NEWS_SIGMAS
+cdef double PERSISTS_S
+cdef double MAX_ODDS
+cdef double GROWS_S
+cdef double SHRINKS_S
+cdef double FOOT_S
+cdef double FOOT_BELOW_S
+cdef double EDGE_PX
+cdef double FRAMES_UNTOLD
+cdef double UNSURE
+cdef int SURE_EDGES
+cdef double COAST_S
+cdef double HIDDEN_S
+cdef double OUTSIDE_S
+cdef double RESTING_S
+cdef double NEAR_M
+cdef double LOSES_HZ
+cdef double FOOT_PX
+cdef double BORDER_PX
+cdef double CUT_SHARE
+cdef double CUT_HIDES
+cdef double PASSED_M
+cdef double MOVES_SIGMAS
+cdef double SLOW_MPS
+cdef double INTO_PATH
+cdef double RESTS_MPS
+cdef double STILL_HZ
+cdef double RATE_SIGMAS
+cdef double EVEN
+cdef double MAX_RANGE_M
+cdef int UNKNOWN
+cdef int STANDING
+cdef int CROSSING
+cdef int ONCOMING
+cdef int LEADING
+cdef int CUTTING_IN
+cdef int CROSSES
+cdef int COMES
+cdef int LEADS
+cdef int SEEN
+cdef int HIDDEN
+cdef int COASTING
+cdef double INFINITY
+cdef double NAN
+
+cdef class Squares:
+    cdef readonly MotionSums parts, wholes, bounds
+    cdef readonly int[::1] members, resting
+    cdef unsigned char[::1] obedient
+    cdef readonly Evidence evidence
+    cdef readonly Belief belief
+
+cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
+cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil
+cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double looming, Situation around) noexcept nogil
+cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
+@cython.locals(inverse=double)
+cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+@cython.locals(y=double)
+cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
+cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+cdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
+cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
+cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, Situation around) noexcept nogil
+cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+@cython.locals(least=double)
+cdef int nearest_object(ObjectColumns objects, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+cdef int free_row(ObjectColumns objects) noexcept nogil
+cdef int least_row(ObjectColumns objects) noexcept nogil
+cdef void found(ObjectColumns objects, Py_ssize_t o, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef int gather(ObjectColumns objects, Squares squares, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef void leave(CircleColumns circles, Py_ssize_t o, int to) noexcept nogil
+cdef void hand_over(EdgeColumns edges, Py_ssize_t o, int to) noexcept nogil
+cdef bint belong_together(ObjectColumns objects, Py_ssize_t a, Py_ssize_t b, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef void unite(ObjectColumns objects, Squares squares, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cdef void update_rate(ObjectColumns objects, Py_ssize_t o, double h_m, double h_q, double value, double variance, double speed_mps) noexcept nogil
+@cython.locals(repeated=double, rate=double, variance=double, speed_mps=double)
+cdef void observe(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around) noexcept nogil
+cdef void show(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around) noexcept nogil
+@cython.locals(time_s=double)
+cdef double follow(double side, double shown, double outwards, Situation around) noexcept nogil
+@cython.locals(whole=double, shown=double, per_m=double, bottom=double, kept=double)
+cdef void collect_evidence(Evidence evidence, ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around) noexcept nogil
+cdef void believe(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence, Situation around) noexcept nogil
+cdef void tell_contact(ObjectColumns objects, Py_ssize_t o, double rate, double sigma, Situation around) noexcept nogil
+@cython.locals(into_path=bint, goes_on=bint, goes_aside=bint)
+cdef int class_of(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence) noexcept nogil
+cdef bint rests(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(beside=double, time_s=double, time_sigma_s=double, drift_mps=double)
+cdef void coast(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
+@cython.locals(beside=double)
+cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
+@cython.locals(across=bint)
+cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(hidden=bint, patience_s=double)
+cdef void go_on(ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef bint obeys(ObjectColumns objects, Py_ssize_t o, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, double share, Situation around) noexcept nogil
+cdef void set_reach(MotionSums bounds, MotionSums wholes, Py_ssize_t o) noexcept nogil
+cdef bint is_in_reach(MotionSums bounds, Py_ssize_t o, double x, double y) noexcept nogil
+cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
+@cython.locals(moves=bint)
+cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef int square_of(CircleColumns circles, EdgeColumns edges, Py_ssize_t i) noexcept nogil
+@cython.locals(share=double)
+cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(share=double)
+cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
+cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(o=Py_ssize_t)
+cdef void tell_circles(ObjectColumns objects, CircleColumns circles, Settings settings) noexcept nogil
+cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -1,0 +1,926 @@
+"""Square expert, S: circles that belong to one thing are an object, with its range, its motion and how sure they are.
+
+The third layer (Tafrishi, Dai & Kandjani 2021). Rebel circles join the object that moves as they do and is near them;
+what is left founds new ones. Objects keep their identity while they are hidden or not seen for a short time.
+"""
+
+import math
+
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, path, range_belief
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.flow import Homography
+from lcf_edge.filter.group_motion import MotionSums
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import integers, octets
+from lcf_edge.filter.patches import Patches
+from lcf_edge.filter.range_belief import Belief, Evidence
+from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause, ObjectClass, ObjectState
+
+MIN_EDGES = 2  # whose motion a circle tells
+SIDE_GAP = 0.25  # of the larger extent, by which circles of one object may lie apart to the side,
+STACK_GAP = 0.75  # and one above the other: who walks has few corners between head and feet
+WIDE_GAP = 0.8  # in widths, and
+TOWER_GAP = 2.0  # of those that move very much alike
+LIKE_SIGMAS = 3.0  # by which motions of one object differ,
+LIKE_SHARE = 0.25  # and share of their speed: limbs swing;
+VERY_LIKE_SHARE = 0.1
+DOUBT_SHARE = 0.5  # and not by more than this because of what is unsure: a doubtful object would take in all around it
+LIKE_SHARE_OF_LINK = 0.2  # and this many of the px within which rebels are linked, each second
+STRAY_SIGMAS = 4.0  # of noise, and
+STRAY_SHARE = 0.35  # share of its speed, by which an edge of an object may move otherwise;
+JOIN_SHARE = 0.1  # one that is no rebel by less:
+SIDE_REACH = 0.1  # within the box of those that are, and so much of it beside
+STACK_REACH = 0.3  # and above and below, what breaks the flow; the ground before it moves much as it does
+ALL = -1  # all edges of an object tell how it moves
+WANDER_MPS = 1.0  # 1 sigma of how much a velocity changes in a second,
+UNSEEN_MPS = 0.3  # and of what is not seen is taken to change
+BODY_SHARE = 0.1  # of m, 1 sigma, by which an object is not what its edges show: some lie farther off,
+BODY_HZ = 0.015  # and at least this;
+SWING_SHARE = 0.1  # so of q
+SWING_HZ = 0.006
+NOISE_GAIN = 1.7  # corners wander more than their noise tells: they are not points of the thing
+MAX_LAG = 0.5  # share by which a rate is brought from the middle of its window to now
+NEWS_SIGMAS = 4.0  # beyond which a measurement is held to be an outlier, and counts less
+PERSISTS_S = 0.055  # time constant with which the logarithmic odds of standing are forgotten
+MAX_ODDS = 4.0  # of which no more is kept
+GROWS_S = 0.07  # time constant with which a box follows edges outside it,
+SHRINKS_S = 0.3  # and edges that show it smaller,
+FOOT_S = 1.2  # and with which a foot is forgotten that is not seen,
+FOOT_BELOW_S = 3.0  # below the picture
+EDGE_PX = 1.0  # by which a corner lies inside of what it is a corner of
+FRAMES_UNTOLD = 2.0  # of a new object,
+UNSURE = 0.25  # and three more with fewer edges than
+SURE_EDGES = 7
+COAST_S = 0.3  # an object goes on unseen for so long without losing trust,
+HIDDEN_S = 1.0  # and behind another one for so long,
+OUTSIDE_S = 1.0  # beside the picture,
+RESTING_S = 2.0  # and where it stands, or is near, before a vehicle that stands, too;
+NEAR_M = 1.5
+LOSES_HZ = 20.0  # trust that it loses then
+FOOT_PX = 2.0  # 1 sigma of where the lowest edge is
+BORDER_PX = 4.0
+CUT_SHARE = 0.15  # of its height: with its lowest edge so near to the picture's border its foot may be below that,
+CUT_HIDES = 0.75  # which is so likely
+PASSED_M = 0.1  # what is not seen and nearer than this is passed
+MOVES_SIGMAS = 1.5  # by which a velocity is above its noise
+SLOW_MPS = 0.15
+INTO_PATH = 0.2  # share of the motion forward, by which what leads goes to the side when it cuts in
+RESTS_MPS = 0.05  # a slower vehicle rests,
+STILL_HZ = 0.05  # and what has a smaller looming and sideways rate, with it
+RATE_SIGMAS = 1.0  # by which a looming is above its noise where a time to contact is told
+EVEN = 0.5
+MAX_RANGE_M = 1000.0  # farther off nothing is known
+UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
+ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
+SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
+CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
+INFINITY = float("inf")
+NAN = float("nan")
+
+
+class Squares:
+    """Room for one frame.
+
+    ``parts``: the motion of each circle; ``wholes``: of each object; ``members``: its edges; ``resting``: those of
+    them that are there while the vehicle rests; ``bounds``: where others may join it. ``obedient``: whether the edge of
+    a verdict moves as its object does.
+    """
+
+    def __init__(self, circles: int, objects: int, edges: int) -> None:
+        self.parts, self.wholes, self.bounds = MotionSums(circles), MotionSums(objects), MotionSums(objects)
+        self.members, self.resting = integers(objects), integers(objects)
+        self.obedient = octets(edges)
+        self.evidence, self.belief = Evidence(), Belief()
+
+
+# Prediction
+
+
+def derotate(objects: ObjectColumns, h: Homography) -> None:
+    """H = K·R·K⁻¹ on the centres of objects."""
+    for o in range(objects.capacity):
+        if objects.active[o]:
+            flow.warp(h, objects.x[o], objects.y[o])
+            objects.x[o], objects.y[o] = h.x, h.y
+
+
+def looming_at(objects: ObjectColumns, o: int, speed_mps: float) -> float:
+    """m at another speed of the vehicle than the one at which it was measured, 1/s."""
+    gained_mps = speed_mps - objects.reference[o]
+    if objects.middle[o] > 0 and math.isfinite(gained_mps):
+        return objects.looming[o] + gained_mps / objects.middle[o]
+    return objects.looming[o]
+
+
+def velocity_x(objects: ObjectColumns, o: int, x: float, looming: float, around: Situation) -> float:
+    """Image velocity of a part of an object at ``x``, px/s: to the side, and by looming about O."""
+    return objects.sideways[o] * around.pinhole.fx + looming * (x - around.focus_x)
+
+
+def velocity_y(y: float, looming: float, around: Situation) -> float:
+    """Image velocity of a part of an object at ``y``, px/s: what moves on the ground moves about the horizon."""
+    return looming * (y - around.horizon_y)
+
+
+def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
+    """S': each object goes on as it moves, and is the less sure of it."""
+    for o in range(objects.capacity):
+        if not objects.active[o]:
+            continue
+        if math.isfinite(around.speed_mps) != math.isfinite(objects.reference[o]):
+            forget_motion(objects, o)
+        dt_s, looming = around.dt_s, looming_at(objects, o, around.speed_mps)
+        objects.x[o] += velocity_x(objects, o, objects.x[o], looming, around) * dt_s
+        objects.y[o] += velocity_y(objects.y[o], looming, around) * dt_s
+        growth = 1 + min(max(looming * dt_s, -MAX_LAG), MAX_LAG)
+        objects.width[o] *= growth
+        objects.height[o] *= growth
+        objects.foot[o] *= growth
+        objects.looming[o] *= growth
+        objects.sideways[o] *= growth
+        inverse = 0.0
+        if objects.middle[o] > 0:
+            objects.middle[o] /= growth
+            objects.range[o] /= growth
+            inverse = 1 / objects.middle[o]
+        wander = (
+            (WANDER_MPS if objects.unseen_s[o] == 0 else UNSEEN_MPS)
+            * max(inverse, math.fabs(looming))
+            * math.sqrt(dt_s)
+        )
+        objects.mm[o] += wander * wander
+        objects.qq[o] += wander * wander
+        objects.age_s[o] += dt_s
+        if is_passed(objects, o) or (not is_in_sight(objects, o, plane) and not is_beside(objects, o, settings)):
+            objects.active[o] = 0
+
+
+def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
+    """Whether a part of the middle row of an object's box is in the picture."""
+    left, right = objects.x[o] - 0.5 * objects.width[o], objects.x[o] + 0.5 * objects.width[o]
+    y = min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1)
+    if image_plane.project(plane, objects.x[o], y) or image_plane.project(plane, left, y):
+        return True
+    return image_plane.project(plane, right, y) or (left < 0 and right > plane.width)
+
+
+def is_passed(objects: ObjectColumns, o: int) -> bool:
+    """Whether an object that is not seen would be nearer than anything can be."""
+    return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
+
+
+def is_beside(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+    """Whether an object that left the picture at its side may still be met."""
+    return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < OUTSIDE_S and objects.middle[o] > 0
+
+
+# Circles of one object
+
+
+def belongs(
+    objects: ObjectColumns,
+    o: int,
+    circles: CircleColumns,
+    c: int,
+    parts: MotionSums,
+    around: Situation,
+    settings: Settings,
+) -> bool:
+    """Whether a circle is a part of an object: near its box, and moving alike.
+
+    What lies farther apart must move the more alike: a large thing may have few corners.
+    """
+    width, tall = max(objects.width[o], circles.width[c]), max(objects.height[o], circles.height[c])
+    extent = max(width, tall)
+    side = math.fabs(objects.x[o] - circles.x[c]) - 0.5 * (objects.width[o] + circles.width[c])
+    stack = math.fabs(objects.y[o] - circles.y[c]) - 0.5 * (objects.height[o] + circles.height[c])
+    near_px = settings.rebel_link_px
+    if side < max(near_px, SIDE_GAP * extent) and stack < max(near_px, STACK_GAP * extent):
+        return moves_alike(objects, o, parts, c, LIKE_SHARE, around, settings)
+    if side < WIDE_GAP * width and stack < TOWER_GAP * extent:
+        return moves_alike(objects, o, parts, c, VERY_LIKE_SHARE, around, settings)
+    return False
+
+
+def moves_alike(
+    objects: ObjectColumns,
+    o: int,
+    parts: MotionSums,
+    c: int,
+    share: float,
+    around: Situation,
+    settings: Settings,
+) -> bool:
+    """Whether a circle moves as that part of the object would, within what both are unsure of."""
+    weight = parts.weight[c]
+    x, y = parts.x[c] / weight, parts.y[c] / weight
+    vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
+    looming = looming_at(objects, o, parts.forward[c] / weight)
+    dx, dy = vx - velocity_x(objects, o, x, looming, around), vy - velocity_y(y, looming, around)
+    fx, fy = around.pinhole.fx, around.pinhole.fy
+    across, down = (x - around.focus_x) / fx, (y - around.horizon_y) / fy
+    own = 1 / weight
+    sideways = objects.qq[o] + across * across * objects.mm[o] + 2 * across * objects.mq[o]
+    variance_x = own + fx * fx * max(sideways, 0.0)
+    variance_y = own + fy * fy * down * down * objects.mm[o]
+    like = share * flow.length(vx, vy) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
+    doubt = DOUBT_SHARE * max(flow.length(vx, vy), flow.length(vx - dx, vy - dy))
+    return (
+        math.fabs(dx) < min(LIKE_SIGMAS * math.sqrt(variance_x), doubt) + like
+        and math.fabs(dy) < min(LIKE_SIGMAS * math.sqrt(variance_y), doubt) + like
+    )
+
+
+def measure_circles(
+    parts: MotionSums,
+    circles: CircleColumns,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    patches: Patches,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """How the edges of each rebel circle move, and its patches."""
+    for c in range(circles.capacity):
+        group_motion.clear(parts, c)
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        if edges.rebel[i] and edges.circle[i] >= 0:
+            group_motion.add_edge(parts, edges.circle[i], verdicts, j, edges, baselines, around)
+    for p in range(patches.capacity):
+        if patches.active[p] and patches.circle[p] >= 0:
+            group_motion.add_patch(parts, patches.circle[p], patches, p, around)
+
+
+def keep_members(
+    objects: ObjectColumns, squares: Squares, circles: CircleColumns, around: Situation, settings: Settings
+) -> None:
+    """Circles that end, or go their own way, leave their object."""
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if o < 0:
+            continue
+        if (
+            not circles.active[c]
+            or not objects.active[o]
+            or (
+                squares.parts.count[c] >= MIN_EDGES
+                and not belongs(objects, o, circles, c, squares.parts, around, settings)
+            )
+        ):
+            circles.square[c] = -1
+
+
+def nearest_object(
+    objects: ObjectColumns, squares: Squares, circles: CircleColumns, c: int, around: Situation, settings: Settings
+) -> int:
+    """The object that a circle is a part of, -1: none."""
+    nearest = -1
+    least = INFINITY
+    for o in range(objects.capacity):
+        if objects.active[o] and belongs(objects, o, circles, c, squares.parts, around, settings):
+            away = flow.length(objects.x[o] - circles.x[c], objects.y[o] - circles.y[c])
+            if away < least:
+                nearest, least = o, away
+    return nearest
+
+
+def free_row(objects: ObjectColumns) -> int:
+    """The first row that is not in use, -1: none."""
+    for o in range(objects.capacity):
+        if not objects.active[o]:
+            return o
+    return -1
+
+
+def least_row(objects: ObjectColumns) -> int:
+    """Row of the object that is trusted least."""
+    least = 0
+    for o in range(objects.capacity):
+        if objects.trust[o] < objects.trust[least]:
+            least = o
+    return least
+
+
+def found(
+    objects: ObjectColumns,
+    o: int,
+    squares: Squares,
+    circles: CircleColumns,
+    c: int,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> None:
+    """A new object from a circle. It is not told in its first frames: its numbers would be those of a few edges."""
+    objects.active[o] = 1
+    objects.id[o] = shared.new_id(ids)
+    left, right = squares.parts.left[c], squares.parts.right[c]
+    top, bottom = squares.parts.top[c], squares.parts.bottom[c]
+    objects.x[o], objects.width[o] = 0.5 * (left + right), right - left
+    objects.y[o], objects.height[o] = 0.5 * (top + bottom), bottom - top
+    objects.trust[o] = settings.tr_s - FRAMES_UNTOLD - 1
+    objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
+    objects.class_id[o], objects.state[o], objects.support[o] = UNKNOWN, SEEN, 0
+    objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
+    objects.probability[o] = 0.0
+    forget_motion(objects, o)
+    circles.square[c] = o
+    group_motion.clear(squares.wholes, o)
+    group_motion.add(squares.wholes, o, squares.parts, c)
+    observe(objects, o, squares.wholes, around)
+
+
+def forget_motion(objects: ObjectColumns, o: int) -> None:
+    """Nothing is known of how an object moves."""
+    objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
+    objects.mm[o] = objects.qq[o] = INFINITY
+    objects.reference[o] = NAN
+
+
+def gather(
+    objects: ObjectColumns,
+    squares: Squares,
+    circles: CircleColumns,
+    edges: EdgeColumns,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """Circles without an object join one, or found a new one; return how many found no place."""
+    evicted = 0
+    for c in range(circles.capacity):
+        if not circles.active[c] or circles.square[c] >= 0 or squares.parts.count[c] < MIN_EDGES:
+            continue
+        o = nearest_object(objects, squares, circles, c, around, settings)
+        if o >= 0:
+            circles.square[c] = o
+        elif circles.trust[c] >= settings.tr_s and not group_motion.is_ground(squares.parts, c, around):
+            o = free_row(objects)
+            if o < 0:
+                evicted += 1
+                o = least_row(objects)
+                leave(circles, o, -1)
+                hand_over(edges, o, -1)
+            found(objects, o, squares, circles, c, around, settings, ids)
+    return evicted
+
+
+def leave(circles: CircleColumns, o: int, to: int) -> None:
+    """The circles of an object go to another one; -1: to none."""
+    for c in range(circles.capacity):
+        if circles.square[c] == o:
+            circles.square[c] = to
+
+
+def hand_over(edges: EdgeColumns, o: int, to: int) -> None:
+    """The edges of an object go to another one; -1: to none."""
+    for i in range(edges.count):
+        if edges.square[i] == o:
+            edges.square[i] = to
+
+
+def belong_together(
+    objects: ObjectColumns,
+    a: int,
+    b: int,
+    squares: Squares,
+    circles: CircleColumns,
+    around: Situation,
+    settings: Settings,
+) -> bool:
+    """Whether all that is seen of one object could be a part of the other, and the other way round."""
+    for c in range(circles.capacity):
+        if squares.parts.count[c] < MIN_EDGES:
+            continue
+        if circles.square[c] == a and not belongs(objects, b, circles, c, squares.parts, around, settings):
+            return False
+        if circles.square[c] == b and not belongs(objects, a, circles, c, squares.parts, around, settings):
+            return False
+    return True
+
+
+def unite(
+    objects: ObjectColumns,
+    squares: Squares,
+    circles: CircleColumns,
+    edges: EdgeColumns,
+    around: Situation,
+    settings: Settings,
+) -> None:
+    """Objects that turn out to be one: the younger goes into the older."""
+    for a in range(objects.capacity):
+        for b in range(objects.capacity):
+            if a == b or not objects.active[a] or not objects.active[b]:
+                continue
+            if objects.age_s[a] < objects.age_s[b] or (objects.age_s[a] == objects.age_s[b] and a > b):
+                continue
+            if objects.unseen_s[a] > 0 or objects.unseen_s[b] > 0:
+                continue
+            if belong_together(objects, a, b, squares, circles, around, settings):
+                leave(circles, b, a)
+                hand_over(edges, b, a)
+                objects.active[b] = 0
+
+
+# What is seen of an object
+
+
+def update_rate(
+    objects: ObjectColumns, o: int, h_m: float, h_q: float, value: float, variance: float, speed_mps: float
+) -> None:
+    """A measurement of h_m·m + h_q·q, by the equations of Kalman; an outlier counts as little as it deserves.
+
+    ``speed_mps``: V at which it was made. m is linear in V: the mean of what is measured belongs to the mean of V. Of
+    an object of which nothing is known m is told first (1, 0), then q with it (across, 1).
+    """
+    if not math.isfinite(objects.mm[o]):
+        objects.looming[o], objects.mm[o], objects.reference[o] = value, variance, speed_mps
+        return
+    if not math.isfinite(objects.qq[o]):
+        objects.sideways[o] = value - h_m * objects.looming[o]
+        objects.qq[o] = variance + h_m * h_m * objects.mm[o]
+        objects.mq[o] = -h_m * objects.mm[o]
+        return
+    p_m = h_m * objects.mm[o] + h_q * objects.mq[o]
+    p_q = h_m * objects.mq[o] + h_q * objects.qq[o]
+    expected = h_m * p_m + h_q * p_q
+    news = value - h_m * objects.looming[o] - h_q * objects.sideways[o]
+    surprise = news * news / (expected + variance) / (NEWS_SIGMAS * NEWS_SIGMAS)
+    total = expected + variance * max(surprise, 1.0)
+    objects.looming[o] += p_m / total * news
+    objects.reference[o] += p_m / total * h_m * (speed_mps - objects.reference[o])
+    objects.sideways[o] += p_q / total * news
+    objects.mm[o] -= p_m * p_m / total
+    objects.mq[o] -= p_m * p_q / total
+    objects.qq[o] -= p_q * p_q / total
+
+
+def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
+    """m and q from the motion of all edges of an object, brought from the middle of their window to now.
+
+    m stays that of the mean speed over the window. Windows of successive frames overlap: each tells only what is new
+    in it.
+    """
+    weight = wholes.weight[o]
+    fx = around.pinhole.fx
+    x, y = wholes.x[o] / weight, wholes.y[o] / weight
+    focus_x, focus_y = wholes.focus_x[o] / weight, wholes.focus_y[o] / weight
+    elapsed_s, common = wholes.elapsed[o] / weight, wholes.common[o] / weight
+    repeated = NOISE_GAIN * NOISE_GAIN
+    if math.isfinite(objects.mm[o]):
+        repeated *= max(elapsed_s / around.dt_s, 1.0)
+    rate = group_motion.expansion(wholes, o)
+    variance = 1 / group_motion.spread(wholes, o)
+    below = y - focus_y
+    if math.fabs(below) > 1:
+        # what moves on the ground moves about the horizon
+        vertical = wholes.vy[o] / weight / below
+        vertical_var = (1 / weight + common * common) / (below * below)
+        rate = (rate * vertical_var + vertical * variance) / (vertical_var + variance)
+        variance = variance * vertical_var / (vertical_var + variance)
+    lag = 1 - min(max(0.5 * elapsed_s * rate, -MAX_LAG), MAX_LAG)
+    speed_mps = wholes.forward[o] / weight if math.isfinite(around.speed_mps) else NAN
+    update_rate(objects, o, 1.0, 0.0, rate / lag, repeated * variance / (lag * lag), speed_mps)
+    across = (x - focus_x) / fx
+    aside = wholes.vx[o] / weight / fx
+    aside_var = (1 / weight + common * common) / (fx * fx)
+    update_rate(objects, o, across, 1.0, aside / lag, repeated * aside_var / (lag * lag), speed_mps)
+
+
+def show(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
+    """The box around all edges of an object: it grows soon, and shrinks slowly."""
+    half_width, half_height = 0.5 * objects.width[o], 0.5 * objects.height[o]
+    left = follow(objects.x[o] - half_width, wholes.left[o] - EDGE_PX, -1.0, around)
+    right = follow(objects.x[o] + half_width, wholes.right[o] + EDGE_PX, 1.0, around)
+    top = follow(objects.y[o] - half_height, wholes.top[o] - EDGE_PX, -1.0, around)
+    bottom = follow(objects.y[o] + half_height, wholes.bottom[o] + EDGE_PX, 1.0, around)
+    objects.x[o], objects.width[o] = 0.5 * (left + right), right - left
+    objects.y[o], objects.height[o] = 0.5 * (top + bottom), bottom - top
+
+
+def follow(side: float, shown: float, outwards: float, around: Situation) -> float:
+    """A side of a box, px, on its way to where the edges show it. ``outwards``: 1 or -1."""
+    time_s = GROWS_S if (shown - side) * outwards > 0 else SHRINKS_S
+    return side + (1 - math.exp(-around.dt_s / time_s)) * (shown - side)
+
+
+# What is believed of it
+
+
+def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation) -> None:
+    """What an object shows, in angles."""
+    fx, fy = around.pinhole.fx, around.pinhole.fy
+    evidence.looming, evidence.sideways = objects.looming[o], objects.sideways[o]
+    whole = flow.length(BODY_SHARE * evidence.looming, BODY_HZ)
+    evidence.mm, evidence.mq = objects.mm[o] + whole * whole, objects.mq[o]
+    whole = flow.length(SWING_SHARE * evidence.sideways, SWING_HZ)
+    evidence.qq = objects.qq[o] + whole * whole
+    evidence.across = (objects.x[o] - around.focus_x) / fx
+    evidence.half_width = 0.5 * objects.width[o] / fx
+    evidence.half_extent = max(evidence.half_width, 0.5 * objects.height[o] / fy)
+    evidence.across_sigma = 0.5 * evidence.half_width
+    bottom = objects.y[o] + 0.5 * objects.height[o]
+    if around.camera_height_m > 0:
+        per_m = fy * around.camera_height_m
+        shown = (bottom - around.horizon_y) / per_m
+        if not objects.foot[o] > shown:
+            objects.foot[o] = shown
+        else:
+            low = around.horizon_y + objects.foot[o] * per_m + BORDER_PX
+            time_s = FOOT_S if image_plane.project(plane, around.focus_x, low) else FOOT_BELOW_S
+            objects.foot[o] += (1 - math.exp(-around.dt_s / time_s)) * (shown - objects.foot[o])
+        evidence.foot = objects.foot[o]
+        bottom = around.horizon_y + evidence.foot * per_m
+        evidence.hidden = range_belief.HIDDEN_FOOT
+        if not image_plane.project(plane, around.focus_x, bottom + CUT_SHARE * objects.height[o]):
+            evidence.hidden = CUT_HIDES
+        evidence.foot_sigma = math.sqrt(around.pitch_sigma_rad * around.pitch_sigma_rad + FOOT_PX * FOOT_PX / fy / fy)
+        evidence.foot_sigma /= around.camera_height_m
+    evidence.is_cut = not image_plane.project(plane, around.focus_x, bottom + BORDER_PX)
+    evidence.reference = objects.reference[o]
+    evidence.range_before, evidence.range_doubt = objects.middle[o], objects.middle_sigma[o]
+    kept = math.exp(-around.dt_s / PERSISTS_S)
+    evidence.log_odds = min(max(kept * objects.log_odds[o], -MAX_ODDS), MAX_ODDS)
+
+
+def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, around: Situation) -> None:
+    """The object's numbers from what is believed."""
+    objects.log_odds[o] = belief.log_odds
+    objects.middle[o], objects.middle_sigma[o] = belief.middle, belief.middle_sigma
+    objects.range[o], objects.range_sigma[o] = belief.mean[range_belief.RANGE], belief.sigma[range_belief.RANGE]
+    objects.forward[o], objects.forward_sigma[o] = belief.mean[range_belief.FORWARD], belief.sigma[range_belief.FORWARD]
+    objects.right[o], objects.right_sigma[o] = belief.mean[range_belief.RIGHT], belief.sigma[range_belief.RIGHT]
+    objects.closest[o], objects.closest_sigma[o] = belief.mean[range_belief.CLOSEST], belief.sigma[range_belief.CLOSEST]
+    objects.lateral[o], objects.lateral_sigma[o] = belief.mean[range_belief.LATERAL], belief.sigma[range_belief.LATERAL]
+    objects.probability[o] = belief.met
+    if objects.range[o] > MAX_RANGE_M:
+        objects.range[o] = objects.range_sigma[o] = NAN
+    if math.fabs(objects.lateral[o]) > MAX_RANGE_M:
+        objects.lateral[o] = objects.lateral_sigma[o] = NAN
+    tell_contact(objects, o, belief.mean[range_belief.RATE], belief.sigma[range_belief.RATE], around)
+    objects.class_id[o] = class_of(objects, o, belief, evidence)
+
+
+def tell_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:
+    """Time to contact from its inverse, 1/s; none where the looming is not above its noise."""
+    if rate > RATE_SIGMAS * sigma and rate * range_belief.MAX_HORIZONS * around.horizon_s > 1:
+        objects.ttc[o], objects.ttc_sigma[o] = 1 / rate, sigma / (rate * rate)
+    else:
+        objects.ttc[o], objects.ttc_sigma[o] = INFINITY, NAN
+
+
+def class_of(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence) -> int:
+    """What an object does, over ground."""
+    if belief.stands > EVEN:
+        return STANDING
+    forward, right = objects.forward[o], objects.right[o]
+    goes_on = math.fabs(forward) > max(MOVES_SIGMAS * objects.forward_sigma[o], SLOW_MPS)
+    goes_aside = math.fabs(right) > max(MOVES_SIGMAS * objects.right_sigma[o], SLOW_MPS)
+    if goes_aside and (not goes_on or math.fabs(right) >= math.fabs(forward)):
+        return CROSSING
+    if not goes_on:
+        return UNKNOWN
+    if forward < 0:
+        return ONCOMING
+    into_path = goes_aside and right * evidence.across < 0 and math.fabs(right) > INTO_PATH * forward
+    return CUTTING_IN if into_path else LEADING
+
+
+def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
+    """Whether neither an object nor the vehicle moves: then nothing new is seen of where it is."""
+    if not math.fabs(around.speed_mps) < RESTS_MPS or objects.log_odds[o] < 0 or not objects.range[o] > 0:
+        return False
+    return math.fabs(objects.looming[o]) < STILL_HZ and math.fabs(objects.sideways[o]) < STILL_HZ
+
+
+def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
+    """What is not seen goes on as it went: all follows from its place and its velocity, which become unsure."""
+    drift_mps = UNSEEN_MPS * math.sqrt(around.dt_s) if objects.unseen_s[o] > 0 else 0.0
+    objects.forward_sigma[o] = flow.length(objects.forward_sigma[o], drift_mps)
+    objects.right_sigma[o] = flow.length(objects.right_sigma[o], drift_mps)
+    range_m, closing_mps = objects.range[o], around.speed_mps - objects.forward[o]
+    right_mps = objects.right[o]
+    if objects.unseen_s[o] > 0:
+        objects.range_sigma[o] = flow.length(objects.range_sigma[o], objects.forward_sigma[o] * around.dt_s)
+    share = flow.length(objects.range_sigma[o] / range_m, objects.forward_sigma[o] / max(closing_mps, SLOW_MPS))
+    objects.probability[o] = 0.0
+    objects.lateral[o] = objects.lateral_sigma[o] = objects.closest[o] = objects.closest_sigma[o] = NAN
+    tell_contact(objects, o, closing_mps / range_m, share * math.fabs(closing_mps) / range_m, around)
+    if not math.isfinite(objects.ttc[o]):
+        return
+    time_s, time_sigma_s = objects.ttc[o], objects.ttc_sigma[o]
+    objects.closest[o], objects.closest_sigma[o] = time_s, time_sigma_s
+    right_m = range_m * evidence.across + right_mps * time_s
+    objects.lateral[o] = path.miss(right_m, range_m + objects.forward[o] * time_s, around)
+    aside = flow.length(range_m * evidence.across_sigma, evidence.across * objects.range_sigma[o])
+    late = flow.length(objects.right_sigma[o] * time_s, right_mps * time_sigma_s)
+    objects.lateral_sigma[o] = flow.length(aside, late)
+    half_m = around.half_width_m + evidence.half_width * range_m
+    variance = objects.lateral_sigma[o] * objects.lateral_sigma[o]
+    beside = range_belief.below(half_m, objects.lateral[o], variance)
+    beside -= range_belief.below(-half_m, objects.lateral[o], variance)
+    soon = range_belief.below(around.horizon_s, time_s, time_sigma_s * time_sigma_s)
+    objects.probability[o] = beside * soon
+
+
+def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
+    """The vehicle's speed is not known: the picture alone tells when, and the foot where."""
+    objects.middle[o] = objects.middle_sigma[o] = objects.range[o] = objects.range_sigma[o] = NAN
+    objects.lateral[o] = objects.lateral_sigma[o] = NAN
+    objects.forward[o] = objects.forward_sigma[o] = objects.right[o] = objects.right_sigma[o] = NAN
+    objects.closest[o] = objects.closest_sigma[o] = NAN
+    objects.class_id[o] = UNKNOWN
+    sigma = math.sqrt(evidence.mm)
+    tell_contact(objects, o, evidence.looming, sigma, around)
+    beside = EVEN
+    if around.camera_height_m > 0 and evidence.foot > 2 * evidence.foot_sigma and not evidence.is_cut:
+        range_m = 1 / evidence.foot
+        objects.range[o], objects.range_sigma[o] = range_m, range_m * range_m * evidence.foot_sigma
+        objects.right[o], objects.right_sigma[o] = evidence.sideways * range_m, math.sqrt(evidence.qq) * range_m
+        if math.isfinite(objects.ttc[o]):
+            time_s = objects.ttc[o]
+            objects.lateral[o] = range_m * (evidence.across + evidence.sideways * time_s)
+            lateral_var = range_m * range_m * time_s * time_s * evidence.qq
+            objects.lateral_sigma[o] = math.sqrt(lateral_var)
+            half_m = around.half_width_m + evidence.half_width * range_m
+            beside = range_belief.below(half_m, objects.lateral[o], lateral_var)
+            beside -= range_belief.below(-half_m, objects.lateral[o], lateral_var)
+    soon = 1 - range_belief.below(1 / around.horizon_s, evidence.looming, evidence.mm)
+    objects.probability[o] = beside * soon
+
+
+# Life
+
+
+def is_behind(objects: ObjectColumns, o: int) -> bool:
+    """Whether an object's middle lies behind a nearer one."""
+    for other in range(objects.capacity):
+        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
+            continue
+        if not objects.range[other] < objects.range[o]:
+            continue
+        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * (objects.width[other] + objects.width[o])
+        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * (objects.height[other] + objects.height[o]):
+            return True
+    return False
+
+
+def go_on(objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation, settings: Settings) -> None:
+    """An object that no edge shows in this frame is hidden, or coasts; in the end it is lost.
+
+    What stands shows nothing to a vehicle that does, what is very near may show no corner, and what left the picture
+    at its side cannot.
+    """
+    objects.unseen_s[o] += around.dt_s
+    hidden = is_behind(objects, o)
+    objects.state[o] = HIDDEN if hidden else COASTING
+    patience_s = HIDDEN_S if hidden else COAST_S
+    if not is_in_sight(objects, o, plane):
+        patience_s = OUTSIDE_S
+    elif math.fabs(around.speed_mps) < SLOW_MPS and (objects.log_odds[o] > 0 or objects.range[o] < NEAR_M):
+        patience_s = RESTING_S
+    if objects.unseen_s[o] > patience_s:
+        objects.trust[o] -= around.dt_s * LOSES_HZ
+    if objects.trust[o] < settings.tr_cr:
+        objects.active[o] = 0
+
+
+def obeys(
+    objects: ObjectColumns,
+    o: int,
+    verdicts: Verdicts,
+    j: int,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    share: float,
+    around: Situation,
+) -> bool:
+    """Whether an edge moves as its place on the object would, within a share of its speed, and noise."""
+    i = verdicts.row[j]
+    elapsed_s = baselines.elapsed_s[verdicts.slot[j]]
+    speed_mps = baselines.depth_m[verdicts.slot[j]] / elapsed_s
+    x, y = 0.5 * (edges.x[i] + verdicts.x[j]), 0.5 * (edges.y[i] + verdicts.y[j])
+    looming = looming_at(objects, o, speed_mps)
+    lag = 1 - min(max(0.5 * elapsed_s * looming, -MAX_LAG), MAX_LAG)
+    vx, vy = velocity_x(objects, o, x, looming, around) * lag, velocity_y(y, looming, around) * lag
+    dx, dy = (edges.x[i] - verdicts.x[j]) / elapsed_s - vx, (edges.y[i] - verdicts.y[j]) / elapsed_s - vy
+    most = STRAY_SIGMAS * around.noise_px / elapsed_s + share * flow.length(vx, vy)
+    return dx * dx + dy * dy < most * most
+
+
+def set_reach(bounds: MotionSums, wholes: MotionSums, o: int) -> None:
+    """Where edges may join an object."""
+    bounds.count[o] = wholes.count[o]
+    if wholes.count[o] < MIN_EDGES:
+        return
+    side = SIDE_REACH * (wholes.right[o] - wholes.left[o])
+    stack = STACK_REACH * (wholes.bottom[o] - wholes.top[o])
+    bounds.left[o], bounds.right[o] = wholes.left[o] - side, wholes.right[o] + side
+    bounds.top[o], bounds.bottom[o] = wholes.top[o] - stack, wholes.bottom[o] + stack
+
+
+def is_in_reach(bounds: MotionSums, o: int, x: float, y: float) -> bool:
+    """Whether a place is inside the bounds of an object."""
+    if bounds.count[o] < MIN_EDGES or x < bounds.left[o] or x > bounds.right[o]:
+        return False
+    return y >= bounds.top[o] and y <= bounds.bottom[o]
+
+
+def still_px(verdicts: Verdicts, j: int) -> float:
+    """By how much an edge moved otherwise than what stands still at whatever depth, px."""
+    return max(math.fabs(verdicts.drift[j]), verdicts.short[j], verdicts.over[j])
+
+
+def take_others(
+    objects: ObjectColumns,
+    squares: Squares,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """Edges that are no rebels join the object that they are near to and move with.
+
+    As feet on the ground do, that hardly break the flow. Those that move otherwise than what stands still become its
+    own; so do those that rest inside what rests.
+    """
+    shown = 0
+    for o in range(objects.capacity):
+        set_reach(squares.bounds, squares.wholes, o)
+        shown += squares.wholes.count[o]
+    if shown == 0:
+        return
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        if edges.square[i] >= 0:
+            continue
+        x, y = edges.x[i], edges.y[i]
+        moves = still_px(verdicts, j) > STRAY_SIGMAS * around.noise_px
+        for o in range(objects.capacity):
+            if not (is_in_reach(squares.bounds, o, x, y) if moves else is_in_reach(squares.wholes, o, x, y)):
+                continue
+            if obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around):
+                group_motion.add_edge(squares.wholes, o, verdicts, j, edges, baselines, around)
+                if moves:
+                    edges.square[i] = o
+                break
+
+
+def square_of(circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
+    """The object that an edge belongs to, by its circle, or as it did before; -1: none."""
+    if edges.rebel[i] and edges.circle[i] >= 0 and circles.square[edges.circle[i]] >= 0:
+        return circles.square[edges.circle[i]]
+    return edges.square[i]
+
+
+def count_members(
+    objects: ObjectColumns,
+    squares: Squares,
+    circles: CircleColumns,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """The edges of each object; ``ALL`` where most of them move otherwise than was thought."""
+    for o in range(objects.capacity):
+        group_motion.clear(squares.wholes, o)
+        squares.members[o] = squares.resting[o] = 0
+    for i in range(edges.count):
+        edges.square[i] = o = square_of(circles, edges, i)
+        if o >= 0 and edges.matched[i] and math.fabs(around.speed_mps) < RESTS_MPS:
+            squares.resting[o] += 1
+    for j in range(verdicts.count):
+        o = edges.square[verdicts.row[j]]
+        if o >= 0:
+            squares.members[o] += 1
+            share = STRAY_SHARE if edges.rebel[verdicts.row[j]] else JOIN_SHARE
+            squares.obedient[j] = 1 if obeys(objects, o, verdicts, j, edges, baselines, share, around) else 0
+            squares.wholes.count[o] += squares.obedient[j]
+    for o in range(objects.capacity):
+        if squares.wholes.count[o] < MIN_EDGES or 2 * squares.wholes.count[o] < squares.members[o]:
+            squares.members[o] = ALL
+        squares.wholes.count[o] = 0
+
+
+def take_members(
+    objects: ObjectColumns,
+    squares: Squares,
+    circles: CircleColumns,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """The motion of each object, by its edges. Those that move otherwise than most of them are no longer its own."""
+    count_members(objects, squares, circles, verdicts, edges, baselines, around)
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        o = edges.square[i]
+        if o < 0:
+            continue
+        if squares.members[o] == ALL or squares.obedient[j]:
+            group_motion.add_edge(squares.wholes, o, verdicts, j, edges, baselines, around)
+        else:
+            edges.square[i] = -1
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if o >= 0 and circles.active[c] and squares.wholes.count[o] < MIN_EDGES:
+            group_motion.add(squares.wholes, o, squares.parts, c)  # patches tell where edges do not
+
+
+def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation, settings: Settings) -> float:
+    """By how much the trust of an object changes that edges show: few make it sure slowly, the ground is none."""
+    if group_motion.is_ground(wholes, o, around):
+        return -1.0
+    return 1.0 if wholes.count[o] >= SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
+
+
+# What it tells its circles
+
+
+def cause_of(objects: ObjectColumns, o: int) -> int:
+    """The cause of the circles of an object that moves."""
+    if objects.probability[o] > EVEN:
+        return COMES
+    return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
+
+
+def tell_circles(objects: ObjectColumns, circles: CircleColumns, settings: Settings) -> None:
+    """Circles of what moves take cause, range and miss from their object, which knows more than each of them.
+
+    The time to contact stays their own, for their prediction rests on it. What stands they measure better themselves;
+    one that takes itself for something to be met is contradicted only where the object goes to the side.
+    """
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if o < 0 or not circles.active[c] or objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
+            continue
+        if circles.cause[c] == COMES and objects.class_id[o] != CROSSING:
+            continue
+        if objects.trust[o] >= settings.tr_s and objects.unseen_s[o] == 0:
+            circles.cause[c] = cause_of(objects, o)
+            circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
+
+
+def update(
+    squares: Squares,
+    objects: ObjectColumns,
+    circles: CircleColumns,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    patches: Patches,
+    baselines: Baselines,
+    plane: ImagePlane,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """S from C_r, and what S knows back to them; return evictions."""
+    for i in range(edges.count):
+        if edges.square[i] >= 0 and not objects.active[edges.square[i]]:
+            edges.square[i] = -1  # before its row is used again
+    measure_circles(squares.parts, circles, verdicts, edges, patches, baselines, around)
+    keep_members(objects, squares, circles, around, settings)
+    evicted = gather(objects, squares, circles, edges, around, settings, ids)
+    unite(objects, squares, circles, edges, around, settings)
+    take_members(objects, squares, circles, verdicts, edges, baselines, around)
+    take_others(objects, squares, verdicts, edges, baselines, around)
+    for o in range(objects.capacity):
+        if not objects.active[o]:
+            continue
+        if squares.wholes.count[o] >= MIN_EDGES:
+            objects.unseen_s[o], objects.state[o] = 0.0, SEEN
+            objects.support[o] = squares.wholes.count[o]
+            believed = belief_in(objects, o, squares.wholes, around, settings)
+            objects.trust[o] = edge_equations.change_trust(objects.trust[o], believed, settings.tr_max)
+            if objects.trust[o] < settings.tr_cr and objects.age_s[o] > 0:
+                objects.active[o] = 0
+                continue
+            show(objects, o, squares.wholes, around)
+            if objects.age_s[o] == 0:
+                forget_motion(objects, o)
+            observe(objects, o, squares.wholes, around)
+        elif squares.resting[o] >= MIN_EDGES:
+            objects.unseen_s[o], objects.state[o] = 0.0, SEEN
+            objects.looming[o] = objects.sideways[o] = 0.0
+            objects.reference[o] = around.speed_mps
+        else:
+            go_on(objects, o, plane, around, settings)
+        collect_evidence(squares.evidence, objects, o, plane, around)
+        if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or rests(objects, o, around)):
+            coast(objects, o, squares.evidence, around)
+        elif math.isfinite(around.speed_mps):
+            range_belief.consider(squares.belief, squares.evidence, around)
+            believe(objects, o, squares.belief, squares.evidence, around)
+        else:
+            believe_without_speed(objects, o, squares.evidence, around)
+    tell_circles(objects, circles, settings)
+    return evicted

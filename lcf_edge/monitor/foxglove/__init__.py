@@ -1,0 +1,1 @@
+"""``lcf-edge foxglove``: what a running daemon sees, for the Foxglove app (``relay``)."""

@@ -1,0 +1,113 @@
+"""A WebSocket server for Foxglove that passes on what a daemon publishes, byte by byte, with its definitions.
+
+What is drawn over the picture it makes of the scenes itself, so that it costs the daemon nothing. It subscribes to a
+topic only while a client of it does. Clients can read and nothing else.
+"""
+
+import logging
+import threading
+import time
+from collections import Counter
+from typing import Any
+
+import foxglove
+import zenoh
+from foxglove.websocket import ChannelView, Client, ServerListener
+
+from lcf_edge.cdr import CdrError, decode_scene
+from lcf_edge.errors import LcfError, PublishError
+from lcf_edge.monitor.live.source import Source
+from lcf_edge.recording.write.schemas import ENCODING, schema
+from lcf_edge.standard_messages.image_annotations import encode_image_annotations
+from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
+from lcf_edge.zenoh_link.preview import PREVIEW
+from lcf_edge.zenoh_link.scene import SCENE
+from lcf_edge.zenoh_link.session import close_session, open_session, reason
+from lcf_edge.zenoh_link.topics import ANNOTATIONS, STANDARD, Topic
+
+BACKLOG = 64  # messages that wait for a client which takes nothing: 3 s of scenes; of more, the oldest are dropped
+
+RELAYED = (SCENE, DIAGNOSTICS, PREVIEW, *STANDARD)
+
+
+class Relay(ServerListener):
+    """Serves at ``host``:``port`` (0: any) until it is closed.
+
+    ``broken`` counts payloads that were not what their key promises; they are not passed on. Raises ``PublishError``
+    for a source that is none, ``LcfError`` when the port cannot be listened to.
+    """
+
+    def __init__(self, source: Source, host: str, port: int) -> None:
+        self.broken = 0
+        self._prefix = source.prefix
+        self._lock = threading.Lock()
+        self._clients: Counter[str] = Counter()  # of each topic
+        self._subscribers: dict[str, Any] = {}
+        foxglove.set_log_level(logging.CRITICAL)  # it has a line for whatever a client sends that is nonsense
+        self._context = context = foxglove.Context()  # there while it is kept
+        self._channels = {f"/{_key(topic, source)}": (topic, _channel(topic, source, context)) for topic in RELAYED}
+        self._session = open_session(source.zenoh())
+        try:
+            self._server = foxglove.start_server(
+                name="lcf-edge",
+                host=host,
+                port=port,
+                server_listener=self,
+                context=context,
+                message_backlog_size=BACKLOG,
+            )
+        except (RuntimeError, OSError) as error:
+            close_session(self._session)
+            raise LcfError(f"{host}:{port}: cannot listen ({error}); name another with --port") from error
+        self.port = self._server.port
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
+        """Subscribe at the daemon for the first client."""
+        with self._lock:
+            self._clients[channel.topic] += 1
+            if channel.topic not in self._subscribers:
+                self._subscribers[channel.topic] = self._subscribed(*self._channels[channel.topic])
+
+    def on_unsubscribe(self, client: Client, channel: ChannelView) -> None:  # noqa: ARG002
+        """Unsubscribe after the last one."""
+        with self._lock:
+            self._clients[channel.topic] -= 1
+            if self._clients[channel.topic] <= 0:
+                subscriber = self._subscribers.pop(channel.topic, None)
+                if subscriber is not None:
+                    subscriber.undeclare()
+
+    def close(self) -> None:
+        """Let the clients go, and the daemon."""
+        self._server.stop()
+        close_session(self._session)
+
+    def _subscribed(self, topic: Topic, channel: foxglove.Channel) -> Any:
+        makes = topic is ANNOTATIONS
+        source = SCENE if makes else topic
+
+        def receive(sample: zenoh.Sample) -> None:
+            try:
+                payload = source.payload(sample)
+                if makes:
+                    payload = encode_image_annotations(decode_scene(payload))
+            except CdrError:
+                self.broken += 1
+            else:
+                channel.log(payload, log_time=time.time_ns())
+
+        handler: Any = zenoh.handlers.Callback(receive, indirect=False)
+        return self._session.declare_subscriber(source.key(self._prefix), handler)
+
+
+def _key(topic: Topic, source: Source) -> str:
+    """Raises ``PublishError`` for a prefix that is none."""
+    try:
+        return str(zenoh.KeyExpr(topic.key(source.prefix)))
+    except zenoh.ZError as error:
+        raise PublishError(f"{source.prefix}: {reason(error)}; name another prefix") from error
+
+
+def _channel(topic: Topic, source: Source, context: foxglove.Context) -> foxglove.Channel:
+    definition = foxglove.Schema(name=topic.message, encoding=ENCODING, data=schema(topic.message))
+    return foxglove.Channel(f"/{_key(topic, source)}", schema=definition, message_encoding="cdr", context=context)

@@ -1,0 +1,55 @@
+"""The last seconds of what was received, as it was sent."""
+
+import threading
+from collections import deque
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+LENGTH_S = 30.0
+MAX_BYTES = {"scene": 4 * 2**20, "diagnostics": 2**20, "preview/compressed": 16 * 2**20}
+"""By topic: what is small must not be pushed out by pictures."""
+
+
+@dataclass(frozen=True, slots=True)
+class Message:
+    """One payload of a topic."""
+
+    topic: str  # "scene"; behind the prefix of the keys
+    received_ns: int  # system clock
+    payload: bytes
+
+
+class History:
+    """Holds the messages of the last ``length_s`` seconds, of each topic at most ``largest_bytes``."""
+
+    def __init__(self, length_s: float = LENGTH_S, largest_bytes: Mapping[str, int] = MAX_BYTES) -> None:
+        self._length_ns = round(length_s * 1e9)
+        self._largest = largest_bytes
+        self._kept: dict[str, deque[Message]] = {topic: deque() for topic in largest_bytes}
+        self._bytes = dict.fromkeys(largest_bytes, 0)
+        self._lock = threading.Lock()
+
+    def add(self, message: Message) -> None:
+        """Keep a message; the oldest of its topic make room."""
+        topic = message.topic
+        with self._lock:
+            self._kept[topic].append(message)
+            self._bytes[topic] += len(message.payload)
+            while self._bytes[topic] > self._largest[topic]:
+                self._forget(topic)
+            self._expire(message.received_ns)
+
+    def messages(self, now_ns: int) -> list[Message]:
+        """What is not older than the length, in the order in which it came."""
+        with self._lock:
+            self._expire(now_ns)
+            kept = [message for messages in self._kept.values() for message in messages]
+        return sorted(kept, key=lambda message: message.received_ns)
+
+    def _expire(self, now_ns: int) -> None:
+        for topic, messages in self._kept.items():
+            while messages and now_ns - messages[0].received_ns > self._length_ns:
+                self._forget(topic)
+
+    def _forget(self, topic: str) -> None:
+        self._bytes[topic] -= len(self._kept[topic].popleft().payload)

@@ -1,0 +1,1 @@
+"""Recordings: made (``write``), read (``read``), and played as if they were devices (``playback``)."""

@@ -1,0 +1,188 @@
+"""What every kind of recording has in common: delivery order, one picture size, counted skips."""
+
+import bisect
+import heapq
+import math
+from abc import ABC, abstractmethod
+from collections import Counter
+from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Config
+from lcf_edge.errors import RecordingError
+from lcf_edge.lens import Lens
+from lcf_edge.printable import printable
+from lcf_edge.recording.read.decoding import Grey, PictureError
+
+WARNINGS_OF_A_KIND = 5  # further skips for the same reason are only counted
+MAX_STAMP_NS = 2**63 - 1
+HELD_PICTURES = 6  # that wait to be put in order
+HELD_SAMPLES = 1024
+
+Sample = ImuSample | SpeedSample
+
+
+@dataclass(frozen=True, slots=True)
+class Picture:
+    """A picture that is decoded when its turn comes, so that none wait in memory."""
+
+    stamp_ns: int
+    name: str  # for warnings
+    decode: Callable[[], Grey]  # raises PictureError
+
+
+class Recording(ABC):
+    """Frames, IMU and speed samples of one drive; every ``iter`` starts anew and reads lazily.
+
+    Items come in the order of their stamps, except that before each frame all IMU and speed samples up to and
+    including the first one at or after the frame's stamp are delivered, so that the interval between two
+    exposures can be integrated exactly.
+
+    What cannot be used is skipped, counted in ``skipped`` by reason, and told in ``warnings``, which grow
+    while reading; ``seq`` of the frames has a gap at each skipped picture. Iterating raises
+    ``RecordingError`` at the end when not one picture could be read.
+
+    ``start_s`` after the first picture and for ``duration_s``: the part that ``iter`` gives; what comes before is not
+    decoded. ``first_ns``: the stamp of the first picture, once it was reached.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.lens: Lens | None = None  # as the recording tells it
+        self.frame_count: int | None = None
+        self.has_imu = False
+        self.has_speed = False
+        self.warnings: list[str] = []
+        self.skipped: Counter[str] = Counter()
+        self.start_s, self.duration_s = 0.0, math.inf
+        self.first_ns: int | None = None
+
+    @abstractmethod
+    def _items(self) -> Iterator[Picture | Sample]:
+        """Items in the order of delivery."""
+
+    def __iter__(self) -> Iterator[Frame | ImuSample | SpeedSample]:
+        self.skipped.clear()
+        shape: tuple[int, ...] | None = None
+        seq = -1
+        last_s, start_s, end_s = 0.0, self.start_s, self.start_s + self.duration_s
+        begun = start_s <= 0
+        for item in self._items():
+            if not isinstance(item, Picture):
+                if begun:
+                    yield item
+                continue
+            seq += 1
+            if seq == 0:
+                self.first_ns = item.stamp_ns
+            assert self.first_ns is not None
+            last_s = (item.stamp_ns - self.first_ns) / 1e9
+            begun = begun or last_s >= start_s
+            if not begun:
+                continue
+            if last_s > end_s:
+                break
+            try:
+                image = item.decode()
+            except PictureError as error:
+                self._skip(f"picture {error}", item.name)
+                continue
+            shape = shape or image.shape
+            if image.shape == shape:
+                yield Frame(item.stamp_ns, seq, image)
+            else:
+                self._skip("picture of another size than the first", item.name)
+        if not begun and seq >= 0:
+            raise RecordingError(f"{self.path}: ends after {last_s:.1f} s; name an earlier start than {start_s:g} s")
+        if shape is None:
+            why = "".join(f" ({count} times: {what})" for what, count in self.skipped.most_common(1))
+            raise RecordingError(f"{self.path}: not one picture could be read{why}; record it again")
+
+    def _warn(self, text: str) -> None:
+        text = printable(text, 1000)  # names in a file may hold anything
+        if text not in self.warnings:
+            self.warnings.append(text)
+
+    def _skip(self, reason: str, where: str) -> None:
+        self.skipped[reason] += 1
+        if self.skipped[reason] <= WARNINGS_OF_A_KIND:
+            last = self.skipped[reason] == WARNINGS_OF_A_KIND
+            self._warn(f"{where}: {reason}, skipped" + ("; more of these are only counted" if last else ""))
+
+    def _warn_without_lens(self, config: Config) -> None:
+        if self.lens is None and not config.camera.intrinsics:
+            self._warn(f"{self.path}: tells no intrinsics, they are guessed; set camera.intrinsics")
+
+
+def interleave(
+    pictures: Iterable[Picture], imu: Iterable[ImuSample], speed: Iterable[SpeedSample]
+) -> Iterator[Picture | Sample]:
+    """Three streams, each in the order of its stamps, in the order of delivery (see ``Recording``)."""
+    streams: tuple[_Stream, _Stream] = (_Stream(imu), _Stream(speed))
+    for picture in pictures:
+        yield from heapq.merge(*(stream.up_to(picture.stamp_ns) for stream in streams), key=_stamp_ns)
+        yield picture
+    yield from heapq.merge(*(stream.up_to(math.inf) for stream in streams), key=_stamp_ns)
+
+
+def reorder(items: Iterable[Picture | Sample], late: Callable[[Picture | Sample], None]) -> Iterator[Picture | Sample]:
+    """One stream, only roughly in the order of its stamps, in the order of delivery (see ``Recording``).
+
+    At most ``HELD_PICTURES`` and ``HELD_SAMPLES`` wait for earlier ones; what comes later still, or repeats
+    the stamp of its kind, goes to ``late``.
+    """
+    held: list[Picture | Sample] = []
+    pictures = 0
+    reached_ns: dict[type, float] = dict.fromkeys((Picture, ImuSample, SpeedSample), -math.inf)
+
+    def release() -> Iterator[Picture | Sample]:
+        first = held.pop(0)
+        if first.stamp_ns <= reached_ns[type(first)]:
+            late(first)
+            return
+        reached_ns[type(first)] = first.stamp_ns
+        if isinstance(first, Picture):
+            yield from ahead(first.stamp_ns)
+        yield first
+
+    def ahead(stamp_ns: int) -> Iterator[Sample]:
+        waited_for = {kind for kind in (ImuSample, SpeedSample) if reached_ns[kind] < stamp_ns}
+        index = 0
+        while waited_for and index < len(held):
+            sample = held[index]
+            if isinstance(sample, Picture) or type(sample) not in waited_for:
+                index += 1
+                continue
+            del held[index]
+            waited_for.remove(type(sample))
+            reached_ns[type(sample)] = sample.stamp_ns
+            yield sample
+
+    for item in items:
+        bisect.insort(held, item, key=_stamp_ns)
+        pictures += isinstance(item, Picture)
+        while pictures > HELD_PICTURES or len(held) - pictures > HELD_SAMPLES:
+            pictures -= isinstance(held[0], Picture)
+            yield from release()
+    while held:
+        yield from release()
+
+
+class _Stream:
+    """Samples, and how far they were read."""
+
+    def __init__(self, samples: Iterable[Sample]) -> None:
+        self._samples = iter(samples)
+        self._reached_ns = -math.inf
+
+    def up_to(self, stamp_ns: float) -> Iterator[Sample]:
+        """The samples still to come, up to and including the first one at or after ``stamp_ns``."""
+        while self._reached_ns < stamp_ns and (sample := next(self._samples, None)) is not None:
+            self._reached_ns = sample.stamp_ns
+            yield sample
+
+
+def _stamp_ns(item: Picture | Sample) -> int:
+    return item.stamp_ns

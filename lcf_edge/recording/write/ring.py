@@ -1,0 +1,35 @@
+"""The last seconds, kept in memory until something makes them worth saving."""
+
+from collections import deque
+
+from lcf_edge.recording.write.messages import Message
+
+
+class Ring:
+    """Messages of the last ``before_s``; the oldest leave."""
+
+    def __init__(self, before_s: float) -> None:
+        self.bytes = 0
+        self._before_ns = round(before_s * 1e9)
+        self._messages: deque[Message] = deque()
+
+    def add(self, message: Message, limit_bytes: int) -> None:
+        """Keep a message; then no more than ``limit_bytes`` are kept."""
+        self._messages.append(message)
+        self.bytes += size_bytes(message)
+        while self._messages and (
+            self.bytes > limit_bytes or self._messages[0].stamp_ns < message.stamp_ns - self._before_ns
+        ):
+            self.bytes -= size_bytes(self._messages.popleft())
+
+    def take(self) -> list[Message]:
+        """All that it keeps, oldest first."""
+        messages = list(self._messages)
+        self._messages.clear()
+        self.bytes = 0
+        return messages
+
+
+def size_bytes(message: Message) -> int:
+    """What a message takes in memory, with the objects that hold it."""
+    return len(message.payload) + 256

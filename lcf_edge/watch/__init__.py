@@ -1,1 +1,0 @@
-"""The table in a terminal: ``screen`` makes it from what is known, ``terminal`` has the keys and the way back."""

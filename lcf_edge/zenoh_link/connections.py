@@ -1,0 +1,124 @@
+"""Who is connected, and how much of the daemon's memory is laid to whom.
+
+Zenoh keeps what peers declare, has no limit for it, and does not tell who declared what. So whenever the memory of the
+process has grown, those connections over TCP are charged with it that have brought something meanwhile, each by its
+share, but none with more than its bytes can have caused. Unix sockets do not tell how much they brought: what TCP
+leaves unexplained is laid to all of them alike.
+"""
+
+import os
+import socket
+import sys
+from collections.abc import Iterator
+from contextlib import suppress
+
+_DESCRIPTORS = "/proc/self/fd"
+MAX_PER_BYTE = 128
+"""Bytes of memory that one byte received can take: a key that is declared takes 1.5 kB, by 20 bytes at least."""
+
+_MIB = 2**20
+_TCP_INFO_BYTES = 192
+_RECEIVED = slice(128, 136)  # tcpi_bytes_received of struct tcp_info, linux/tcp.h
+
+Connection = int
+"""The number of its socket in the system."""
+
+
+class Connections:
+    """Those that others have made to this process. Of all, since the beginning: ``charged_mib``, ``received_bytes``."""
+
+    def __init__(self) -> None:
+        self.charged_mib = 0.0
+        self.received_bytes = 0
+        self._received: dict[Connection, int] = {}  # bytes, at the last look
+        self._charges_mib: dict[Connection, float] = {}
+
+    def charge(self, grown_mib: float) -> None:
+        """Look at what each has brought since the last call, while the memory grew by so much (0: it did not)."""
+        try:
+            received = {number: _bytes_received(one) for number, one in _accepted()}
+        except OSError:  # no descriptor is left to look with: the next look counts this one's
+            return
+        silent = [number for number, count in received.items() if count is None]
+        counts = {number: count for number, count in received.items() if count is not None}
+        brought = {number: max(count - self._received.get(number, 0), 0) for number, count in counts.items()}
+        self._received = counts
+        self._charges_mib = {number: self._charges_mib.get(number, 0.0) for number in received}
+        total = sum(brought.values())
+        self.received_bytes += total
+        explained_mib = min(grown_mib, total * MAX_PER_BYTE / _MIB)
+        for number, count in brought.items():
+            self._lay(number, explained_mib * count / max(total, 1))
+        for number in silent:
+            self._lay(number, (grown_mib - explained_mib) / len(silent))
+
+    def _lay(self, number: Connection, charge_mib: float) -> None:
+        self.charged_mib += charge_mib
+        self._charges_mib[number] += charge_mib
+
+    def cut(self, charge_mib: float) -> int:
+        """Shut down those that are charged with that much or more. Return how many."""
+        guilty = {number for number, charge in self._charges_mib.items() if charge >= charge_mib}
+        cut = 0
+        with suppress(OSError):  # no descriptor is left to look with
+            for number, one in _accepted():
+                if number in guilty:
+                    with suppress(OSError):  # it has just gone by itself
+                        one.shutdown(socket.SHUT_RDWR)
+                    cut += 1
+                    del self._charges_mib[number]
+        return cut
+
+
+def _accepted() -> Iterator[tuple[Connection, socket.socket]]:
+    """Every connection to a port or path on which this process listens; each socket is a copy, closed after its turn.
+
+    Raises ``OSError`` when there is no descriptor left.
+    """
+    places = {_place(one) for one in _sockets() if one.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN)}
+    for one in _sockets():
+        with suppress(OSError):  # not connected, or no longer
+            one.getpeername()
+            if _place(one) in places:
+                yield os.fstat(one.fileno()).st_ino, one
+
+
+def _place(one: socket.socket) -> int | str | bytes:
+    """Where it was connected to: a port, or the path of a Unix socket."""
+    name: tuple[str, int] | str | bytes = one.getsockname()
+    return name[1] if isinstance(name, tuple) else name
+
+
+def _sockets() -> Iterator[socket.socket]:
+    for number in os.listdir(_DESCRIPTORS):  # noqa: PTH208  # done often: as paths it would take twice the time
+        one = _stream_socket(number)
+        if one is not None:
+            with one:
+                yield one
+
+
+def _stream_socket(number: str) -> socket.socket | None:
+    """A copy of a descriptor, where it is one."""
+    try:
+        if not os.readlink(f"{_DESCRIPTORS}/{number}").startswith("socket:"):  # noqa: PTH115
+            return None
+        copy = os.dup(int(number))
+    except OSError:  # closed meanwhile, or none is left for the copy
+        return None
+    try:
+        one = socket.socket(fileno=copy)
+    except OSError:
+        os.close(copy)
+        return None
+    if one.family in {socket.AF_INET, socket.AF_INET6, socket.AF_UNIX} and one.type == socket.SOCK_STREAM:
+        return one
+    one.close()
+    return None
+
+
+def _bytes_received(one: socket.socket) -> int | None:
+    """None: it does not tell."""
+    if one.family == socket.AF_UNIX:
+        return None
+    info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES)
+    return int.from_bytes(info[_RECEIVED], sys.byteorder)

@@ -1,0 +1,56 @@
+"""What is published under which name, and how."""
+
+from dataclasses import dataclass
+
+import zenoh
+
+from lcf_edge.cdr import CdrError
+from lcf_edge.standard_messages import (
+    camera_transform,
+    detections,
+    image_annotations,
+    markers,
+    point_cloud,
+    speed_limit,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Topic:
+    """What is published under a prefix, and how."""
+
+    name: str  # "scene"
+    message: str  # "lcf_msgs/msg/Scene"
+    priority: zenoh.Priority
+    express: bool = False
+    largest_bytes: int = 2**17  # of what is taken for one; a scene has some 60 a circle
+    is_global: bool = False  # not under the prefix
+    is_lasting: bool = False  # for ROS 2: who comes later wants the last one
+
+    def key(self, prefix: str) -> str:
+        """The key of its samples."""
+        return self.name if self.is_global else f"{prefix}/{self.name}"
+
+    @property
+    def encoding(self) -> str:
+        """The encoding of its samples."""
+        return f"application/cdr;{self.message}"
+
+    def payload(self, sample: zenoh.Sample) -> bytes:
+        """Of one that came. Raises ``CdrError`` for what is larger than any of this topic."""
+        if len(sample.payload) > self.largest_bytes:
+            raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
+        return sample.payload.to_bytes()
+
+
+ANNOTATIONS = Topic("annotations", image_annotations.MESSAGE, zenoh.Priority.DATA)
+POINTS = Topic("points", point_cloud.MESSAGE, zenoh.Priority.DATA_HIGH)
+MARKERS = Topic("markers", markers.MESSAGE, zenoh.Priority.DATA)
+DETECTIONS_2D = Topic("detections", detections.MESSAGE_2D, zenoh.Priority.DATA_HIGH)
+DETECTIONS_3D = Topic("detections_3d", detections.MESSAGE_3D, zenoh.Priority.DATA_HIGH)
+SPEED_LIMIT = Topic("speed_limit", speed_limit.MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
+NAV2_SPEED_LIMIT = Topic("nav2_speed_limit", speed_limit.NAV2_MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
+TRANSFORM = Topic("tf_static", camera_transform.MESSAGE, zenoh.Priority.DATA_LOW, is_global=True, is_lasting=True)
+
+STANDARD = (ANNOTATIONS, POINTS, MARKERS, DETECTIONS_2D, DETECTIONS_3D, SPEED_LIMIT, NAV2_SPEED_LIMIT, TRANSFORM)
+"""Those of ``standard_messages``."""

@@ -1,0 +1,170 @@
+"""``python -m release.elsewhere MACHINE PYTHON… -- TESTS``: the tests with other Pythons and on another processor.
+
+What is tested is the source package with the extension of the wheel, unpacked; beside it lies what the tests need, as
+pip would pick it there. A Python is this computer's where it has that one, else that of a Debian, unpacked; another
+processor is emulated. Each Python's outcome is told in one line at the end.
+"""
+
+import argparse
+import hashlib
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import tempfile
+import tomllib
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from lcf_edge.errors import LcfError
+from release import wheels
+from release.debian import MACHINES, Machine, ReleaseError, cache, get_tools, run, unpacked
+from release.foreign_pip import options_for
+
+SUITES = {"3.11": "bookworm", "3.13": "trixie", "3.14": "forky"}
+"""The Debian that has it."""
+
+PACKAGES = ("python3", "libstdc++6", "libc-bin", "tzdata", "dash", "coreutils", "openssl", "procps", "mount")
+TESTS_NEED = ("plot", "watch", "view", "foxglove", "test")
+EMULATED_TIMEOUT_S = 3600  # of one test
+
+_IN_ROOT = """
+mount -t proc proc "$0/proc"
+mount --rbind /dev "$0/dev"
+mount -t tmpfs tmpfs "$0/tmp"
+mount --bind "$1" "$0/packages"
+mount --bind "$2" "$0/project"
+root=$0; shift 2
+exec chroot "$root" /usr/bin/env --chdir=/project "$@"
+"""
+
+
+@dataclass(frozen=True, slots=True)
+class Python:
+    """Where a Python is: a program of this computer, or a folder that holds a Debian."""
+
+    version: str
+    program: str = ""
+    root: Path | None = None
+
+    def test(self, machine: Machine, packages: Path, project: Path, tests: Sequence[str]) -> int:
+        """Run pytest, which tells what it does; return its exit status."""
+        arguments = ["-m", "pytest", "-p", "no:cacheprovider", *tests]
+        if not machine.is_this:
+            arguments += ["-o", f"timeout={EMULATED_TIMEOUT_S}"]
+        if self.root is None:
+            with tempfile.TemporaryDirectory() as place:
+                run(self.program, "-m", "venv", "--without-pip", place)
+                _import_from(Path(place, "lib", f"python{self.version}", "site-packages"), project, packages)
+                return subprocess.run([f"{place}/bin/python", *arguments], cwd=project, check=False).returncode
+        for name in ("packages", "project", "proc", "dev", "tmp"):
+            (self.root / name).mkdir(exist_ok=True)
+        _import_from(self.root / f"usr/local/lib/python{self.version}/dist-packages", "/project", "/packages")
+        settings = ["-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/tmp", "LANG=C.UTF-8"]
+        apart = ["unshare", "--mount", "sh", "-ec", _IN_ROOT]
+        places = [str(self.root), str(packages), str(project)]
+        return subprocess.run([*apart, *places, *settings, "python3", *arguments], check=False).returncode
+
+
+def _import_from(site_packages: Path, *folders: Path | str) -> None:
+    """What a Python imports from, also one that a test starts with an environment of its own."""
+    site_packages.mkdir(parents=True, exist_ok=True)
+    (site_packages / "lcf-edge.pth").write_text("".join(f"{folder}\n" for folder in folders), encoding="utf-8")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Test; return the exit status."""
+    parser = argparse.ArgumentParser(prog="python -m release.elsewhere", description=__doc__)
+    parser.add_argument("machine", choices=list(MACHINES))
+    parser.add_argument("pythons", nargs="+", metavar="PYTHON")
+    parser.add_argument("--tests", nargs=argparse.REMAINDER, default=[], help="what pytest is told (all of tests)")
+    wanted = parser.parse_args(arguments)
+    machine = MACHINES[wanted.machine]
+    outcomes = {}
+    try:
+        get_tools([machine], "test-all" if machine.is_this else "test-arm64")
+        with tempfile.TemporaryDirectory() as place:
+            project = _project(machine, Path(place))
+            for version in wanted.pythons:
+                sys.stdout.write(f"Python {version}, {machine.name}\n")
+                sys.stdout.flush()
+                outcomes[version] = _tested(machine, version, project, wanted.tests)
+    except LcfError as error:
+        sys.stderr.write(f"tests: {error}\n")
+        return error.exit_status
+    for version, told in outcomes.items():
+        sys.stdout.write(f"Python {version}, {machine.name}: {told or 'passed'}\n")
+    return 1 if any(outcomes.values()) else 0
+
+
+def _tested(machine: Machine, version: str, project: Path, tests: Sequence[str]) -> str:
+    """What went wrong; empty: nothing."""
+    try:
+        python = find(machine, version)
+        status = python.test(machine, packages(machine, version), project, tests)
+    except ReleaseError as error:
+        return f"not tested: {error}"
+    return f"failed, pytest's exit status {status}" if status else ""
+
+
+def find(machine: Machine, version: str) -> Python:
+    """A Python of that version for that processor. Raises ``ReleaseError``."""
+    if machine.is_this and (program := installed(version)):
+        return Python(version, program)
+    if version not in SUITES:
+        raise ReleaseError(f"there is no python{version} on this computer, and no Debian has it")
+    return Python(version, root=unpacked(machine, SUITES[version], PACKAGES))
+
+
+def installed(version: str) -> str:
+    """This computer's, on the path or kept by pyenv; empty: none."""
+    kept = Path(os.environ.get("PYENV_ROOT") or Path.home() / ".pyenv").glob(
+        f"versions/{version}.*/bin/python{version}"
+    )
+    for program in (f"python{version}", *map(str, sorted(kept))):
+        found = shutil.which(program)
+        if found and subprocess.run((found, "-c", ""), check=False, capture_output=True).returncode == 0:
+            return found
+    return ""
+
+
+def packages(machine: Machine, version: str) -> Path:
+    """A folder with all that the tests import, kept. Raises ``ReleaseError``."""
+    needed = _requirements()
+    named = hashlib.sha256(" ".join(needed).encode()).hexdigest()[:8]
+    folder = cache() / f"packages-{machine.name}-{version}-{named}"
+    if not folder.exists():
+        unfinished = folder.with_name("unfinished-packages")
+        shutil.rmtree(unfinished, ignore_errors=True)
+        command = (sys.executable, "-m", "pip", "install", "--quiet", "--target", str(unfinished))
+        run(*command, *options_for(machine.name, version), *needed)
+        unfinished.rename(folder)
+    return folder
+
+
+def _requirements() -> list[str]:
+    """Of the project, and of its tests."""
+    project = tomllib.loads((wheels.PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    extras = (need for extra in TESTS_NEED for need in project["optional-dependencies"][extra])
+    return sorted({*project["dependencies"], *(need for need in extras if not need.startswith("lcf-edge"))})
+
+
+def _project(machine: Machine, place: Path) -> Path:
+    """The source package with its extension, below ``place``. Raises ``ReleaseError``."""
+    source = wheels.source_package(place)
+    wheel = wheels.build(machine, source, place)
+    with tarfile.open(source) as archive:
+        archive.extractall(place, filter="data")
+    (project,) = (path for path in place.iterdir() if path.is_dir())
+    with zipfile.ZipFile(wheel) as archive:
+        for name in archive.namelist():
+            if name.endswith(".so"):
+                archive.extract(name, project)
+    return project
+
+
+if __name__ == "__main__":
+    sys.exit(main())

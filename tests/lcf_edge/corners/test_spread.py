@@ -1,0 +1,111 @@
+"""Which corners are kept when there are too many: the strongest, from all over the picture."""
+
+from collections import Counter
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from lcf_edge.corners.detector import FEW, SQUARES, side_px, strongest, strongest_spread
+from lcf_edge.corners.spread import Squares, find_poor, leave_poor
+
+SIDE_PX = 40
+WIDTH, HEIGHT = 320, 240
+
+
+def squares(pixel: npt.NDArray[np.int32], side: int = SIDE_PX) -> list[tuple[int, int]]:
+    return [(int(x // side), int(y // side)) for x, y in pixel.tolist()]
+
+
+def test_the_strongest_are_kept() -> None:
+    pixel = np.array([(5, 5), (6, 9), (9, 6), (100, 100)], np.int32)
+    strength = np.array([3, 9, 5, 1], np.float32)
+    kept = [
+        strongest_spread(Squares(201, 201, SIDE_PX), pixel, strength, capacity).tolist() for capacity in (1, 2, 3, 4)
+    ]
+    assert kept == [[1], [1, 3], [1, 2, 3], [0, 1, 2, 3]]
+
+
+@given(
+    places=st.sets(st.tuples(st.integers(0, 200), st.integers(0, 200)), min_size=1, max_size=60),
+    capacity=st.integers(1, 60),
+    seed=st.integers(0, 99),
+)
+def test_every_square_keeps_its_strongest_and_none_keeps_more_than_its_share(
+    places: set[tuple[int, int]], capacity: int, seed: int
+) -> None:
+    pixel = np.array(sorted(places), np.int32)
+    strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
+    kept = strongest_spread(Squares(201, 201, SIDE_PX), pixel, strength, capacity)
+    assert len(kept) == min(capacity, len(pixel))
+    assert (np.diff(kept) > 0).all()
+    held = np.isin(np.arange(len(pixel)), kept)
+    square = squares(pixel)
+    had, keeps = Counter(square), Counter(square[row] for row in kept)
+    most = max(keeps.values())
+    for name in had:
+        rows = np.array([each == name for each in square])
+        assert keeps[name] >= min(had[name], most - 1)
+        weakest_held = strength[rows & held].min(initial=np.inf)
+        assert weakest_held > strength[rows & ~held].max(initial=-1)
+
+
+PLACES = st.sets(st.tuples(st.integers(0, 319), st.integers(0, 239)), max_size=80)
+
+
+def in_picture(places: set[tuple[int, int]]) -> npt.NDArray[np.int32]:
+    return np.array(sorted(places), np.int32).reshape(-1, 2)
+
+
+def picture() -> Squares:
+    return Squares(WIDTH, HEIGHT, side_px(WIDTH, HEIGHT))
+
+
+@given(places=PLACES, most=st.integers(1, 5), seed=st.integers(0, 99))
+def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, seed: int) -> None:
+    pixel = in_picture(places)
+    strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
+    square = squares(pixel, picture().side_px)
+    expected = []
+    for row, name in enumerate(square):
+        stronger = sum(strength[other] > strength[row] for other, each in enumerate(square) if each == name)
+        if stronger < most:
+            expected.append((pixel[row].tolist(), float(strength[row])))
+    kept, how_strong = strongest(picture(), pixel.copy(), strength.copy(), most)
+    assert list(zip(kept.tolist(), how_strong.tolist(), strict=True)) == expected
+
+
+@given(places=PLACES, first_row=st.integers(0, 5), without=st.sets(st.integers(0, 191)))
+def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
+    places: set[tuple[int, int]], first_row: int, without: set[int]
+) -> None:
+    looked_at, pixel = picture(), in_picture(places)
+    among = np.ones((looked_at.rows, looked_at.columns), np.uint8)
+    among.ravel()[list(without)] = 0
+    square = np.empty(len(pixel), np.int32)
+    count = find_poor(looked_at, pixel.data, square.data, FEW, among.data, first_row)
+    covered = np.zeros((looked_at.rows * looked_at.side_px, looked_at.columns * looked_at.side_px), np.int32)
+    for left, top, right, bottom in np.asarray(looked_at.rectangles)[:count].tolist():
+        covered[top:bottom, left:right] += 1
+    held = Counter(squares(pixel, looked_at.side_px))
+    poor = [
+        [
+            int(held[column, row] < FEW and row >= first_row and among[row, column] != 0)
+            for column in range(looked_at.columns)
+        ]
+        for row in range(looked_at.rows)
+    ]
+    assert np.array_equal(covered, np.kron(poor, np.ones((looked_at.side_px, looked_at.side_px), np.int32)))
+    assert np.asarray(looked_at.poor).reshape(among.shape).tolist() == poor
+
+    rich = [at for at in pixel.tolist() if not poor[at[1] // looked_at.side_px][at[0] // looked_at.side_px]]
+    strength = np.zeros(len(pixel), np.float32)
+    left_over = leave_poor(looked_at, pixel.data, strength.data, square.data)
+    assert pixel[:left_over].tolist() == rich
+
+
+@given(size=st.tuples(st.integers(160, 4000), st.integers(120, 3000)))
+def test_every_picture_has_about_as_many_squares(size: tuple[int, int]) -> None:
+    assert size[0] * size[1] / side_px(*size) ** 2 == pytest.approx(SQUARES, rel=0.15)

@@ -1,0 +1,168 @@
+"""Rendered drives whose gyro has a bias, dies, sticks or is missing; and a sudden shock: the pictures tell the rest."""
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import pytest
+from msgspec.structs import replace as with_values
+
+from benchmarks.playing import config_of
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Config, Imu, Vehicle
+from lcf_edge.ego_motion.estimator import EgoMotionEstimator
+from lcf_edge.filter import Motion
+from lcf_edge.lens import Lens
+from lcf_edge.pipeline import Pipeline
+from lcf_edge.rendered import scenes
+
+Spoil = Callable[[Sequence[ImuSample]], Sequence[ImuSample]]
+
+DRIVE = scenes.make("turn", 2, seconds=3.0)
+FRAMES = [frame for frame, _ in scenes.frames(DRIVE)]
+LATE_NS = 20_000_000
+HALF = len(FRAMES) // 2
+BIAS = (0.08, -0.08, 0.05)
+
+
+@dataclass
+class Seen:
+    """Of each frame: by how much the rotation was off that was given to the filter, and what the flow left, mrad."""
+
+    given_mrad: np.ndarray
+    left_mrad: np.ndarray
+    notes: list[tuple[str, ...]]
+    pipeline: Pipeline
+
+
+@pytest.fixture(scope="module")
+def truth() -> list[np.ndarray]:
+    """Rotations, (3, 3) each."""
+    ego = EgoMotionEstimator(Imu(), Vehicle())
+    perfect = replace(DRIVE, noise=replace(DRIVE.noise, gyro_radps=0.0))
+    return [motion for _, motion in fed(ego, FRAMES, scenes.imu(perfect))]
+
+
+def fed(
+    ego: EgoMotionEstimator, frames: Sequence[Frame], samples: Sequence[ImuSample]
+) -> Iterator[tuple[Frame, np.ndarray]]:
+    given = 0
+    for frame in frames:
+        while given < len(samples) and samples[given].stamp_ns <= frame.stamp_ns + LATE_NS:
+            ego.add_imu(samples[given])
+            given += 1
+        yield frame, ego.advance(frame.stamp_ns).rotation
+
+
+def driven(truth: list[np.ndarray], spoil: Spoil, bias: tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Seen:
+    """Without odometry's yaw rate."""
+    config = config_of(DRIVE)
+    pipeline = Pipeline(config, Lens.from_config(config.camera, 640, 480))
+    motions: list[Motion] = []
+    residuals: list[np.ndarray] = []
+    step = pipeline.filter.step
+
+    def watched(corners: object, motion: Motion, picture: object) -> object:
+        taken = step(corners, motion, picture)  # type: ignore[arg-type]
+        motions.append(motion)
+        residuals.append(taken.residual.turn_rad if taken.residual else np.zeros(3))
+        return taken
+
+    pipeline.filter.step = watched  # type: ignore[method-assign, assignment]
+    biased = replace(DRIVE, noise=replace(DRIVE.noise, gyro_bias_radps=bias))
+    speeds = [replace(speed, yaw_rate_radps=float("nan")) for speed in scenes.odometry(DRIVE)]
+    samples: list[ImuSample | SpeedSample] = sorted(
+        [*spoil(scenes.imu(biased)), *speeds], key=lambda sample: sample.stamp_ns
+    )
+    notes, given = [], 0
+    for frame in FRAMES:
+        while given < len(samples) and samples[given].stamp_ns <= frame.stamp_ns + LATE_NS:
+            pipeline.add(samples[given])
+            given += 1
+        notes.append(pipeline.process(frame).notes)
+    given_mrad, left_mrad = [], []
+    for motion, residual, rotation in zip(motions, residuals, truth, strict=True):
+        given_mrad.append(1e3 * cv2.Rodrigues(motion.rotation @ rotation.T)[0].ravel())
+        flown = cv2.Rodrigues(residual)[0] @ motion.rotation
+        left_mrad.append(1e3 * cv2.Rodrigues(flown @ rotation.T)[0].ravel())
+    return Seen(np.abs(given_mrad), np.abs(left_mrad), notes, pipeline)
+
+
+def untouched(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    return samples
+
+
+def none(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    del samples
+    return ()
+
+
+def dies(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    return [sample for sample in samples if sample.stamp_ns < FRAMES[HALF].stamp_ns]
+
+
+def sticks(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    end_ns = FRAMES[HALF].stamp_ns
+    last = next(sample for sample in samples if sample.stamp_ns >= end_ns)
+    return [sample if sample.stamp_ns < end_ns else replace(sample, gyro=last.gyro) for sample in samples]
+
+
+@pytest.mark.parametrize("bias", [BIAS, (-0.35, 0.35, -0.2)], ids=["0.08 rad/s", "20 degrees a second"])
+def test_a_bias_is_learnt_while_the_vehicle_drives(truth: list[np.ndarray], bias: tuple[float, float, float]) -> None:
+    seen = driven(truth, untouched, bias)
+    learnt = seen.pipeline.gyro_bias
+    assert (np.abs(learnt.mean_radps - bias) < 2 * learnt.sigma_radps).all()
+    assert learnt.known
+    assert not any(seen.notes[10:])
+    assert np.median(seen.given_mrad[10:]) < 0.5  # a quarter of a pixel
+
+
+def test_without_an_imu_the_pictures_tell_the_turn(truth: list[np.ndarray]) -> None:
+    seen = driven(truth, none)
+    assert all("no imu" in notes for notes in seen.notes)
+    assert np.percentile(seen.given_mrad[10:], 90) < 6.0
+    assert np.percentile(seen.left_mrad[10:], 90) < 1.0
+
+
+def hangs(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
+    end_ns = FRAMES[HALF].stamp_ns
+    last = next(sample for sample in samples if sample.stamp_ns >= end_ns)
+    return [sample if sample.stamp_ns < end_ns else replace(last, stamp_ns=sample.stamp_ns) for sample in samples]
+
+
+@pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck"), (hangs, "gyro stuck")])
+def test_a_gyro_that_ends_in_the_middle_is_told_and_the_pictures_go_on(
+    truth: list[np.ndarray], spoil: Spoil, note: str
+) -> None:
+    seen = driven(truth, spoil)
+    assert not any(note in notes for notes in seen.notes[:HALF])
+    assert all(note in notes for notes in seen.notes[HALF + 4 :])
+    assert np.percentile(seen.left_mrad[HALF + 6 :], 90) < 1.5
+
+
+@pytest.mark.parametrize("degrees", [-5, 3, 5])
+def test_a_sudden_shock_is_survived_in_one_frame(degrees: int) -> None:
+    """The camera, which has no gyro, is knocked aside from one picture to the next."""
+    drive = scenes.make("passing", 3, seconds=1.5, width=800)
+    config = config_of(drive)
+    focal = drive.lens.focal_px
+    camera = with_values(config.camera, width=640, intrinsics=[focal, focal, 319.5, 239.5])
+    pipeline = Pipeline(with_values(config, camera=camera), Lens.from_config(camera, 640, 480))
+    before, shocked, after = knocked(pipeline, drive, round(focal * np.tan(np.radians(degrees))))
+    assert before > 0.4
+    assert shocked > 0.4 * before  # without a look at the whole picture: 0.03
+    assert after > 0.8 * before
+
+
+def knocked(pipeline: Pipeline, drive: scenes.Drive, shift_px: int) -> tuple[float, float, float]:
+    """Share of the trusted edges that are found again before, at and after the shock."""
+    shares = []
+    for frame, _ in scenes.frames(drive):
+        left = 80 + shift_px * (frame.seq >= 20)
+        pipeline.add(SpeedSample(frame.stamp_ns, float(drive.speed.at(np.array(frame.seq / drive.fps))), float("nan")))
+        pipeline.process(replace(frame, image=np.ascontiguousarray(frame.image[:, left : left + 640])))
+        edges, n = pipeline.filter.edges, pipeline.filter.edges.count
+        trusted = edges.trust[:n] >= Config().filter.tr_s
+        shares.append(float(np.count_nonzero(trusted & edges.matched[:n])) / max(np.count_nonzero(trusted), 1))
+    return shares[19], shares[20], shares[22]

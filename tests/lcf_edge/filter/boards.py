@@ -1,0 +1,78 @@
+"""Pictures of what stands ahead: a board with a pattern before a far background, seen from a vehicle that drives."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+from lcf_edge.config import Filter
+from lcf_edge.corners.detector import CornerDetector
+from lcf_edge.filter import Corners, Motion
+from lcf_edge.lens import Lens
+
+LENS = Lens(320, 240, 250.0, 250.0, 159.5, 119.5)
+Grey = npt.NDArray[np.uint8]
+
+
+def pattern(width: int, height: int, seed: int, grain_px: float = 2.5) -> Grey:
+    """Soft blobs, as cloth and gravel have them; no two places alike."""
+    noise = np.random.default_rng(seed).normal(size=(height, width)).astype(np.float32)
+    soft = cv2.GaussianBlur(noise, (0, 0), grain_px)
+    return np.asarray(np.clip(128 + 45 * soft / soft.std(), 0, 255), np.uint8)
+
+
+def drawn(picture: Grey, texture: Grey, left: float, top: float, scale: float) -> Grey:
+    """The picture with the texture, that many times as large, its corner there, px."""
+    matrix = np.array([[scale, 0, left], [0, scale, top]])
+    size = picture.shape[1], picture.shape[0]
+    put = cv2.warpAffine(texture, matrix, size, flags=cv2.INTER_AREA if scale < 0.5 else cv2.INTER_LINEAR)
+    where = cv2.warpAffine(np.full_like(texture, 255), matrix, size)
+    share = where.astype(np.float32) / 255
+    return np.asarray(np.rint(picture * (1 - share) + put * share), np.uint8)
+
+
+@dataclass(frozen=True)
+class Board:
+    """A drive towards a board; iterating gives what each step takes, with the picture.
+
+    ``range_m``, ``right_m``, ``width_m``, ``height_m``: of the board's middle, at the start and at the camera's height,
+    and its size. ``speed_mps``, ``yaw_rate_radps``: as told; the camera itself looks straight ahead. ``flicker``: share
+    of the corners that a frame does not show.
+    """
+
+    range_m: float = 6.0
+    right_m: float = 0.0
+    width_m: float = 0.8
+    height_m: float = 1.0
+    speed_mps: float = 1.0
+    yaw_rate_radps: float = 0.0
+    told_mps: float | None = None
+    frames: int = 50
+    fps: float = 20.0
+    flicker: float = 0.6
+    seed: int = 0
+
+    def __iter__(self) -> Iterator[tuple[Corners, Motion, Grey]]:
+        detector = CornerDetector(Filter(), LENS, 1500)
+        random = np.random.default_rng(self.seed)
+        told_mps = self.speed_mps if self.told_mps is None else self.told_mps
+        for seq in range(self.frames):
+            picture = self.picture(seq)
+            corners, _ = detector.detect(picture)
+            kept = random.random(len(corners)) >= self.flicker
+            shown = Corners(corners.pixel[kept], corners.position[kept], corners.appearance[kept])
+            yield shown, Motion(1 / self.fps, np.eye(3), 0.001, told_mps, self.yaw_rate_radps), picture
+
+    def distance_m(self, seq: int) -> float:
+        """From the camera to the board."""
+        return self.range_m - self.speed_mps * seq / self.fps
+
+    def picture(self, seq: int) -> Grey:
+        """What the camera sees."""
+        background = 160 + pattern(LENS.width, LENS.height, self.seed + 100) // 8
+        px_m = LENS.fx / self.distance_m(seq)
+        texture = pattern(200, round(200 * self.height_m / self.width_m), self.seed, 14.0)
+        left = LENS.cx + (self.right_m - self.width_m / 2) * px_m
+        return drawn(background, texture, left, LENS.cy - self.height_m / 2 * px_m, self.width_m * px_m / 200)

@@ -1,0 +1,57 @@
+"""What crosses and comes near is followed although it accelerates in the picture."""
+
+import numpy as np
+import pytest
+
+from lcf_edge.config import Filter
+from lcf_edge.filter import edge_expert
+from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable
+from lcf_edge.messages import Cause
+
+SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
+DT_S = 0.05
+DELTA_PX = SETTINGS.delta_px
+TR_MAX = SETTINGS.tr_max
+
+
+def left_behind(step_px: float, behind_px: float, aside_px: float = 0.0, cause: Cause = Cause.CROSSING) -> float:
+    """How far L stays from its corner, px: of a trusted rebel that moves ``step_px`` a frame to the right.
+
+    Its corner is found ``behind_px`` farther on than predicted, and ``aside_px`` to the side.
+    """
+    edges, normal, rebel, corners = EdgeTable(4, 2, 2), CircleTable(2), CircleTable(2), CornerTable(4)
+    row = edges.append(1).start
+    edges.x[row] = edges.predicted_x[row] = 300.0
+    edges.y[row] = edges.predicted_y[row] = 200.0
+    edges.cos[row], edges.sin[row], edges.predicted_speed[row] = 1.0, 0.0, step_px / DT_S
+    edges.rebel[row], edges.trust[row], edges.circle[row], edges.corner[row] = True, TR_MAX, 0, 0
+    edges.bl[row] = 12.0
+    rebel.cause[0], rebel.active[0] = cause, True
+    corners.x[0], corners.y[0] = 300.0 + behind_px, 200.0 + aside_px
+    edge_expert.update(edges.columns, normal.columns, rebel.columns, corners.columns, DELTA_PX, DT_S, SETTINGS)
+    return float(np.hypot(corners.x[0] - edges.x[row], corners.y[0] - edges.y[row]))
+
+
+@pytest.mark.parametrize("behind_px", [4.0, 8.0, 20.0])
+def test_what_crosses_fast_and_goes_on_faster_is_not_left_behind(behind_px: float) -> None:
+    assert left_behind(60.0, behind_px) <= DELTA_PX + 1e-9
+
+
+def test_by_its_trust_alone_it_would_be() -> None:
+    weight = TR_MAX - SETTINGS.tr_cr
+    assert left_behind(60.0, 8.0, cause=Cause.INCOMING) == pytest.approx(8.0 * weight / (weight + 1))
+
+
+@pytest.mark.parametrize(
+    ("step_px", "behind_px", "aside_px"),
+    [(6.0, 8.0, 0.0), (60.0, -8.0, 0.0), (60.0, 4.0, 8.0), (60.0, 2.0, 0.0)],
+    ids=["it is slow", "it went slower", "it is elsewhere", "it is as predicted"],
+)
+def test_the_prediction_keeps_its_weight_where_nothing_accelerates(
+    step_px: float, behind_px: float, aside_px: float
+) -> None:
+    weight = TR_MAX - SETTINGS.tr_cr
+    off = float(np.hypot(behind_px, aside_px))
+    assert left_behind(step_px, behind_px, aside_px) == pytest.approx(off * weight / (weight + 1))

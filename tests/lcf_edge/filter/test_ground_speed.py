@@ -1,0 +1,67 @@
+"""How fast the vehicle is, as the ground tells that is seen below the horizon."""
+
+import math
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Camera, Config
+from lcf_edge.ego_motion.inertial_speed import InertialSpeed
+from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter.ground_speed import GroundSpeed
+
+Drive = Callable[..., Any]
+Landmarks = Callable[..., npt.NDArray[np.float64]]
+
+
+def ground(landmarks: int = 300, height_m: float = 0.3) -> npt.NDArray[np.float64]:
+    """(n, 3) landmarks on the ground, left, right and ahead."""
+    random = np.random.default_rng(3)
+    x, z = random.uniform(-3, 3, landmarks), random.uniform(1.0, 12.0, landmarks)
+    return np.stack([x, np.full(landmarks, height_m), z], axis=1)
+
+
+def told(way: Any, speed_mps: float, config: Config | None = None) -> GroundSpeed:
+    """What the ground tells at the end of a drive of which a wrong speed was told."""
+    tables = LineCircleFilter(config or Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, replace(motion, speed_mps=speed_mps))
+    return tables.ground
+
+
+@pytest.mark.parametrize("wrong_mps", [2.0, 1.0, 3.0, -0.5])
+def test_the_ground_tells_the_speed_whatever_was_told(drive: Drive, clutter: Landmarks, wrong_mps: float) -> None:
+    way = replace(drive(ground()) + drive(clutter(100)), frames=16)
+    found = told(way, wrong_mps)
+    assert found.speed_mps == pytest.approx(2.0, rel=0.1)
+    assert abs(found.speed_mps - 2.0) < 2 * found.sigma_mps
+    assert found.told_mps == pytest.approx(wrong_mps, rel=0.1)
+
+
+def test_where_no_ground_is_seen_nothing_is_told(drive: Drive, clutter: Landmarks) -> None:
+    above = clutter(200) * np.array([1.0, 1.0, 1.0]) - np.array([0.0, 0.6, 0.0])
+    assert math.isnan(told(replace(drive(above), frames=16), 2.0).speed_mps)
+
+
+def test_without_a_height_of_the_camera_nothing_is_told(drive: Drive) -> None:
+    config = Config(camera=Camera(height_m=0))
+    assert math.isnan(told(replace(drive(ground()), frames=16), 2.0, config).speed_mps)
+
+
+def test_a_speed_by_the_accelerometer_follows_the_ground_as_far_as_it_is_unsure() -> None:
+    speed = InertialSpeed(0.01)
+    up = np.array([0.0, -9.81, 0.0])
+    speed.rest(up, 0.05, up, np.eye(3))
+    for _ in range(40):  # 2 s at 0.5 m/s², of which the accelerometer tells half
+        speed.advance(0.05, np.array([0.0, -9.81, 0.25]), np.eye(3), 0.0)
+    before, doubt = speed.mean_mps, speed.sigma_mps
+    for _ in range(20):
+        speed.see_ground(1.0 - speed.mean_mps, 0.1)
+        speed.advance(0.05, np.array([0.0, -9.81, 0.0]), np.eye(3), 0.0)
+    assert before == pytest.approx(0.5, abs=0.05)
+    assert speed.mean_mps == pytest.approx(1.0, abs=0.1)
+    assert speed.sigma_mps < doubt + 0.05

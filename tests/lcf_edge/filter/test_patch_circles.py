@@ -1,0 +1,77 @@
+"""What stands ahead and comes slowly is found by how much a piece of the picture grows, though its corners flicker."""
+
+import math
+
+import numpy as np
+import pytest
+
+from lcf_edge.config import Config, Filter, Memory, Vehicle, load
+from lcf_edge.filter import LineCircleFilter
+from lcf_edge.messages import Cause
+from tests.lcf_edge.filter.boards import LENS, Board
+
+VEHICLE = Vehicle(half_width_m=0.3, height_m=1.5, horizon_s=5.0)
+CONFIG = Config(vehicle=VEHICLE)
+
+
+def driven(board: Board, config: Config = CONFIG) -> list[LineCircleFilter]:
+    """The filter after the drive, once for each frame in which it told of a rebel circle; the last one always."""
+    tables, told = LineCircleFilter(config, LENS), []
+    for corners, motion, picture in board:
+        tables.step(corners, motion, picture)
+        if (tables.rebel.active & (tables.rebel.trust >= config.filter.tr_s)).any():
+            told.append(tables)
+    return told
+
+
+def without_patches(config: Config) -> Config:
+    return Config(vehicle=config.vehicle, filter=Filter(patches=0))
+
+
+def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it() -> None:
+    board = Board()
+    assert not driven(board, without_patches(CONFIG))
+    tables = LineCircleFilter(CONFIG, LENS)
+    ranges_m = []
+    for seq, (corners, motion, picture) in enumerate(board):
+        tables.step(corners, motion, picture)
+        rebel = tables.rebel
+        for c in np.flatnonzero(rebel.active & (rebel.trust >= 3)):
+            assert rebel.cause[c] == Cause.INCOMING
+            assert rebel.ttc[c] * board.speed_mps == pytest.approx(rebel.range[c], rel=0.3)
+            assert abs(rebel.lateral[c]) < VEHICLE.half_width_m
+            ranges_m.append(rebel.range[c] / board.distance_m(seq))
+    assert len(ranges_m) > 10
+    assert np.median(ranges_m) == pytest.approx(1.0, abs=0.15)
+
+
+def test_it_is_an_object_that_stands() -> None:
+    tables = LineCircleFilter(CONFIG, LENS)
+    told = 0
+    for corners, motion, picture in Board():
+        tables.step(corners, motion, picture)
+        told += int((tables.objects.active & (tables.objects.trust >= 3)).any())
+    assert told > 5
+
+
+@pytest.mark.parametrize(
+    "board",
+    [
+        pytest.param(Board(right_m=1.2), id="beside the way"),
+        pytest.param(Board(range_m=30.0, width_m=4.0, height_m=4.0), id="beyond the horizon"),
+        pytest.param(Board(yaw_rate_radps=0.4), id="in a turn, which leaves it aside"),
+        pytest.param(Board(told_mps=math.nan), id="without a speed"),
+        pytest.param(Board(speed_mps=0.0, told_mps=1.0, frames=40), id="while nothing comes nearer"),
+    ],
+)
+def test_what_will_not_be_met_is_not_told(board: Board) -> None:
+    assert not driven(board)
+
+
+def test_the_paper_s_profile_has_none() -> None:
+    assert load(None, ["filter.profile=paper"]).filter.patches == 0
+
+
+def test_a_full_table_of_circles_is_no_fault() -> None:
+    few = Config(vehicle=VEHICLE, memory=Memory(circles_rebel=1, objects=1))
+    assert driven(Board(), few)

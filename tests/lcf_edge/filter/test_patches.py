@@ -1,0 +1,141 @@
+"""Patches: a piece of the picture is found again with its place and its scale, or not at all."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from lcf_edge.filter import patches as functions
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.memory import memory_of
+from lcf_edge.filter.patches import Patches
+from lcf_edge.filter.situation import Situation
+from lcf_edge.lens import Lens
+from tests.lcf_edge.filter.boards import pattern
+
+LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
+FISHEYE = Lens(640, 480, 330.0, 330.0, 319.5, 239.5, "equidistant", (0.0, 0.0, 0.0, 0.0))
+MIDDLE = 330.0, 225.0
+HALF_PX = 12.0
+MAX_MISSES, LIFE_S = 4, 2.5  # as the module has them
+
+Grey = npt.NDArray[np.uint8]
+
+
+def born(picture: Grey, lens: Lens = LENS, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> Patches | None:
+    patches = Patches(2)
+    is_born = functions.give_birth(patches, 0, x, y, HALF_PX, memory_of(picture.reshape(-1)), ImagePlane(lens))
+    return patches if is_born else None
+
+
+def follow(patches: Patches, picture: Grey, lens: Lens = LENS) -> None:
+    functions.follow(patches, memory_of(picture.reshape(-1)), ImagePlane(lens))
+
+
+def grown(picture: Grey, scale: float, right_px: float = 0.0, down_px: float = 0.0) -> Grey:
+    """The picture about the middle of the patch, that many times as large, and shifted."""
+    x, y = MIDDLE
+    matrix = np.array([[scale, 0, x - scale * x + right_px], [0, scale, y - scale * y + down_px]])
+    return np.asarray(cv2.warpAffine(picture, matrix, (640, 480), flags=cv2.INTER_CUBIC), np.uint8)
+
+
+@given(
+    st.floats(0.95, 1.08), st.floats(-2.5, 2.5), st.floats(-2.5, 2.5), st.floats(0.7, 1.3), st.integers(-30, 30),
+    st.integers(0, 50),
+)  # fmt: skip
+@settings(max_examples=40)
+def test_place_and_scale_are_found_to_a_part_of_a_pixel_whatever_the_light(
+    scale: float, right_px: float, down_px: float, contrast: float, light: int, seed: int
+) -> None:
+    picture = pattern(640, 480, seed)
+    patches = born(picture)
+    assume(patches is not None)  # else this place shows no scale
+    assert patches is not None
+    seen = np.clip(128 + light + contrast * (grown(picture, scale, right_px, down_px) - 128.0), 0, 255)
+    follow(patches, seen.astype(np.uint8))
+    assert not patches.misses[0]
+    assert (patches.x[0], patches.y[0]) == pytest.approx((MIDDLE[0] + right_px, MIDDLE[1] + down_px), abs=0.25)
+    assert patches.scale[0] == pytest.approx(scale, abs=3 * patches.sigma[0])
+    assert patches.sigma[0] < 0.03
+
+
+def test_over_many_pictures_the_scale_is_that_since_the_first_one() -> None:
+    picture = pattern(640, 480, 3, 4.0)
+    patches = born(picture)
+    assert patches is not None
+    for scale in np.linspace(1.0, 1.8, 30):
+        follow(patches, grown(picture, scale))
+    assert patches.scale[0] == pytest.approx(1.8, abs=0.02)
+    assert (patches.x[0], patches.y[0]) == pytest.approx(MIDDLE, abs=0.2)
+
+
+def test_the_lens_is_in_what_is_compared() -> None:
+    """Towards the rim a fisheye shows things smaller; what turns there has not gone away."""
+    picture = pattern(1200, 1200, 5, 4.0)
+    x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
+    ideal = FISHEYE.undistort_pixels(x.ravel().astype(np.int32), y.ravel().astype(np.int32)).reshape(480, 640, 2)
+
+    def shown(right_px: float) -> Grey:
+        at = ideal - np.array([right_px - 280, -360], np.float32)
+        return np.asarray(cv2.remap(picture, at[..., 0], at[..., 1], cv2.INTER_LINEAR), np.uint8)
+
+    patches = born(shown(0), FISHEYE, 340.0, 240.0)
+    assert patches is not None
+    for right_px in range(2, 162, 2):
+        follow(patches, shown(right_px), FISHEYE)
+    assert not patches.misses[0]
+    assert (patches.x[0], patches.y[0]) == pytest.approx((500.0, 240.0), abs=1.0)
+    assert patches.scale[0] == pytest.approx(1.0, abs=0.03)
+
+
+@pytest.mark.parametrize("nothing", ["plain", "an edge", "at the border"])
+def test_what_does_not_show_its_scale_is_no_patch(nothing: str) -> None:
+    picture = pattern(640, 480, 1)
+    if nothing == "plain":
+        picture[:] = 90
+    if nothing == "an edge":
+        picture[:, :330], picture[:, 330:] = 60, 180
+    assert born(picture, x=5.0 if nothing == "at the border" else MIDDLE[0]) is None
+
+
+def test_what_is_gone_is_missed_and_ends_after_a_few_pictures() -> None:
+    patches = born(pattern(640, 480, 1))
+    assert patches is not None
+    for missed in range(1, MAX_MISSES + 1):
+        follow(patches, pattern(640, 480, 2))
+        assert patches.misses[0] == missed
+        assert (patches.x[0], patches.y[0], patches.scale[0]) == (*MIDDLE, 1.0)
+    follow(patches, pattern(640, 480, 2))
+    assert not patches.active[0]
+
+
+def test_it_ends_with_its_time_and_without_a_speed(situation: type[Situation]) -> None:
+    picture = pattern(640, 480, 1)
+    old, lost = born(picture), born(picture)
+    assert old is not None
+    assert lost is not None
+    around = situation(speed_mps=0.0)
+    while old.active[0]:
+        functions.predict(old, around)
+        follow(old, picture)
+    assert old.elapsed_s[0] == pytest.approx(LIFE_S, abs=2 * around.dt_s)
+    functions.predict(lost, situation(speed_mps=float("nan")))
+    assert not lost.active[0]
+
+
+def test_what_stands_tells_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
+    """From 5 m to 4 m: s = 5/4, and 1/Z = (s - 1)/ΔZ."""
+    picture, around = pattern(640, 480, 7, 4.0), situation(speed_mps=2.0)
+    patches = born(picture)
+    assert patches is not None
+    for ahead_m in np.arange(0.1, 1.05, 0.1):
+        functions.predict(patches, around)
+        right_px, down_px = (
+            (MIDDLE[k] - (around.focus_x, around.focus_y)[k]) * ahead_m / (5 - ahead_m) for k in range(2)
+        )
+        follow(patches, grown(picture, 5 / (5 - ahead_m), right_px, down_px))
+    assert patches.depth_m[0] == pytest.approx(1.0)
+    assert 1 / patches.inverse[0] == pytest.approx(4.0, rel=0.1)
+    assert abs(patches.inverse[0] - 0.25) < 3 * patches.doubt[0]

@@ -1,0 +1,255 @@
+"""S: circles that belong to one thing are one object, with its class, its contact and its identity."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Config, Filter, Memory
+from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter.tables import ObjectTable
+from lcf_edge.messages import Cause, ObjectClass, ObjectState
+
+TR_S = Config().filter.tr_s
+SPEED_MPS, FPS = 2.0, 20.0
+
+Drive = Callable[..., Any]
+Landmarks = Callable[..., npt.NDArray[np.float64]]
+
+
+def steps(way: Any, config: Config | None = None, speed_mps: float | None = None) -> Iterator[LineCircleFilter]:
+    """The filter after each frame."""
+    tables = LineCircleFilter(config or Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion if speed_mps is None else replace(motion, speed_mps=speed_mps))
+        yield tables
+
+
+def published(objects: ObjectTable) -> list[int]:
+    """Rows of what is told."""
+    return np.flatnonzero(objects.active & (objects.trust >= TR_S)).tolist()
+
+
+def test_a_wall_ahead_is_one_object_that_stands(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    way = drive(clutter(150)) + drive(box((0.0, -0.4, 7.0), (0.5, 0.9, 0.0), landmarks=40))
+    *_, tables = steps(replace(way, frames=30))
+    left_m = 7.0 - SPEED_MPS * 29 / FPS
+    (row,) = published(tables.objects)
+    objects = tables.objects
+    assert objects.class_id[row] == ObjectClass.STANDING
+    assert objects.state[row] == ObjectState.SEEN
+    assert objects.ttc[row] == pytest.approx(left_m / SPEED_MPS, rel=0.1)
+    assert objects.range[row] == pytest.approx(left_m, rel=0.1)
+    assert abs(objects.lateral[row]) < 0.15
+    assert objects.probability[row] > 0.8
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_who_crosses_is_one_object_from_head_to_foot(
+    drive: Drive, box: Landmarks, clutter: Landmarks, side: int
+) -> None:
+    """1.7 m tall, on the ground 0.3 m under the camera, 1.2 m/s."""
+    walker = drive(box((-2.2 * side, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2 * side, 0, 0]))
+    seen: list[tuple[int, int]] = []
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=34)):
+        objects = tables.objects
+        rows = published(objects)
+        seen += [(int(objects.id[row]), int(objects.class_id[row])) for row in rows]
+    assert len(seen) > 10
+    assert len({identity for identity, _ in seen}) == 1
+    assert {what for _, what in seen[3:]} == {ObjectClass.CROSSING}
+    assert np.sign(objects.right[rows[0]]) == side
+    assert abs(objects.right[rows[0]]) == pytest.approx(1.2, rel=0.3)
+    assert len({int(one) for one in tables.rebel.square[tables.rebel.active]} - {-1}) == 1
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+def test_who_leaves_to_the_side_never_stands_and_is_never_imminent(
+    drive: Drive, box: Landmarks, clutter: Landmarks, side: int
+) -> None:
+    """Beside the path, walking away from it, the vehicle fast."""
+    walker = drive(box((1.0 * side, -0.55, 5.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.4 * side, 0, 0]))
+    told = 0
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=36)):
+        objects = tables.objects
+        for row in published(objects):
+            told += 1
+            assert objects.class_id[row] != ObjectClass.STANDING
+            assert objects.probability[row] < 0.1
+    assert told > 5
+
+
+def test_what_goes_ahead_leads(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    random = np.random.default_rng(3)
+    ground = np.stack([random.choice([-1, 1], 250) * random.uniform(0.4, 3, 250), np.full(250, 0.3),
+                       random.uniform(1, 12, 250)], axis=1)  # fmt: skip
+    leader = drive(box((0.0, 0.1, 2.5), (0.6, 0.35, 0.0), landmarks=40), np.array([0, 0, 2.0]))
+    *_, tables = steps(replace(drive(ground) + drive(clutter(150)) + leader, frames=18))
+    (row,) = published(tables.objects)
+    assert tables.objects.class_id[row] == ObjectClass.LEADING
+    assert tables.objects.forward[row] == pytest.approx(2.0, rel=0.2)
+    assert tables.objects.range[row] == pytest.approx(2.5, rel=0.2)
+    assert tables.objects.probability[row] < 0.2
+
+
+def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    left = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([1.0, 0, 0]))
+    right = drive(box((2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([-1.0, 0, 0]))
+    *_, tables = steps(replace(drive(clutter(150)) + left + right, frames=22))
+    rows = published(tables.objects)
+    assert len(rows) == 2
+    assert sorted(np.sign(tables.objects.right[rows])) == [-1, 1]
+
+
+def test_an_object_that_is_not_seen_coasts_keeps_its_id_and_ends(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """Somebody who crosses vanishes for 0.25 s, then for good."""
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
+    way = replace(drive(clutter(150)) + walker, frames=60)
+    tables = LineCircleFilter(Config(), way.lens)
+    states, before = [], None
+    for seq, (corners, motion) in enumerate(way):
+        gone = 20 <= seq < 25 or seq >= 32
+        walkers = {looks.tobytes() for looks in way.looks[150:]}
+        keep = np.array([not gone or looks.tobytes() not in walkers for looks in corners.appearance])
+        tables.step(type(corners)(corners.pixel[keep], corners.position[keep], corners.appearance[keep]), motion)
+        rows = published(tables.objects)
+        if seq == 19:
+            before = tables.objects.id[rows].tolist()
+        if 20 <= seq < 25:
+            states += tables.objects.state[rows].tolist()
+        if seq == 30:
+            assert tables.objects.id[rows].tolist() == before
+    assert ObjectState.COASTING in states
+    assert not published(tables.objects)
+
+
+def test_without_a_speed_the_contact_is_known_and_no_speed_over_ground(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    walker = drive(box((-1.6, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.0, 0, 0]))
+    told = 0
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=24), speed_mps=math.nan):
+        objects = tables.objects
+        for row in published(objects):
+            told += 1
+            assert objects.class_id[row] == ObjectClass.UNKNOWN
+            assert math.isnan(objects.forward[row])
+            assert not math.isnan(objects.ttc[row])
+    assert told
+
+
+def test_a_full_table_gives_way_and_counts_it(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    left = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([1.0, 0, 0]))
+    right = drive(box((2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([-1.0, 0, 0]))
+    way = replace(drive(clutter(150)) + left + right, frames=22)
+    tables = LineCircleFilter(Config(memory=Memory(objects=1)), way.lens)
+    evicted = [tables.step(corners, motion).sizes.evicted for corners, motion in way]
+    assert tables.objects.count == 1
+    assert sum(evicted) > 0
+
+
+def test_an_object_is_told_from_its_third_frame_on(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    """The numbers of its first frames are those of a few edges."""
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
+    told_after_s = []
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
+        told_after_s += tables.objects.age_s[published(tables.objects)].tolist()
+    assert told_after_s
+    assert min(told_after_s) == pytest.approx(2 / FPS)
+
+
+def test_of_few_edges_it_is_told_three_frames_later(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=6), np.array([1.2, 0, 0]))
+    few, told_after_s = Config(filter=Filter(rebel_support=3)), []
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=30), few):
+        told_after_s += tables.objects.age_s[published(tables.objects)].tolist()
+    assert min(told_after_s) == pytest.approx(5 / FPS)
+
+
+def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
+    circles_told = 0
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
+        objects, circles = tables.objects, tables.rebel
+        for o in published(objects):
+            if objects.class_id[o] != ObjectClass.CROSSING or objects.probability[o] > 0.5:
+                continue
+            for c in np.flatnonzero(circles.active & (circles.square == o)):
+                circles_told += 1
+                assert circles.cause[c] == Cause.CROSSING
+                for number in ("range", "lateral"):
+                    of_both = getattr(circles, number)[c], getattr(objects, number)[o]
+                    assert of_both[0] == pytest.approx(of_both[1], nan_ok=True)
+    assert circles_told > 5
+
+
+def test_where_nothing_breaks_the_flow_there_is_no_object(drive: Drive, clutter: Landmarks) -> None:
+    for tables in steps(replace(drive(clutter(200)), frames=24)):
+        assert tables.objects.count == 0
+
+
+def test_what_stands_before_a_vehicle_that_stops_stays_where_it_was(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """Nothing moves in the picture any more: it breaks no flow, and is still there; what is known of it stays."""
+    wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
+    tables = LineCircleFilter(Config(), wall.lens)
+    for corners, motion in wall:
+        tables.step(corners, motion)
+    (row,) = published(tables.objects)
+    identity, numbers = tables.objects.id[row], []
+    for _ in range(100):
+        tables.step(corners, replace(motion, speed_mps=0.0))
+        assert tables.objects.id[published(tables.objects)].tolist() == [identity]
+        numbers.append((float(tables.objects.range[row]), float(tables.objects.range_sigma[row])))
+    assert numbers[20] == pytest.approx(numbers[-1], rel=0.1)
+    assert tables.objects.class_id[row] == ObjectClass.STANDING
+
+
+def test_who_leaves_the_picture_at_its_side_is_expected_there_for_a_second(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """He walks towards the path beside a faster vehicle, so that it loses sight of him."""
+    walker = drive(box((1.5, -0.55, 3.2), (0.4, 1.7, 0.2), landmarks=60), np.array([-0.5, 0, 0]))
+    way = replace(drive(clutter(150)) + walker, frames=44, speed_mps=1.5)
+    tables, unseen_s = LineCircleFilter(Config(), way.lens), []
+    walkers = {looks.tobytes() for looks in way.looks[150:]}
+    for corners, motion in way:
+        tables.step(corners, motion)
+        if not any(looks.tobytes() in walkers for looks in corners.appearance):
+            for row in published(tables.objects):
+                unseen_s.append(float(tables.objects.unseen_s[row]))
+                assert tables.objects.right[row] < 0
+                assert tables.objects.class_id[row] != ObjectClass.STANDING
+                assert tables.objects.state[row] != ObjectState.SEEN
+    assert unseen_s
+    assert max(unseen_s) < 1.3
+
+
+def test_where_the_speed_is_told_too_low_the_ground_is_no_object(drive: Drive, clutter: Landmarks) -> None:
+    """By half of the speed the ground would be a thing that stands above it, twice as near."""
+    random = np.random.default_rng(4)
+    ground = np.stack([random.uniform(-1.5, 1.5, 500), np.full(500, 0.3), random.uniform(0.6, 9, 500)], axis=1)
+    way = replace(drive(ground) + drive(clutter(100)), frames=24, speed_mps=1.0)
+    for tables in steps(way, speed_mps=0.5):
+        assert published(tables.objects) == []
+
+
+@pytest.mark.parametrize("fps", [10.0, 20.0, 40.0])
+def test_what_is_told_does_not_depend_on_the_frame_rate(
+    drive: Drive, box: Landmarks, clutter: Landmarks, fps: float
+) -> None:
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
+    *_, tables = steps(replace(drive(clutter(150)) + walker, frames=round(1.6 * fps), fps=fps))
+    (row,) = published(tables.objects)
+    assert tables.objects.class_id[row] == ObjectClass.CROSSING
+    assert tables.objects.right[row] == pytest.approx(1.2, rel=0.3)
+    assert tables.objects.range[row] == pytest.approx(6.0 - SPEED_MPS * 1.6, rel=0.3)

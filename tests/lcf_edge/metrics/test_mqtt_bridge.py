@@ -1,0 +1,81 @@
+"""``examples/mqtt_bridge.py`` brings objects and health to a client of a real broker."""
+
+import json
+import queue
+import subprocess
+import sys
+from collections.abc import Iterator
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from typing import Any
+
+import paho.mqtt.client as mqtt
+import pytest
+
+from lcf_edge.cdr import DiagnosticArray, Header
+from lcf_edge.diagnostics import DeviceStatus, Level
+
+PATIENCE_S = 30.0
+BRIDGE = Path(__file__).parents[3] / "examples/mqtt_bridge.py"
+
+
+def test_whatever_a_part_is_called_it_makes_a_topic() -> None:
+    spec = spec_from_file_location("mqtt_bridge", BRIDGE)
+    assert spec
+    assert spec.loader
+    bridge = module_from_spec(spec)
+    spec.loader.exec_module(bridge)
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    for name in ("a/b+c#", "nothing\0more\n\x1b[31m", "long" * 50_000):
+        diagnostics = DiagnosticArray(Header(1, ""), "rover", (DeviceStatus(name, Level.OK, ""),))
+        ((topic, payload),) = bridge.health_messages(diagnostics, "seven")
+        assert topic.isprintable()
+        client.publish(topic, payload)  # raises for one that is none
+
+
+@pytest.fixture
+def broker(rover: Any) -> Iterator[int]:
+    """The port of a broker: the one after the rover's."""
+    port = int(rover.endpoint.rpartition(":")[2]) % 60000 + 1
+    command = (sys.executable, str(Path(__file__).with_name("mqtt_broker.py")), str(port))
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
+        assert process.stdout
+        assert process.stdout.readline() == "listens\n"
+        yield port
+        process.kill()
+
+
+@pytest.fixture
+def messages(broker: int) -> Iterator[queue.Queue[tuple[str, Any]]]:
+    """What a client receives that subscribes to all."""
+    received: queue.Queue[tuple[str, Any]] = queue.Queue()
+    client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
+    client.on_connect = lambda *_: client.subscribe("lcf/#", qos=1)
+    client.on_message = lambda _, __, message: received.put((message.topic, json.loads(message.payload)))
+    client.connect("127.0.0.1", broker)
+    client.loop_start()
+    yield received
+    client.disconnect()
+    client.loop_stop()
+
+
+def test_objects_and_health_arrive_and_its_end_is_told(
+    rover: Any, broker: int, messages: queue.Queue[tuple[str, Any]]
+) -> None:
+    command = (sys.executable, str(BRIDGE), rover.endpoint, "127.0.0.1", "--port", str(broker), "--robot", "seven")
+    found: dict[str, Any] = {}
+    with subprocess.Popen(command) as bridge:
+        wanted = {"lcf/seven/online", "lcf/seven/objects", "lcf/seven/health/camera", "lcf/seven/health/imu"}
+        while not wanted <= set(found):
+            topic, message = messages.get(timeout=PATIENCE_S)
+            found[topic] = message
+        bridge.kill()
+    assert found["lcf/seven/online"] is True
+    _, crossing, cutting_in = found["lcf/seven/objects"]["objects"]
+    assert (crossing["class"], crossing["ttc"], crossing["probability"]) == ("crossing", 2.125, 0.97)
+    assert (cutting_in["state"], cutting_in["ttc"], cutting_in["range"]) == ("hidden", None, None)
+    assert found["lcf/seven/health/camera"]["values"]["rate_hz"] == "20.00"
+    assert found["lcf/seven/health/imu"]["level"] == "error"
+    while found["lcf/seven/online"]:
+        topic, message = messages.get(timeout=PATIENCE_S)
+        found[topic] = message

@@ -1,0 +1,69 @@
+"""Where the tests find another Python. That they pass with it is ``make test-all`` and ``make test-arm64``."""
+
+import os
+import platform
+import sys
+from pathlib import Path
+
+import pytest
+
+from release import elsewhere
+from release.debian import MACHINES, Machine, ReleaseError
+
+THIS = f"{sys.version_info.major}.{sys.version_info.minor}"
+
+
+@pytest.fixture
+def here() -> Machine:
+    """This computer's processor."""
+    return MACHINES[platform.machine()]
+
+
+@pytest.fixture
+def other() -> Machine:
+    """The other one."""
+    return next(machine for machine in MACHINES.values() if not machine.is_this)
+
+
+def test_a_python_that_this_computer_has_is_taken(here: Machine) -> None:
+    python = elsewhere.find(here, THIS)
+    assert python.root is None
+    assert Path(python.program).name == f"python{THIS}"
+
+
+@pytest.mark.parametrize(("version", "suite"), [("3.11", "bookworm"), ("3.13", "trixie"), ("3.14", "forky")])
+def test_another_processors_is_that_of_the_debian_that_has_it(
+    other: Machine, version: str, suite: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(
+        elsewhere, "unpacked", lambda machine, suite, packages: Path(machine.debian, suite, packages[0])
+    )
+    assert elsewhere.find(other, version).root == Path(other.debian, suite, "python3")
+
+
+def test_one_that_is_nowhere_is_told_and_the_others_go_on(here: Machine, tmp_path: Path) -> None:
+    with pytest.raises(ReleaseError, match=r"no python3\.99 on this computer"):
+        elsewhere.find(here, "3.99")
+    assert elsewhere._tested(here, "3.99", tmp_path, ()).startswith("not tested: there is no python3.99")
+
+
+@pytest.mark.parametrize(("value", "status"), [(1, 0), (2, 1)], ids=["passes", "fails"])
+def test_what_is_tested_is_the_project_with_its_packages(
+    here: Machine, tmp_path: Path, value: int, status: int
+) -> None:
+    (tmp_path / "project.py").write_text("VALUE = 1\n")
+    (tmp_path / "test_it.py").write_text(f"import project\ndef test_it(): assert project.VALUE == {value}\n")
+    packages = Path(pytest.__file__).parents[1]
+    assert elsewhere.Python(THIS, sys.executable).test(here, packages, tmp_path, ("-q", "test_it.py")) == status
+
+
+def test_what_the_tests_need_is_what_the_project_says() -> None:
+    needed = {requirement.split(">")[0] for requirement in elsewhere._requirements()}
+    assert {"numpy", "aiohttp", "foxglove-sdk", "pytest", "hypothesis"} <= needed
+    assert not any(name.startswith("lcf-edge") for name in needed)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may do it")
+def test_without_root_it_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
+    assert elsewhere.main(["aarch64", "3.13"]) == 1
+    assert "(sudo make test-" in capsys.readouterr().err
