@@ -74,8 +74,8 @@ def vote(
     """One edge votes for its shift to each free corner within ``reach``, px, but not near by, that looks like it."""
     u, v = leaps.u[i], leaps.v[i]
     most = matching.likeness_needed(matching.contrast(edges, i), settings)
-    left, right = matching.first_cell(u, reach), matching.last_cell(u, reach, index.columns)
-    for row in range(matching.first_cell(v, reach), matching.last_cell(v, reach, index.rows) + 1):
+    left, right = matching.first_cell(u, reach, index.columns), matching.last_cell(u, reach, index.columns)
+    for row in range(matching.first_cell(v, reach, index.rows), matching.last_cell(v, reach, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - u, index.y[place] - v
             away2 = dx * dx + dy * dy
@@ -122,8 +122,8 @@ def take(
     u, v = leaps.u[i] + (leaps.across + 1) * step - reach, leaps.v[i] + (leaps.down + 1) * step - reach
     least = matching.likeness_needed(matching.contrast(edges, i), settings)
     best = -1
-    left, right = matching.first_cell(u, step), matching.last_cell(u, step, index.columns)
-    for row in range(matching.first_cell(v, step), matching.last_cell(v, step, index.rows) + 1):
+    left, right = matching.first_cell(u, step, index.columns), matching.last_cell(u, step, index.columns)
+    for row in range(matching.first_cell(v, step, index.rows), matching.last_cell(v, step, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - u, index.y[place] - v
             if max(dx, -dx) > step or max(dy, -dy) > step or not corners.free[index.order[place]]:

@@ -52,8 +52,8 @@ def coincides(
         return False
     u, v = plane.u, plane.v
     seen = False
-    left, right = matching.first_cell(u, reach_px), matching.last_cell(u, reach_px, index.columns)
-    for row in range(matching.first_cell(v, reach_px), matching.last_cell(v, reach_px, index.rows) + 1):
+    left, right = matching.first_cell(u, reach_px, index.columns), matching.last_cell(u, reach_px, index.columns)
+    for row in range(matching.first_cell(v, reach_px, index.rows), matching.last_cell(v, reach_px, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             corner = index.order[place]
             beside = math.fabs(index.x[place] - u) > reach_px or math.fabs(index.y[place] - v) > reach_px

@@ -26,8 +26,8 @@ cdef class CornerIndex:
 cpdef void take_corners(CornerColumns corners, const int[:, ::1] pixel, const float[:, ::1] position, const unsigned long long[:, ::1] words) noexcept nogil
 cpdef int cell_of(CornerIndex index, int x, int y) noexcept nogil
 cpdef void fill(CornerIndex index, CornerColumns corners) noexcept nogil
-cdef int first_cell(double middle, double gate) noexcept nogil
-cdef int last_cell(double middle, double gate, int cells) noexcept nogil
+cpdef int first_cell(double middle, double gate, int cells) noexcept nogil
+cpdef int last_cell(double middle, double gate, int cells) noexcept nogil
 @cython.locals(total=int)
 cpdef double difference(EdgeColumns edges, Py_ssize_t i, CornerIndex index, Py_ssize_t place) noexcept nogil
 @cython.locals(total=int)

@@ -80,14 +80,14 @@ def fill(index: CornerIndex, corners: CornerColumns) -> None:
     index.start[0] = 0
 
 
-def first_cell(middle: float, gate: float) -> int:
-    """First row or column of cells that an interval around ``middle`` meets."""
-    return rounding.whole(max(middle - gate, 0.0)) >> CELL_SHIFT
+def first_cell(middle: float, gate: float, cells: int) -> int:
+    """First of so many rows or columns of cells that an interval around ``middle`` meets; ``cells``: none."""
+    return min(rounding.whole(max(middle - gate, 0.0)) >> CELL_SHIFT, cells)
 
 
 def last_cell(middle: float, gate: float, cells: int) -> int:
-    """Last row or column of so many cells that an interval around ``middle`` meets."""
-    return min(rounding.whole(middle + gate) >> CELL_SHIFT, cells - 1)
+    """Last of so many rows or columns of cells that an interval around ``middle`` meets; -1: none."""
+    return max(min(rounding.whole(middle + gate) >> CELL_SHIFT, cells - 1), -1)
 
 
 def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> float:
@@ -121,8 +121,8 @@ def choose(
 
     ``most``: mean grey difference of its looks that is still the same corner.
     """
-    left, right = first_cell(x, gate), last_cell(x, gate, index.columns)
-    for row in range(first_cell(y, gate), last_cell(y, gate, index.rows) + 1):
+    left, right = first_cell(x, gate, index.columns), last_cell(x, gate, index.columns)
+    for row in range(first_cell(y, gate, index.rows), last_cell(y, gate, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - x, index.y[place] - y
             away2 = dx * dx + dy * dy

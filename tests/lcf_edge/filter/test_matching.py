@@ -294,3 +294,12 @@ def test_places_in_the_input_frame_are_those_of_the_lens(lens: Lens, x: float, y
     at = np.array([[lens.cx + x, lens.cy + y]], np.float32)
     project(plane, *at[0].tolist())
     assert (plane.u, plane.v) == pytest.approx(lens.distort(at)[0].tolist(), abs=1e-3, nan_ok=True)
+
+
+@given(st.floats(-1e6, 1e6), st.floats(0, 1e6), st.integers(1, 200))
+def test_cells_around_a_place_outside_the_picture_are_none_and_no_others(middle: float, gate: float, cells: int) -> None:
+    first, last = matching.first_cell(middle, gate, cells), matching.last_cell(middle, gate, cells)
+    assert 0 <= first <= cells
+    assert -1 <= last < cells
+    met = {cell for cell in range(cells) if cell * 16 <= middle + gate and (cell + 1) * 16 > max(middle - gate, 0)}
+    assert met <= set(range(first, last + 1))
