@@ -194,9 +194,9 @@ def _foxglove(place: Place) -> Iterator[int]:
                 if message.type == aiohttp.WSMsgType.BINARY:
                     seen.set()
                     continue
-                told = json.loads(message.data)
-                if told["op"] == "advertise":
-                    wanted = [{"id": each["id"], "channelId": each["id"]} for each in told["channels"]]
+                received = json.loads(message.data)
+                if received["op"] == "advertise":
+                    wanted = [{"id": each["id"], "channelId": each["id"]} for each in received["channels"]]
                     await socket.send_str(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
     with _served(place, "foxglove", "ws://", look) as number:

@@ -43,7 +43,7 @@ class _Filmed:
         wanted = self._driver.decide(moment)
         assert moment.frame is not None
         assert self._driver.scene is not None
-        picture = draw(moment, self._driver.scene, self._driver.told(self._driver.scene), wanted)
+        picture = draw(moment, self._driver.scene, self._driver.reported(self._driver.scene), wanted)
         self.writer.write(picture)
         return wanted
 

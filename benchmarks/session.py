@@ -90,8 +90,8 @@ def save(drive: Drive, folder: Path) -> None:
 def _run(folder: Path, endpoint: str, seconds: float) -> Session:
     command = (sys.executable, "-m", "benchmarks.session_daemon", folder, "run", "-c", folder / "config.toml")
     log = folder / "log.txt"
-    with log.open("wb") as told:
-        daemon = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=told)
+    with log.open("wb") as errors:
+        daemon = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors)
     try:
         return _listened(daemon, endpoint, seconds)
     except (LcfError, ValueError) as error:

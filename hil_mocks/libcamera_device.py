@@ -46,7 +46,7 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     focuses: bool = False
     newer: bool = False  # has the controls of libcamera 0.5
     chooses_modes: bool = True
-    told_in: str = ""  # a file in which the mode and the controls are told at every start
+    log_path: str = ""  # a file in which the mode and the controls are told at every start
 
     installed: bool = True
     busy: bool = False
@@ -253,10 +253,10 @@ class Camera:
 
     def start(self, controls: dict[Control, Any]) -> None:
         """Pictures come from now on."""
-        told = {control.name: value for control, value in controls.items()}
-        if self._world.told_in:
-            Path(self._world.told_in).write_text(json.dumps({"mode": self._mode, **told}), encoding="utf-8")
-        threading.Thread(target=self._run, args=(told["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
+        started_with = {control.name: value for control, value in controls.items()}
+        if self._world.log_path:
+            Path(self._world.log_path).write_text(json.dumps({"mode": self._mode, **started_with}), encoding="utf-8")
+        threading.Thread(target=self._run, args=(started_with["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
 
     def stop(self) -> None:
         """No more pictures."""

@@ -79,8 +79,8 @@ class Pipeline:
         self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
         memory, self._plane = config.memory, ImagePlane(lens)
-        self._told_circles = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
-        self._told_objects, self._told_psi = Records(memory.objects, OBJECT), Records(memory.psi, PSI_REGION)
+        self._circle_records = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
+        self._object_records, self._psi_records = Records(memory.objects, OBJECT), Records(memory.psi, PSI_REGION)
         self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
 
@@ -196,26 +196,26 @@ class Pipeline:
 
     def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
         """The circles from Tr_s up, rebels first, and the object of each, 0: none."""
-        told, least = self._told_circles, self._config.filter.tr_s
-        told.count = 0
+        records, least = self._circle_records, self._config.filter.tr_s
+        records.count = 0
         objects = self.filter.objects.columns
         for kind, table in ((Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)):
-            scene_records.add_circles(told, table.columns, objects, kind, self._plane, least)
-        return told.told(), told.told_owners()
+            scene_records.add_circles(records, table.columns, objects, kind, self._plane, least)
+        return records.written(), records.written_owners()
 
     def _objects(self) -> Rows:
         """The objects from Tr_s up."""
-        told = self._told_objects
-        told.count = 0
+        records = self._object_records
+        records.count = 0
         least = self._config.filter.tr_s
-        scene_records.add_objects(told, self.filter.objects.columns, self._plane, least)
-        return told.told()
+        scene_records.add_objects(records, self.filter.objects.columns, self._plane, least)
+        return records.written()
 
     def _psi(self) -> Rows:
-        told = self._told_psi
-        told.count = 0
-        scene_records.add_psi(told, self.filter.psi.columns, self._plane)
-        return told.told()
+        records = self._psi_records
+        records.count = 0
+        scene_records.add_psi(records, self.filter.psi.columns, self._plane)
+        return records.written()
 
     def view(self) -> View:
         """What the last scene was made of, for those who draw it."""

@@ -110,7 +110,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         say(f"    warning: {warning}")
     say("")
     for line in (
-        *(_told(threat) for threat in threats),
+        *(_found_line(threat) for threat in threats),
         *summary.lines(recording.skipped),
         f"memory   {memory_mib:.0f} MiB at most, of the process that filters and publishes",
         f"received {received.scenes} of {publisher.sent} scenes in the second process, "
@@ -222,7 +222,7 @@ def _write(path: Path, data: bytes) -> None:
         raise cannot_write(path, error) from error
 
 
-def _told(threat: FoundThreat) -> str:
+def _found_line(threat: FoundThreat) -> str:
     if threat.latency_s is None:
         return f"missed   {threat.name}, in sight for {(threat.last_ns - threat.since_ns) / 1e9:.1f} s"
     ((cause, _),) = threat.causes.most_common(1)

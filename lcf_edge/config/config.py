@@ -25,7 +25,7 @@ MIN_HEIGHT_M = 0.001
 MAX_POLYGONS, MAX_POINTS = 64, 256  # of a mask
 
 _SHOWN = 60  # characters of a key that is not known
-_TOLD = 300  # of anything else that somebody wrote
+_MAX_QUOTED = 300  # of anything else that somebody wrote
 
 # Every number has bounds far beyond what is sensible, within which nothing overflows, divides by zero or takes memory
 # that was not reckoned with.
@@ -326,7 +326,7 @@ def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     try:
         return bounded_toml.parse(data.decode())
     except ValueError as error:
-        raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _TOLD)}") from error
+        raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _MAX_QUOTED)}") from error
 
 
 def _start_of(path: Path) -> bytes:
@@ -461,7 +461,7 @@ def _check_mask(camera: Camera, origin: str) -> None:
 def _check_endpoints(zenoh: Zenoh, origin: str) -> None:
     for key, endpoints in (("connect", zenoh.connect), ("listen", zenoh.listen)):
         for wrong in filter(None, map(fault, endpoints)):
-            raise ConfigError(f"{origin}: zenoh.{key}: {printable(wrong, _TOLD)}")
+            raise ConfigError(f"{origin}: zenoh.{key}: {printable(wrong, _MAX_QUOTED)}")
 
 
 def _numbers(value: Any) -> Iterator[float]:

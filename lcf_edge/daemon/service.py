@@ -146,7 +146,7 @@ class Service:
         """What a thread raises ends the daemon, in one line."""
 
         def notice(failed: threading.ExceptHookArgs) -> None:
-            self._to_do.put(partial(self._fail, _told(failed)))
+            self._to_do.put(partial(self._fail, _error_of(failed)))
 
         before, threading.excepthook = threading.excepthook, notice
         try:
@@ -288,7 +288,7 @@ class Service:
         self._reserve.close()
 
 
-def _told(failed: threading.ExceptHookArgs) -> LcfError:
+def _error_of(failed: threading.ExceptHookArgs) -> LcfError:
     """A failure as one line."""
     if isinstance(failed.exc_value, LcfError):
         return failed.exc_value

@@ -294,7 +294,7 @@ class EgoMotionEstimator:
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
             return
         again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
-        self._inertial.see_ground(ground.speed_mps - ground.told_mps, ground.sigma_mps * sqrt(again))
+        self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
 
     def _rotation(self) -> Floats:
         """Of directions, over the interval."""

@@ -80,12 +80,12 @@ def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: Recording
     views = set(np.linspace(0.1, 0.9, VIEWS).dot(recording.frame_count or 0).astype(int).tolist())
     differing = 0
     for number, (frame, outcome) in enumerate(run(recording, task.config)):
-        told = rebels(outcome.scene.circles)
+        reported = rebels(outcome.scene.circles)
         known = truth.of(frame.stamp_ns)
-        line = report.line_of(frame, told)
+        line = report.line_of(frame, reported)
         score.step_ms.append(outcome.scene.timing.total / 1000)
         if known is not None:
-            verdict = score.add(frame.stamp_ns, told, known)
+            verdict = score.add(frame.stamp_ns, reported, known)
             line = msgspec.structs.replace(
                 line,
                 scored=True,

@@ -17,7 +17,7 @@ _RED, _YELLOW, _GREY, _WHITE, _BLACK = (60, 60, 255), (0, 230, 255), (190, 190, 
 Colours = npt.NDArray[np.uint8]
 
 
-def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], told: Sequence[Rebel], caption: str) -> Colours:
+def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], reported: Sequence[Rebel], caption: str) -> Colours:
     """A frame (h, w), grey, as a small picture (h, ``WIDTH_PX``, 3): threats yellow, other things grey, rebels red."""
     scale = WIDTH_PX / image.shape[1]
     kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
@@ -25,7 +25,7 @@ def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], told: Sequence[Re
     for each in known:
         x0, y0, x1, y1 = (round(scale * value) for value in each.box)
         cv2.rectangle(picture, (x0, y0), (x1, y1), _YELLOW if each.threat else _GREY, 1, cv2.LINE_AA)
-    for rebel in told:
+    for rebel in reported:
         place = round(scale * rebel.x), round(scale * rebel.y)
         cv2.circle(picture, place, max(round(scale * rebel.r), 3), _RED, 2, cv2.LINE_AA)
         if rebel.ttc_s is not None and 0 < rebel.ttc_s < CLOSE_S:

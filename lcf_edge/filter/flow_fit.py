@@ -288,9 +288,9 @@ def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
     if turned < MIN_TURNED:
         return
     off_px = quantile(fit, SCALE_SHARE, MIN_TURN_PX, 0.0) / SCALE_SIGMAS
-    told2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
+    turn2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
     gain = 1 - math.exp(-dt_s / TURN_MEMORY_S)
-    fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (told2 - fit.turn_share * fit.turn_share))
+    fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (turn2 - fit.turn_share * fit.turn_share))
 
 
 def measure(

@@ -210,7 +210,7 @@ class LineCircleFilter:
 
     def _rested(self, motion: Motion) -> Motion:
         """The motion as the picture knows it: where it says that the vehicle stands, no told speed is believed."""
-        self._rest.told_mps = motion.speed_mps
+        self._rest.measured_mps = motion.speed_mps
         if not self._rest.stands:
             return motion
         key_frames.stop(self._keys)

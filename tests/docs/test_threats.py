@@ -42,7 +42,7 @@ def test_the_bound_of_videos() -> None:
     assert f"{_DECODER_BYTES // 2**20} MiB and {_BYTES_A_PIXEL} bytes for each pixel of the first picture" in DOCUMENT
 
 
-def test_every_loss_that_is_counted_is_told() -> None:
+def test_every_loss_that_is_counted_is_reported() -> None:
     counts = {"scene failed", "scene unfit", "bytes received", "sessions", "connections cut", "renewals"}
     queries = Queryables.COUNTED - {"answered"}
     assert [one for one in counts | {f"query {one}" for one in queries} if f"`{one}`" not in DOCUMENT] == []

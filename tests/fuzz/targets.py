@@ -112,7 +112,7 @@ def an_image() -> bytes:
     return cdr.LITTLE_ENDIAN + header + fields + a_picture().tobytes()
 
 
-def told(error: LcfError) -> str:
+def one_line(error: LcfError) -> str:
     """The text of an error, which is a line for a terminal."""
     text = str(error)
     assert text.isprintable(), text
@@ -292,7 +292,7 @@ def configurations(folder: Path) -> Iterator[Take]:
 
                 report(config)
         except ConfigError as error:
-            return told(error).partition(": ")[2][:30]
+            return one_line(error).partition(": ")[2][:30]
         return "taken"
 
     yield take
@@ -368,7 +368,7 @@ def replayed(path: Path, frames: int) -> str:
             if count >= frames:
                 break
     except (RecordingError, ConfigError) as error:
-        return told(error).rpartition("/")[2][:30]
+        return one_line(error).rpartition("/")[2][:30]
     assert all(warning.isprintable() for warning in recording.warnings)
     return f"{sorted(recording.skipped)} {len(recording.warnings)}"
 
@@ -431,7 +431,7 @@ def mcap(folder: Path) -> Iterator[Take]:
         try:
             load(path)
         except ConfigError as error:
-            return told(error)[-20:] + replayed(path, 6)
+            return one_line(error)[-20:] + replayed(path, 6)
         return replayed(path, 6)
 
     yield take

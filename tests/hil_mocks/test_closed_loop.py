@@ -118,7 +118,7 @@ def test_a_place_on_the_course_is_found_again(at_m: float, right_m: float) -> No
     assert found == pytest.approx((at_m, right_m), abs=0.06)
 
 
-def test_what_is_run_into_is_told_once_with_the_speed_and_taken_away() -> None:
+def test_what_is_run_into_is_reported_once_with_the_speed_and_taken_away() -> None:
     driver = Watching(1.0)
     log = ended(world(body(0.0, 3.0)), driver, 5.0)
     assert [(contact.name, round(contact.speed_mps, 2)) for contact in log.contacts] == [("walker_0", 1.0)]

@@ -38,7 +38,7 @@ def test_the_package_names_what_it_depends_on() -> None:
     assert package.findtext("member_of_group") == "rosidl_interface_packages"
 
 
-def test_the_schema_that_is_told_is_made_of_the_same_messages() -> None:
+def test_the_published_schema_is_made_of_the_same_messages() -> None:
     schema = scene_schema()
     assert all(text.decode() in schema for text in MESSAGES.values())
 

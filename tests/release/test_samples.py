@@ -49,7 +49,7 @@ def test_every_picture_of_it_has_truth_and_the_filter_sees_what_threatens(sample
     assert numbers.contacts == 0
 
 
-def test_another_reader_finds_sensors_and_what_was_told(sample: Path) -> None:
+def test_another_reader_finds_sensors_and_what_was_reported(sample: Path) -> None:
     with sample.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None

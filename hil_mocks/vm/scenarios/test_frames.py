@@ -112,11 +112,11 @@ def test_the_daemon_finds_what_a_plain_replay_finds(recorded: Path) -> None:
     config = load(recorded)
     replayed = {frame.stamp_ns: outcome.scene for frame, outcome in run(open_recording(recorded, config), config)}
     with recorded.open("rb") as file:
-        told = [decode_scene(message.data) for _, _, message in make_reader(file).iter_messages(["/lcf/scene"])]
-    assert len(told) >= MIN_PICTURES
-    assert {scene.stamp_ns for scene in told} <= replayed.keys()
-    same, circles = map(sum, zip(*(found_again(scene, replayed[scene.stamp_ns]) for scene in told), strict=True))
-    assert circles > len(told)
+        output = [decode_scene(message.data) for _, _, message in make_reader(file).iter_messages(["/lcf/scene"])]
+    assert len(output) >= MIN_PICTURES
+    assert {scene.stamp_ns for scene in output} <= replayed.keys()
+    same, circles = map(sum, zip(*(found_again(scene, replayed[scene.stamp_ns]) for scene in output), strict=True))
+    assert circles > len(output)
     assert same / circles >= MIN_SHARE_OF_SAME
 
 

@@ -167,7 +167,7 @@ class Server:
         audience, last_s = Audience(), -INTERVAL_S
         while (await browser.receive(SILENCE_S)).type is WSMsgType.TEXT:
             await asyncio.sleep(last_s + INTERVAL_S - time.monotonic())
-            if self._monitor.snapshot().version == audience.told_version:
+            if self._monitor.snapshot().version == audience.sent_version:
                 self._came.clear()
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._came.wait(), PULSE_S)

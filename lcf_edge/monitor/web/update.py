@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 class Audience:
     """What one browser knows already."""
 
-    told_version: int = -1
+    sent_version: int = -1
     diagnostics_ns: int = -1
     picture_ns: int = -1
     point_ns: int = -1
@@ -28,7 +28,7 @@ class Audience:
     def update(self, monitor: "Monitor | Player", endpoint: str) -> list[str | bytes]:
         """What it does not know: a text, and perhaps the JPEG that belongs to it."""
         snapshot, now_ns = monitor.snapshot(), time.time_ns()
-        self.told_version = snapshot.version
+        self.sent_version = snapshot.version
         update: dict[str, Any] = {
             "connection": {
                 "presence": snapshot.presence.value,

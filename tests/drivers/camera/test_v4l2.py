@@ -383,7 +383,7 @@ class TestSettings:
             open_camera(width=640, height=480)
 
     @pytest.mark.parametrize(
-        ("settings", "told"),
+        ("settings", "message"),
         [
             ({"width": 123, "height": 77}, ["123x77", "YUYV: ", "640x480 (30, 15/s)", "1280x720 (10/s)"]),
             ({"fps": 17}, ["at 17/s", "(30, 15/s)"]),
@@ -392,11 +392,11 @@ class TestSettings:
         ids=["size", "rate", "format"],
     )
     def test_what_is_not_offered_is_refused_with_what_is(
-        self, open_camera: Open, settings: dict[str, object], told: list[str]
+        self, open_camera: Open, settings: dict[str, object], message: list[str]
     ) -> None:
         with pytest.raises(UnsupportedSettingError) as caught:
             open_camera(**settings)
-        assert all(part in str(caught.value) for part in told)
+        assert all(part in str(caught.value) for part in message)
         assert "\n" not in str(caught.value)
 
     def test_a_size_that_is_offered_but_not_granted_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
@@ -448,16 +448,16 @@ class TestSettings:
         assert webcam.controls[v4l2.CID_POWER_LINE_FREQUENCY].value == 2
 
     @pytest.mark.parametrize(
-        ("settings", "told"),
+        ("settings", "message"),
         [
             ({"exposure_s": 10.0}, "choose 3 to 2047"),
             ({"gain": 256}, "choose 0 to 255"),
         ],
     )
     def test_a_value_out_of_range_is_refused_with_the_range(
-        self, open_camera: Open, settings: dict[str, object], told: str
+        self, open_camera: Open, settings: dict[str, object], message: str
     ) -> None:
-        with pytest.raises(UnsupportedSettingError, match=told):
+        with pytest.raises(UnsupportedSettingError, match=message):
             open_camera(**settings)
 
     def test_a_value_that_becomes_another_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
@@ -492,7 +492,7 @@ class TestNames:
 
     @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
     @pytest.mark.parametrize("name", [PATH, "rp1-cfe"])
-    def test_a_ribbon_cable_camera_is_told_at_once_with_the_remedy(
+    def test_a_ribbon_cable_camera_is_reported_at_once_with_the_remedy(
         self, open_camera: Open, kernel: MockKernel, clock: VirtualClock, name: str, interface: int
     ) -> None:
         kernel.unplug(PATH)
@@ -558,7 +558,7 @@ class TestNames:
         take(open_camera("Mock Webcam"), 1)
 
     @pytest.mark.parametrize("name", ["C920", "/dev/video9", "/dev/v4l/by-id/other"])
-    def test_a_camera_that_is_not_there_is_told_with_those_that_are(self, open_camera: Open, name: str) -> None:
+    def test_a_camera_that_is_not_there_is_reported_with_those_that_are(self, open_camera: Open, name: str) -> None:
         with pytest.raises(DeviceMissingError, match=rf"{name}: no .*found: /dev/video0 \(Mock Webcam\)"):
             open_camera(name)
 

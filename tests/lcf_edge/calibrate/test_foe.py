@@ -66,14 +66,14 @@ def test_what_is_no_straight_drive_is_refused(given: Make, guide: Guide, straigh
     standing = [replace(frame, image=straight[0].image) for frame in straight * 2]
     standing = [replace(frame, stamp_ns=straight[0].stamp_ns + i * 10**8) for i, frame in enumerate(standing)]
     backwards = [replace(frame, image=other.image) for frame, other in zip(straight, reversed(straight), strict=True)]
-    for frames, told in (
+    for frames, message in (
         (turning, "the drive is not straight, it turned in"),
         (blank, "followed over 0 intervals"),
         (standing, "next to nothing came nearer"),
         (backwards, "it drives backwards"),
         ([], "no pictures came"),
     ):
-        with pytest.raises(CalibrationError, match=told):
+        with pytest.raises(CalibrationError, match=message):
             calibrate_foe(given(frames, lens=PINHOLE), Config(), None, guide)
 
 

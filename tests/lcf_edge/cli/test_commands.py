@@ -153,7 +153,7 @@ def test_an_error_is_one_line_in_a_process_of_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("source", ["", "raise OSError", "import no_such_module"])
-def test_a_folder_with_the_name_of_the_drivers_is_told_in_one_line(tmp_path: Path, source: str) -> None:
+def test_a_folder_with_the_name_of_the_drivers_is_reported_in_one_line(tmp_path: Path, source: str) -> None:
     (tmp_path / "drivers").mkdir()
     (tmp_path / "drivers" / "__init__.py").write_text(source)
     done = lcf_edge("run", cwd=tmp_path)
@@ -346,7 +346,7 @@ def test_a_part_of_a_recording_is_replayed(recording: Path) -> None:
     assert sequence(lcf_edge("replay", recording, "-o", "-", "--start", "2")) == list(range(20, FRAMES))
 
 
-def test_a_start_beyond_the_end_is_told_with_the_length(refused: Refused, recording: Path) -> None:
+def test_a_start_beyond_the_end_is_reported_with_the_length(refused: Refused, recording: Path) -> None:
     refused("replay", recording, "--start", "60", status=1, parts=("ends after 2.3 s", "earlier start than 60 s"))
 
 
@@ -397,7 +397,7 @@ def test_options_of_a_replay_are_refused_where_they_mean_nothing(
     refused(*arguments, status=2, parts=parts)
 
 
-def test_a_recording_that_is_not_there_is_told_by_view_and_watch(refused: Refused) -> None:
+def test_a_recording_that_is_not_there_is_reported_by_view_and_watch(refused: Refused) -> None:
     for command in ("view", "watch"):
         refused(command, "nowhere", status=1, parts=("nowhere",))
 

@@ -30,7 +30,7 @@ def test_usual_pictures_have_no_notes() -> None:
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["sideways", "up and down"])
-def test_motion_blur_is_told_while_it_lasts(turned: bool) -> None:
+def test_motion_blur_is_reported_while_it_lasts(turned: bool) -> None:
     quality = PictureQuality()
     *before, last = drive()
     for image in before:
@@ -46,12 +46,12 @@ def test_a_lens_that_is_always_soft_is_as_usual() -> None:
     assert {quality.notes(image, 700) for image in soft} == {()}
 
 
-@pytest.mark.parametrize(("corners", "told"), [(0, ("no corners",)), (39, ("few corners",)), (40, ())])
-def test_how_many_corners_there_are(corners: int, told: tuple[str, ...]) -> None:
-    assert PictureQuality().notes(drive(0.1)[0], corners) == told
+@pytest.mark.parametrize(("corners", "notes"), [(0, ("no corners",)), (39, ("few corners",)), (40, ())])
+def test_how_many_corners_there_are(corners: int, notes: tuple[str, ...]) -> None:
+    assert PictureQuality().notes(drive(0.1)[0], corners) == notes
 
 
-def test_darkness_and_glare_are_told() -> None:
+def test_darkness_and_glare_are_reported() -> None:
     (image,) = drive(0.1)
     assert "dark" in PictureQuality().notes(image // 8, 700)
     dazzled = image.copy()

@@ -92,7 +92,7 @@ def test_stamps_are_of_the_system_clock(plain: Config, start: Start, mail: Mail,
     assert before_ns - 10**6 <= link.scenes[0].stamp_ns <= after_ns + 10**6
 
 
-def test_stamps_follow_a_step_of_the_system_clock_and_it_is_told(
+def test_stamps_follow_a_step_of_the_system_clock_and_it_is_reported(
     plain: Config, start: Start, mail: Mail, link: Any, approach: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     ahead_ns = 0

@@ -101,11 +101,11 @@ def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start,
     assert files[:2] == ["drive_0.mcap", "drive_1.mcap"]
     with Reader(folder) as bag:  # reads what metadata.yaml names, and nothing else
         counts = Counter(connection.topic for connection, _, _ in bag.messages())
-        told = {connection.topic: connection.msgcount for connection in bag.connections}
+        recorded = {connection.topic: connection.msgcount for connection in bag.connections}
         qualities = {connection.topic: connection.ext.offered_qos_profiles for connection in bag.connections}
         assert bag.message_count == counts.total() == sum(messages_in(folder / name) for name in files)
         assert bag.start_time < bag.end_time
-    assert {topic: count for topic, count in told.items() if count} == counts
+    assert {topic: count for topic, count in recorded.items() if count} == counts
     (lasting,) = qualities["/tf_static"]
     assert lasting.durability is QosDurability.TRANSIENT_LOCAL
     assert replayed(folder).split()[1] == f"{counts['/lcf/scene']},"

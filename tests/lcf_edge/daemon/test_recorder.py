@@ -345,7 +345,7 @@ def small_disk(folder: Path) -> Iterator[Path]:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk")
 @pytest.mark.usefixtures("often")
-def test_a_full_disk_is_told_once_and_the_file_goes_on_when_there_is_room(
+def test_a_full_disk_is_reported_once_and_the_file_goes_on_when_there_is_room(
     tmp_path: Path, begin: Begin, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO", "lcf_edge")
@@ -371,9 +371,9 @@ def test_a_full_disk_is_told_once_and_the_file_goes_on_when_there_is_room(
         ended(recorder)
         ((*_, final),) = scenes_in(disk)  # one file, whole
         assert final.seq == last
-    told = [record.getMessage() for record in caplog.records]
-    assert len([line for line in told if "cannot be written" in line]) == 1
-    assert [line.split()[1] for line in told] == ["records", str(disk / told[0].split("/")[-1]) + ":", "goes"]
+    logged = [record.getMessage() for record in caplog.records]
+    assert len([line for line in logged if "cannot be written" in line]) == 1
+    assert [line.split()[1] for line in logged] == ["records", str(disk / logged[0].split("/")[-1]) + ":", "goes"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk")

@@ -132,7 +132,7 @@ def hangs(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
 
 
 @pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck"), (hangs, "gyro stuck")])
-def test_a_gyro_that_ends_in_the_middle_is_told_and_the_pictures_go_on(
+def test_a_gyro_that_ends_in_the_middle_is_reported_and_the_pictures_go_on(
     truth: list[np.ndarray], spoil: Spoil, note: str
 ) -> None:
     seen = driven(truth, spoil)

@@ -144,11 +144,11 @@ seen = st.tuples(st.sampled_from(["rest", "picture", "flow", "doubt"]), rates, s
 
 @given(st.lists(seen, max_size=40), st.floats(0, 10))
 @settings(deadline=None)
-def test_whatever_is_told_numbers_stay_finite_and_sigmas_positive_and_bounded(
-    told: Sequence[tuple[str, list[float], float, bool]], dt_s: float
+def test_whatever_is_reported_numbers_stay_finite_and_sigmas_positive_and_bounded(
+    inputs: Sequence[tuple[str, list[float], float, bool]], dt_s: float
 ) -> None:
     bias = GyroBias()
-    for what, rate, sigma, measured in told:
+    for what, rate, sigma, measured in inputs:
         bias.advance(dt_s, np.full(3, sigma / 7), measured)
         if what == "doubt":
             bias.doubt()

@@ -55,7 +55,9 @@ def seen(lens: Lens, before: Grey, after: Grey) -> Turn | None:
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES.keys())
 @pytest.mark.parametrize("share", [(0.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.4, 0.1)])
-def test_up_to_100_degrees_a_second_are_told_within_the_stated_sigma(lens: Lens, share: tuple[float, float]) -> None:
+def test_up_to_100_degrees_a_second_are_reported_within_the_stated_sigma(
+    lens: Lens, share: tuple[float, float]
+) -> None:
     truth = np.array([*share, 0.0]) * HUNDRED_DEGREES_PER_S
     turn = seen(lens, picture(lens), picture(lens, truth))
     assert turn is not None
@@ -114,7 +116,7 @@ def test_pictures_that_share_nothing_do_not_tell(what: str) -> None:
     assert seen(lens, before, after) is None
 
 
-def test_roll_is_not_told() -> None:
+def test_roll_is_not_reported() -> None:
     lens = LENSES["640x480"]
     turn = seen(lens, picture(lens), picture(lens))
     assert turn is not None

@@ -49,10 +49,10 @@ def test_one_report_of_many_recordings_and_the_broken_one_is_left_out(
 ) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", str(corpus), "--out", str(out), "--jobs", "2"]) == 0
-    told = capsys.readouterr()
-    assert re.search(r"broken\.mcap: left out: .*broken\.mcap", told.err)
-    assert "read      2 recordings, 1 left out" in told.out
-    assert f"report    {out}/index.html" in told.out
+    output = capsys.readouterr()
+    assert re.search(r"broken\.mcap: left out: .*broken\.mcap", output.err)
+    assert "read      2 recordings, 1 left out" in output.out
+    assert f"report    {out}/index.html" in output.out
     found = rows(out)
     assert found["broken.mcap"].error
     known, bare = found["with-truth"], found["without"]
@@ -127,7 +127,7 @@ def test_truth_is_named_for_one_recording_or_as_a_folder_for_many(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "output"),
     [
         (["--against", "nowhere"], "nowhere: cannot be read"),
         (["--against", "corpus/with-truth/truth.jsonl"], "no report of lcf-edge evaluate"),
@@ -137,13 +137,13 @@ def test_truth_is_named_for_one_recording_or_as_a_folder_for_many(
     ],
 )
 def test_wrong_usage_is_one_line_before_work_begins(
-    corpus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+    corpus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], output: str
 ) -> None:
     monkeypatch.chdir(corpus.parent)
     assert main(["evaluate", "corpus", *arguments]) == 2
     errors = capsys.readouterr().err
     assert len(errors.splitlines()) == 1
-    assert told in errors
+    assert output in errors
     assert not (corpus.parent / "evaluation").exists()
 
 

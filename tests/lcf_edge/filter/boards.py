@@ -48,7 +48,7 @@ class Board:
     height_m: float = 1.0
     speed_mps: float = 1.0
     yaw_rate_radps: float = 0.0
-    told_mps: float | None = None
+    measured_mps: float | None = None
     frames: int = 50
     fps: float = 20.0
     flicker: float = 0.6
@@ -57,13 +57,13 @@ class Board:
     def __iter__(self) -> Iterator[tuple[Corners, Motion, Grey]]:
         detector = CornerDetector(Filter(), LENS, 1500)
         random = np.random.default_rng(self.seed)
-        told_mps = self.speed_mps if self.told_mps is None else self.told_mps
+        measured_mps = self.speed_mps if self.measured_mps is None else self.measured_mps
         for seq in range(self.frames):
             picture = self.picture(seq)
             corners, _ = detector.detect(picture)
             kept = random.random(len(corners)) >= self.flicker
             shown = Corners(corners.pixel[kept], corners.position[kept], corners.appearance[kept])
-            yield shown, Motion(1 / self.fps, np.eye(3), 0.001, told_mps, self.yaw_rate_radps), picture
+            yield shown, Motion(1 / self.fps, np.eye(3), 0.001, measured_mps, self.yaw_rate_radps), picture
 
     def distance_m(self, seq: int) -> float:
         """From the camera to the board."""

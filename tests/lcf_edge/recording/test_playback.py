@@ -226,7 +226,7 @@ class TestFaults:
         assert min(delays_s) < max(delays_s)
         assert all((frame.stamp_ns - start_ns) % FRAME_NS == 0 for frame, _ in frames)
 
-    def test_a_stall_is_told_as_the_real_driver_tells_it(self, devices: Devices) -> None:
+    def test_a_stall_is_reported_as_the_real_driver_tells_it(self, devices: Devices) -> None:
         faults = Faults()
         camera = devices(RecordedCamera, faults=faults)
         camera.read()

@@ -70,7 +70,7 @@ def test_a_full_disk_is_one_error(tmp_path: Path) -> None:
         filled(path, 3).close()
 
 
-def test_without_matplotlib_the_remedy_is_told(tmp_path: Path) -> None:
+def test_without_matplotlib_the_remedy_is_reported(tmp_path: Path) -> None:
     """A second interpreter in which Matplotlib cannot be found."""
     code = (
         "import sys\n"

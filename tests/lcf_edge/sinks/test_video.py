@@ -55,7 +55,7 @@ def test_a_browser_plays_it(tmp_path: Path, suffix: str, browser: Any) -> None:
     assert rest == [128, 48, None]
 
 
-def test_what_it_begins_with_is_told_by_no_file(tmp_path: Path) -> None:
+def test_no_file_says_what_it_begins_with(tmp_path: Path) -> None:
     """A replay without one picture leaves nothing behind."""
     with VideoSink(tmp_path / "overlay.webm", 20):
         pass

@@ -159,7 +159,7 @@ def test_queries_are_answered(link: Link, peer: Any, scene: Callable[..., Scene]
     assert link.counts["query refused"] == 1
 
 
-def test_the_effective_configuration_is_told(link: Link, peer: Any, tmp_path: Any) -> None:
+def test_the_effective_configuration_can_be_asked_for(link: Link, peer: Any, tmp_path: Any) -> None:
     path = tmp_path / "config.toml"
     for config in (Config(publish=Publish(frame_id="eye", robot="seven")), Config(vehicle=Vehicle(height_m=1.5))):
         link.show_config(config)
@@ -169,7 +169,7 @@ def test_the_effective_configuration_is_told(link: Link, peer: Any, tmp_path: An
         assert load(path) == config
 
 
-def test_the_message_definitions_are_told(link: Link, peer: Any, ros: Typestore) -> None:
+def test_the_message_definitions_can_be_asked_for(link: Link, peer: Any, ros: Typestore) -> None:
     assert link
     (answer,) = peer.get("lcf/query/schema")
     types = get_types_from_msg(answer.payload.decode(), "lcf_msgs/msg/Scene")

@@ -45,9 +45,9 @@ async def channels_of(socket: aiohttp.ClientWebSocketResponse) -> dict[str, dict
     assert (info["op"], info["capabilities"]) == ("serverInfo", [])  # nothing can be sent to it
     channels: dict[str, dict[str, Any]] = {}
     while len(channels) < 11:
-        told = json.loads(await socket.receive_str())
-        if told["op"] == "advertise":
-            channels |= {channel["topic"]: channel for channel in told["channels"]}
+        message = json.loads(await socket.receive_str())
+        if message["op"] == "advertise":
+            channels |= {channel["topic"]: channel for channel in message["channels"]}
     return channels
 
 
@@ -147,18 +147,18 @@ def test_nonsense_of_clients_is_not_written_down(address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [(("--prefix", "a//b"), "name another prefix"), (("--connect", "nowhere"), "nowhere")],
 )
-def test_a_source_that_is_none_is_told_in_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], told: str
+def test_a_source_that_is_none_is_reported_in_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
 ) -> None:
     assert main(["foxglove", "--port", "0", *arguments]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert told in line
+    assert message in line
 
 
-def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str], address: str) -> None:
+def test_a_port_that_is_taken_is_reported(capsys: pytest.CaptureFixture[str], address: str) -> None:
     port = address.rpartition(":")[2]
     assert main(["foxglove", "--port", port]) == 1
     assert "--port" in capsys.readouterr().err

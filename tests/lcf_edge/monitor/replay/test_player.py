@@ -189,7 +189,7 @@ def test_tables_beyond_the_budget_are_refused_before_anything_is_shown(drive: Pa
         Player(drive, Config(memory=Memory(budget_mib=0.01)), STILL)
 
 
-def test_a_recording_that_goes_away_is_told(drive: Path, tmp_path: Path) -> None:
+def test_a_recording_that_goes_away_is_reported(drive: Path, tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     shutil.copytree(drive, gone)
     it = Playing(gone, STILL)

@@ -126,7 +126,7 @@ def test_the_numbers_beside_a_picture_are_those_of_its_frame(
     def contact_s(seq: int) -> float:
         return 2 + seq % 100 / 8 + 0.01
 
-    def told(jpeg: bytes, stamp_ns: int) -> None:
+    def put_preview(jpeg: bytes, stamp_ns: int) -> None:
         drawn_s.add(f"{contact_s(rover.seq):.1f}")
         put(jpeg, stamp_ns)
 
@@ -135,7 +135,7 @@ def test_the_numbers_beside_a_picture_are_those_of_its_frame(
         rover.objects["ttc"][1] = contact_s(rover.seq + 1)
         return bool(rover.seq % 3 == 0 and Link.preview_wanted(rover.link))
 
-    monkeypatch.setattr(rover.link, "put_preview", told)
+    monkeypatch.setattr(rover.link, "put_preview", put_preview)
     monkeypatch.setattr(rover.link, "preview_wanted", wanted)
     browser.open(view().address)
     contact = "document.querySelector('#things td:nth-child(2)').textContent.split(' ')[0]"
@@ -205,7 +205,7 @@ def test_without_a_rover_it_waits(view: Callable[..., Any], browser: Any, endpoi
     browser.wait_for(f"{STATE}.startsWith('waiting for a daemon at {endpoint} since ')")
 
 
-def test_without_pictures_the_scene_is_drawn_and_the_reason_told(
+def test_without_pictures_the_scene_is_drawn_and_the_reason_reported(
     rover: Any, view: Callable[..., Any], browser: Any
 ) -> None:
     rover.link.preview_wanted = lambda: False

@@ -60,17 +60,17 @@ def updates(address: str, work: Callable[[aiohttp.ClientWebSocketResponse], Coro
 async def update(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
     """Ask for one, with its picture if there is one."""
     await socket.send_str("next")
-    told: dict[str, Any] = json.loads(await socket.receive_str())
-    if "picture" in told:
-        told["jpeg"] = await socket.receive_bytes()
-    return told
+    latest: dict[str, Any] = json.loads(await socket.receive_str())
+    if "picture" in latest:
+        latest["jpeg"] = await socket.receive_bytes()
+    return latest
 
 
 async def until(socket: aiohttp.ClientWebSocketResponse, known: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
-    told = await update(socket)
-    while not known(told):
-        told = await update(socket)
-    return told
+    latest = await update(socket)
+    while not known(latest):
+        latest = await update(socket)
+    return latest
 
 
 @pytest.fixture(scope="module")
@@ -147,17 +147,17 @@ def test_updates_tell_all_and_pictures_are_drawn_only_meanwhile(seen: tuple[Any,
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
-        first = await until(socket, lambda told: told.get("status"))
+        first = await until(socket, lambda latest: latest.get("status"))
         assert [one["level"] for one in first["status"]] == ["ok", "error", "ok", "ok"]
-        return await until(socket, lambda told: told.get("picture", {}).get("scene"))
+        return await until(socket, lambda latest: latest.get("picture", {}).get("scene"))
 
     rover.wait_for(lambda: rover.unseen > 20)
-    told = updates(served.address, look)
-    assert told["connection"]["presence"] == "there"
-    assert told["connection"]["robots"] == ["rover"]
-    assert len(told["scene"]["circles"]) == 5
-    assert told["jpeg"].startswith(b"\xff\xd8\xff")
-    assert told["picture"]["scene"]["psi"][1]["shape"] == "rect"
+    latest = updates(served.address, look)
+    assert latest["connection"]["presence"] == "there"
+    assert latest["connection"]["robots"] == ["rover"]
+    assert len(latest["scene"]["circles"]) == 5
+    assert latest["jpeg"].startswith(b"\xff\xd8\xff")
+    assert latest["picture"]["scene"]["psi"][1]["shape"] == "rect"
     rover.wait_for(lambda: rover.unseen > 20)  # nobody looks any more
 
 
@@ -165,7 +165,7 @@ def test_a_browser_that_is_slow_gets_the_newest_not_all(seen: tuple[Any, Any]) -
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> None:
-        first = (await until(socket, lambda told: told["scene"]))["scene"]["seq"]
+        first = (await until(socket, lambda latest: latest["scene"]))["scene"]["seq"]
         await asyncio.to_thread(rover.wait_for, lambda: rover.seq > first + 20)
         assert (await update(socket))["scene"]["seq"] > first + 15
 
@@ -248,7 +248,7 @@ def test_the_last_seconds_are_saved_for_independent_readers(seen: tuple[Any, Any
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> None:
-        await until(socket, lambda told: "jpeg" in told and told["scene"]["seq"] > 10)
+        await until(socket, lambda latest: "jpeg" in latest and latest["scene"]["seq"] > 10)
 
     updates(served.address, look)
     answer: Any = ask(served.address, "/save")
@@ -323,7 +323,7 @@ def test_a_signal_ends_it_while_somebody_looks(rover: Any, view: Callable[..., A
     served = view()
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> aiohttp.WSMsgType:
-        await until(socket, lambda told: told["scene"])
+        await until(socket, lambda latest: latest["scene"])
         served.process.send_signal(number)
         return (await socket.receive()).type
 

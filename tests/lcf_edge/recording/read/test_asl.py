@@ -55,9 +55,9 @@ def test_reading_again_gives_the_same(asl: Any) -> None:
     asl.picture(FRAMES[2]).unlink()
     recording = open_recording(asl.path, Config())
     first = [repr(item) for item in recording]
-    told = (list(recording.warnings), dict(recording.skipped))
+    warned = (list(recording.warnings), dict(recording.skipped))
     assert [repr(item) for item in recording] == first
-    assert (recording.warnings, dict(recording.skipped)) == told
+    assert (recording.warnings, dict(recording.skipped)) == warned
 
 
 def test_imu_is_turned_into_the_axes_of_the_camera(asl: Any, read: Read) -> None:
@@ -91,7 +91,7 @@ def test_without_imu_or_odometry(asl: Any, read: Read, sensor: str, missing: str
     assert (not recording.warnings) == (missing == "folder")
 
 
-def test_a_missing_calibration_is_told(asl: Any) -> None:
+def test_a_missing_calibration_is_reported(asl: Any) -> None:
     (asl.path / "mav0" / "cam0" / "sensor.yaml").unlink()
     recording = open_recording(asl.path, Config())
     assert recording.lens is None
@@ -100,7 +100,7 @@ def test_a_missing_calibration_is_told(asl: Any) -> None:
     assert known.warnings == []
 
 
-def test_a_missing_mounting_of_the_imu_is_told(asl: Any) -> None:
+def test_a_missing_mounting_of_the_imu_is_reported(asl: Any) -> None:
     (asl.path / "mav0" / "imu0" / "sensor.yaml").unlink()
     (warning,) = open_recording(asl.path, Config()).warnings
     assert "imu.axes" in warning

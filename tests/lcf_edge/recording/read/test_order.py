@@ -87,7 +87,7 @@ def test_a_long_stream_is_put_in_order_and_little_of_it_is_held() -> None:
     check_delivery(items, kinds=[ImuSample])
 
 
-def test_what_comes_too_late_or_twice_is_told() -> None:
+def test_what_comes_too_late_or_twice_is_reported() -> None:
     late: list[Any] = []
     pictures = [picture(t) for t in range(100, 120)]
     items = list(reorder([*pictures, picture(3), imu(110), imu(110)], late.append))
@@ -108,7 +108,7 @@ def strays(rows: list[int]) -> tuple[list[int], list[int]]:
 
 
 @given(st.lists(st.integers(0, 30)))
-def test_rows_that_are_kept_increase_and_all_others_are_told(rows: list[int]) -> None:
+def test_rows_that_are_kept_increase_and_all_others_are_reported(rows: list[int]) -> None:
     kept, lines = strays(rows)
     assert kept == sorted(set(kept))
     assert sorted(kept + [rows[line] for line in lines]) == sorted(rows)

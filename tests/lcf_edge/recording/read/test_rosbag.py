@@ -316,17 +316,17 @@ def test_topics_that_cannot_be_used_are_not_chosen(bag: Bag, make: Messages, rea
 
 
 @pytest.mark.parametrize(
-    ("frame_id", "told"),
+    ("frame_id", "is_warned_of"),
     [("imu_optical_frame", False), ("camera_optical_frame", False), ("imu_link", True), ("", True)],
 )
-def test_axes_of_an_imu_that_may_not_be_the_cameras_are_told(
-    bag: Bag, make: Messages, frame_id: str, told: bool
+def test_axes_of_an_imu_that_may_not_be_the_cameras_are_reported(
+    bag: Bag, make: Messages, frame_id: str, is_warned_of: bool
 ) -> None:
     bag.add("/camera/camera_info", make.camera_info())
     bag.add("/camera/image", make.image(START_NS, picture(1)))
     bag.add("/imu", make.imu(START_NS, frame_id=frame_id))
     bag.write()
-    assert any("imu.axes" in warning for warning in open_recording(bag.path, Config()).warnings) == told
+    assert any("imu.axes" in warning for warning in open_recording(bag.path, Config()).warnings) == is_warned_of
     turn = Imu(axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     assert open_recording(bag.path, Config(imu=turn)).warnings == []
 
@@ -380,7 +380,7 @@ def test_lens(bag: Bag, make: Messages, model: str, d: tuple[float, ...], expect
     ],
     ids=lambda info: str(info)[:40],
 )
-def test_a_lens_that_cannot_be_is_told_in_one_line_and_not_used(
+def test_a_lens_that_cannot_be_is_reported_in_one_line_and_not_used(
     bag: Bag, make: Messages, read: Read, info: dict[str, Any]
 ) -> None:
     bag.add("/camera/camera_info", make.camera_info(**info))
