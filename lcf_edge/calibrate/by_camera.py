@@ -7,7 +7,7 @@ from lcf_edge.calibrate.axes import axes_result, snapped
 from lcf_edge.calibrate.compare import Watched, watch
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.calibrate.time_offset import guessed, painter
 from lcf_edge.config import Config
 
@@ -15,7 +15,9 @@ _MAX_SIGMA_RAD = np.radians(1.0)
 _MAX_LAG_S = 0.01  # that the configuration does not know of
 
 
-def calibrate_by_camera(source: Source, config: Config, seconds: float | None, snap_rad: float, guide: Guide) -> Result:
+def calibrate_by_camera(
+    source: SensorSource, config: Config, seconds: float | None, snap_rad: float, guide: Guide
+) -> Result:
     """``imu.axes``. Raises ``CalibrationError``."""
     return axes_of(watch(source, config, seconds, guide), config, snap_rad)
 

@@ -12,7 +12,7 @@ from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.calibrate.target import Sighting, Target
 from lcf_edge.calibrate.views import CELLS, Views
 from lcf_edge.lens import Lens
@@ -59,13 +59,13 @@ class Solution:
         return float(np.sqrt((np.concatenate(self.residuals) ** 2).sum(axis=1).mean()))
 
 
-def calibrate_camera(source: Source, board: Target, model: Model, wanted: int, guide: Guide) -> Result:
+def calibrate_camera(source: SensorSource, board: Target, model: Model, wanted: int, guide: Guide) -> Result:
     """Lens by ``wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
     views = collect(source, board, wanted, guide)
     return solve(views, model)
 
 
-def collect(source: Source, board: Target, wanted: int, guide: Guide) -> Views:
+def collect(source: SensorSource, board: Target, wanted: int, guide: Guide) -> Views:
     """Views of the board, with prompts where it should be held."""
     views = Views(board, source.film)
     if source.live:

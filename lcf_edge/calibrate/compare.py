@@ -8,7 +8,7 @@ import numpy.typing as npt
 from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.image_rotation import Turn, turn
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.calibrate.tracks import Tracker
 from lcf_edge.config import Config
 from lcf_edge.lens import Lens
@@ -34,7 +34,7 @@ class Watched:
             self.brisk_s += (turned.end_ns - turned.start_ns) * 1e-9
 
 
-def watch(source: Source, config: Config, seconds: float | None, guide: Guide) -> Watched:
+def watch(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Watched:
     """Everything from ``source``; live for ``seconds``, 20 unless given. Raises what the source raises."""
     if source.live:
         seconds = seconds or LIVE_S
@@ -63,7 +63,7 @@ def watch(source: Source, config: Config, seconds: float | None, guide: Guide) -
     return seen
 
 
-def lens_of(source: Source, config: Config, frame: Frame) -> tuple[Lens, bool]:
+def lens_of(source: SensorSource, config: Config, frame: Frame) -> tuple[Lens, bool]:
     """The lens for ``frame``, and whether it is only guessed."""
     height, width = frame.image.shape
     lens = source.lens(width, height)

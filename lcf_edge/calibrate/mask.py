@@ -16,7 +16,7 @@ from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config
 
 if TYPE_CHECKING:
@@ -69,7 +69,7 @@ class Stillness:
         return np.asarray(along**2 + down**2 > _STILL**2 * self.pictures * self._squares) & self.textured()
 
 
-def calibrate_mask(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``camera.mask`` by what never moves. Raises ``CalibrationError``."""
     if source.live:
         seconds = seconds or LIVE_S
@@ -96,7 +96,7 @@ def calibrate_mask(source: Source, config: Config, seconds: float | None, guide:
     return _result(polygons, image, config, (words,))
 
 
-def given_mask(source: Source, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
+def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
     """``camera.mask`` as given, px of the source's pictures. Raises ``CalibrationError``."""
     image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
     guide.end()

@@ -31,7 +31,7 @@ _MAX_CLOSE_S = 2.0
 _POLL_S = 0.2
 
 
-class Source(Protocol):
+class SensorSource(Protocol):
     """``live``: a person can still do something; ``film``: pictures follow each other closely."""
 
     live: bool

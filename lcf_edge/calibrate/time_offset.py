@@ -10,7 +10,7 @@ from lcf_edge.calibrate.alignment import Alignment, align
 from lcf_edge.calibrate.compare import Watched, watch
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.config import Config
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 _MAX_SIGMA_S = 0.004
 
 
-def calibrate_time(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+def calibrate_time(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``imu.time_offset_s``. Raises ``CalibrationError``."""
     seen = watch(source, config, seconds, guide)
     alignment = align(seen.turns, seen.samples, config.imu.time_offset_s)

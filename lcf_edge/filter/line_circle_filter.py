@@ -445,7 +445,7 @@ class LineCircleFilter:
             omitted=omitted,
             edges_normal=n - rebels,
             edges_rebel=rebels,
-            chains=int(np.count_nonzero(self.edges.links[:n])),
+            chains=int(np.count_nonzero(self.edges.suspect_keys[:n])),
             circles_normal=self.normal.count,
             circles_rebel=self.rebel.count,
             groups=self.groups.count,

@@ -9,9 +9,9 @@ from lcf_edge.cdr import encode_compressed_image
 from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
 from lcf_edge.zenoh_link.session import MAX_MESSAGE_BYTES
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
-PREVIEW = Topic(
+PREVIEW = ZenohTopic(
     "preview/compressed",
     "sensor_msgs/msg/CompressedImage",
     zenoh.Priority.BACKGROUND,

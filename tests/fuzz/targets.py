@@ -39,9 +39,9 @@ from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import Monitor
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.monitor.web.doorkeeper import Doorkeeper
 from lcf_edge.monitor.web.guard import Guard
 from lcf_edge.monitor.web.server import Server
@@ -175,7 +175,7 @@ def messages_of_ros(_: Path) -> Iterator[Take]:
 )
 def what_viewers_receive(_: Path) -> Iterator[Take]:
     """Scenes, diagnostics, previews and their attachments, up to the text for the page."""
-    monitor = Monitor(Source("tcp/127.0.0.1:9"), history=History())
+    monitor = Monitor(DaemonAddress("tcp/127.0.0.1:9"), history=History())
     monitor.want_preview(True)
 
     def take(data: bytes) -> str:
@@ -567,7 +567,7 @@ class _Page:
     async def _serve(self) -> None:
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(lambda _, context: self.complaints.append(str(context)))
-        server, door = Server(Source("tcp/127.0.0.1:9")), Doorkeeper()
+        server, door = Server(DaemonAddress("tcp/127.0.0.1:9")), Doorkeeper()
         runner = web.AppRunner(server.application(Guard("127.0.0.1"), door), access_log=None, shutdown_timeout=0.1)
         await runner.setup()
         assert runner.server is not None

@@ -24,15 +24,15 @@ from lcf_edge.cdr import (
 from lcf_edge.errors import PublishError
 from lcf_edge.messages import Scene
 from lcf_edge.meters import IntervalMeter
-from lcf_edge.monitor.live.history import History, Message
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
+from lcf_edge.monitor.live.history import History, ReceivedMessage
 from lcf_edge.monitor.live.traces import Point, Traces
 from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
 from lcf_edge.zenoh_link.preview import PREVIEW
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
 MAX_ROBOTS = 32  # of one prefix that are told by name; where no rule forbids it, anybody can claim to be some
 MAX_NAME = 64  # characters of one
@@ -107,22 +107,22 @@ class Snapshot:
 
 
 class Monitor:
-    """Subscribes to the daemon of ``source`` in Zenoh's threads, now or as soon as it is there, and again.
+    """Subscribes to the daemon of ``address`` in Zenoh's threads, now or as soon as it is there, and again.
 
     Previews come only while they are wanted (``want_preview``): nobody draws them else. ``changed`` is called in
     those threads whenever something came; it must be quick. ``history`` keeps what came. Raises ``PublishError`` for
-    a source that is none.
+    an address that is none.
     """
 
     def __init__(
         self,
-        source: Source,
+        address: DaemonAddress,
         *,
         history: History | None = None,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self.traces = Traces()
-        self._prefix = source.prefix
+        self._prefix = address.prefix
         self._history = history
         self._changed = changed
         self._lock = threading.RLock()
@@ -139,12 +139,12 @@ class Monitor:
         self._ahead: Ahead | None = None
         self._preview: Any = None
         self._wanting = threading.Lock()
-        self._session = open_session(source.zenoh())
+        self._session = open_session(address.zenoh())
         try:
             self._declare()
         except zenoh.ZError as error:
             self.close()
-            raise PublishError(f"{source.prefix}: {reason(error)}; name another prefix") from error
+            raise PublishError(f"{address.prefix}: {reason(error)}; name another prefix") from error
 
     def snapshot(self) -> Snapshot:
         """The newest of everything."""
@@ -191,13 +191,13 @@ class Monitor:
             ),
         ]
 
-    def _subscribe(self, topic: Topic, take: Callable[[bytes, zenoh.Sample], None]) -> Any:
+    def _subscribe(self, topic: ZenohTopic, take: Callable[[bytes, zenoh.Sample], None]) -> Any:
         def receive(sample: zenoh.Sample) -> None:
             with self._unless_broken():
                 payload = topic.payload(sample)
                 take(payload, sample)
                 if self._history is not None:
-                    self._history.add(Message(topic.name, time.time_ns(), payload))
+                    self._history.add(ReceivedMessage(topic.name, time.time_ns(), payload))
 
         handler: Any = zenoh.handlers.Callback(receive, indirect=False)  # no queue in between
         return self._session.declare_subscriber(topic.key(self._prefix), handler)

@@ -173,7 +173,7 @@ def test_a_region_never_covers_what_breaks_the_flow(crowd: Any, drive: Drive, bo
     omitted = 0
     for _, tables, step in steps(replace(way, frames=30)):
         edges, n = tables.edges, tables.edges.count
-        breaks = edges.rebel[:n] | (edges.links[:n] > 0)
+        breaks = edges.rebel[:n] | (edges.suspect_keys[:n] > 0)
         assert not inside(tables, np.stack([edges.x[:n], edges.y[:n]], axis=1)[breaks]).any()
         circles = tables.rebel
         assert not inside(tables, np.stack([circles.x, circles.y], axis=1)[circles.active]).any()

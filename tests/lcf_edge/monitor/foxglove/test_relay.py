@@ -150,7 +150,7 @@ def test_nonsense_of_clients_is_not_written_down(address: str) -> None:
     ("arguments", "message"),
     [(("--prefix", "a//b"), "name another prefix"), (("--connect", "nowhere"), "nowhere")],
 )
-def test_a_source_that_is_none_is_reported_in_one_line(
+def test_an_address_that_is_none_is_reported_in_one_line(
     capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
 ) -> None:
     assert main(["foxglove", "--port", "0", *arguments]) == 1

@@ -15,9 +15,9 @@ from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.messages import CIRCLE, PSI_REGION, Scene
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import MAX_NAME, MAX_ROBOTS, Ahead, Monitor, Presence, Snapshot
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.zenoh_link import opened_session
 
 PATIENCE_S = 20.0
@@ -30,7 +30,7 @@ class Watched:
     def __init__(self, endpoint: str) -> None:
         self._changed = threading.Condition()
         self.history = History()
-        self.monitor = Monitor(Source(endpoint), history=self.history, changed=self._notify)
+        self.monitor = Monitor(DaemonAddress(endpoint), history=self.history, changed=self._notify)
 
     def _notify(self) -> None:
         with self._changed:
@@ -200,16 +200,16 @@ def test_the_history_has_payloads_as_they_were_sent(watched: Watched) -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "part"),
+    ("address", "part"),
     [
-        (Source("nonsense"), "nonsense"),
-        (Source(NOBODY, prefix="a//b"), "a//b"),
-        (Source(NOBODY, config_file="/no/such.json5"), "/no/such.json5"),
+        (DaemonAddress("nonsense"), "nonsense"),
+        (DaemonAddress(NOBODY, prefix="a//b"), "a//b"),
+        (DaemonAddress(NOBODY, config_file="/no/such.json5"), "/no/such.json5"),
     ],
 )
-def test_a_source_that_is_none_is_refused(source: Source, part: str) -> None:
+def test_an_address_that_is_none_is_refused(address: DaemonAddress, part: str) -> None:
     with pytest.raises(PublishError, match=part):
-        Monitor(source)
+        Monitor(address)
 
 
 def test_tokens_of_another_prefix_are_not_ours(endpoint: str, watched: Watched) -> None:

@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from lcf_edge.cli.command_line import main
 from lcf_edge.daemon.log import AT_ONCE
 from lcf_edge.messages import CIRCLE
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.web import server
 from lcf_edge.monitor.web.doorkeeper import Doorkeeper
 from lcf_edge.monitor.web.guard import Guard
@@ -305,7 +305,7 @@ def test_who_takes_nothing_is_let_go(rover: Any, monkeypatch: pytest.MonkeyPatch
     rover.circles = np.zeros(15_000, CIRCLE)
 
     async def look() -> None:
-        serving = server.Server(Source(rover.endpoint))
+        serving = server.Server(DaemonAddress(rover.endpoint))
         runner = web.AppRunner(serving.application(Guard("127.0.0.1"), Doorkeeper()))
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -444,7 +444,7 @@ def test_a_request_that_ends_just_as_the_server_gives_it_up_is_no_error(
             loop.call_at(up_s - 0.1, time.sleep, 0.3)
             loop.call_at(up_s - 0.05, done.set)
 
-        serving = server.Server(Source(endpoint))
+        serving = server.Server(DaemonAddress(endpoint))
         application = serving.application(Guard("127.0.0.1"), Doorkeeper())
         application.router.add_get("/slow", slow)
         application.on_shutdown.append(stall)
@@ -477,7 +477,7 @@ def test_what_a_stranger_writes_into_the_log_is_short(endpoint: str, serving: An
 
 NOISY = """
 import asyncio, logging, os, signal, sys
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.web.server import serve
 
 def complain(_):
@@ -486,7 +486,7 @@ def complain(_):
             logging.getLogger(name).warning("socket.send() raised exception.")
     os.kill(os.getpid(), signal.SIGTERM)
 
-asyncio.run(serve(Source(sys.argv[1]), "127.0.0.1", 0, complain))
+asyncio.run(serve(DaemonAddress(sys.argv[1]), "127.0.0.1", 0, complain))
 """
 
 
