@@ -25,7 +25,7 @@ import msgspec
 
 from drivers.camera import libcamera_process
 from drivers.camera.luminance import least_stride
-from hil_mocks.v4l2_device import encode, picture
+from hil_mocks.v4l2_device import drawn_image, encode
 
 SENSOR_TIMESTAMP = "SensorTimestamp"
 FULL = (3280, 2464)  # of the sensor, px
@@ -286,7 +286,7 @@ class Camera:
         stream, buffer = self._configuration.stream, request.buffers["stream"]
         stamp_ns = time.monotonic_ns() + round(self._world.stamp_offset_s * 1e9)
         name = libcamera_process.PIXEL_FORMATS[stream.pixel_format]
-        image = picture(number, stream.size.width, stream.size.height)
+        image = drawn_image(number, stream.size.width, stream.size.height)
         data = encode(image, name, self._world.padding)[: buffer.planes[0].length]
         os.pwrite(buffer.descriptor, data, 0)
         buffer.metadata = SimpleNamespace(

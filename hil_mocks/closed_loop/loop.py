@@ -65,10 +65,10 @@ class Log:
     arrived: bool = False
 
 
-def drive(world: World, driver: Driver, *, pictures: bool = True) -> Log:
+def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
     """Let a driver drive through a world until its end, or until the time is over."""
     stage = Stage(world.drawn())
-    renderer = Renderer(stage) if pictures else None
+    renderer = Renderer(stage) if with_images else None
     vehicle, bodies, sensors = Vehicle(world.build, world.course, world.start_mps), Bodies(world), Sensors(world)
     log = Log()
     steps = round(IMU_HZ / world.fps)
@@ -92,7 +92,7 @@ def drive(world: World, driver: Driver, *, pictures: bool = True) -> Log:
         speed_mps, curvature = vehicle.speed_mps, world.course.curvature(vehicle.travelled_m)
         motion = Motion(vehicle.position.copy(), vehicle.axes, speed_mps, vehicle.yaw_rate_radps, curvature)
         known = tuple(exact(stage, view, motion, footprints, bodies.velocity))
-        frame = Frame(stamp_ns(time_s), seq, renderer.picture(view)) if renderer else None
+        frame = Frame(stamp_ns(time_s), seq, renderer.image(view)) if renderer else None
         advance(seq * steps, seq * steps + LATE_STEPS)
         if waits and vehicle.travelled_m >= waits[0][0]:
             rest_s = waits.pop(0)[1]

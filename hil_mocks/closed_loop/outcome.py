@@ -53,11 +53,11 @@ def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
             around = right[max(first - before, 0) : last + after + 1]
             found.append(Braking(first, last, not any(around)))
 
-    for picture, (wanted, cruise) in enumerate(zip(log.wanted_mps, log.cruise_mps, strict=True)):
+    for number, (wanted, cruise) in enumerate(zip(log.wanted_mps, log.cruise_mps, strict=True)):
         if first is None and wanted < _BRAKES * cruise:
-            first = picture
+            first = number
         elif first is not None and wanted >= _DONE * cruise:
-            end(picture - 1)
+            end(number - 1)
             first = None
     end(len(log.wanted_mps) - 1)
     return found

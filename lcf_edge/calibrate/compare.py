@@ -42,25 +42,25 @@ def watch(source: SensorSource, config: Config, seconds: float | None, guide: Gu
             f"Turn it in place for {seconds:g} s: to and fro, nod, tilt, briskly and unevenly, before something still "
             "that is some metres away."
         )
-    seen, tracker = Watched(), None
+    watched, tracker = Watched(), None
     for item in for_a_while(source.items(), seconds, Frame):
         if isinstance(item, ImuSample):
-            seen.samples.append(item)
+            watched.samples.append(item)
             continue
         if tracker is None:
-            lens, seen.guessed = lens_of(source, config, item)
+            lens, watched.guessed = lens_of(source, config, item)
             tracker = Tracker(lens)
         tracks = tracker.add(item)
         if tracks is not None:
-            seen.add(turn(tracks, travel(config)))
+            watched.add(turn(tracks, travel(config)))
         guide.progress(
-            f"{len(seen.turns)} pictures, {len(seen.samples)} samples, {seen.brisk_s:.0f} s of brisk turning"
+            f"{len(watched.turns)} pictures, {len(watched.samples)} samples, {watched.brisk_s:.0f} s of brisk turning"
         )
     guide.end()
     if tracker is not None:
         for reason, count in tracker.left_out.items():
             guide.say(f"left out: {count} intervals, {reason}")
-    return seen
+    return watched
 
 
 def lens_of(source: SensorSource, config: Config, frame: Frame) -> tuple[Lens, bool]:

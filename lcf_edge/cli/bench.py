@@ -158,8 +158,8 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
     compiled = "uncompiled" if uncompiled() else "compiled"
     where = f"{computer.board}, {computer.machine}, {computer.cores} cores"
     short = " ".join(
-        f"{name} {usual:.2f}/{slow:.2f}/{paced_usual:.2f}/{paced_slow:.2f} ms"
-        for name, (usual, slow), (paced_usual, paced_slow) in zip(
+        f"{name} {middle:.2f}/{slow:.2f}/{paced_middle:.2f}/{paced_slow:.2f} ms"
+        for name, (middle, slow), (paced_middle, paced_slow) in zip(
             ("detect", "filter", "whole"), _figures(fast), _figures(paced), strict=True
         )
     )
@@ -177,13 +177,13 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
 
 def _figures(measured: Measured) -> list[tuple[float, float]]:
     """Median and 99th percentile of each stage."""
-    usual, slow = np.percentile(measured.stages_ms, (50, 99), axis=0)
-    return [*zip(usual.tolist(), slow.tolist(), strict=True)]
+    middle, slow = np.percentile(measured.stages_ms, (50, 99), axis=0)
+    return [*zip(middle.tolist(), slow.tolist(), strict=True)]
 
 
 def _stage_times(measured: Measured) -> str:
     stages = ", ".join(
-        f"{name} {usual:.2f} / {slow:.2f}"
-        for name, (usual, slow) in zip(("detect", "filter", "whole"), _figures(measured), strict=True)
+        f"{name} {middle:.2f} / {slow:.2f}"
+        for name, (middle, slow) in zip(("detect", "filter", "whole"), _figures(measured), strict=True)
     )
     return f"{stages} ms (median / 99 %)"

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from lcf_edge.cli.arguments import parser
 from lcf_edge.cli.namesake import namesake
 from lcf_edge.errors import LcfError, UsageError
-from lcf_edge.picture_limit import limit_opencv
+from lcf_edge.image_limit import limit_opencv
 from lcf_edge.printable import printable
 
 if other := namesake("drivers"):

@@ -17,7 +17,7 @@ from lcf_edge.config import bounded_toml
 from lcf_edge.config.endpoint import fault
 from lcf_edge.config.refusal import why
 from lcf_edge.errors import ConfigError
-from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.image_limit import MAX_PIXELS
 from lcf_edge.printable import printable
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
@@ -436,9 +436,9 @@ def _check_lens(camera: Camera, origin: str) -> None:
         raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
         raise ConfigError(f"{origin}: camera.intrinsics: focal lengths must be positive")
-    wanted = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
-    if len(camera.distortion) not in wanted:
-        counts = " or ".join(map(str, wanted))
+    numbers = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
+    if len(camera.distortion) not in numbers:
+        counts = " or ".join(map(str, numbers))
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
 
 

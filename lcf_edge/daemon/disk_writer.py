@@ -14,7 +14,7 @@ from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.recording.write.destination import MIB, Destination, Named, free_mib
-from lcf_edge.recording.write.messages import PICTURES, RecordedMessage
+from lcf_edge.recording.write.messages import IMAGES, RecordedMessage
 from lcf_edge.recording.write.recording_file import CHUNK_BYTES, RecordingFile
 
 SYNC_S = 0.5
@@ -88,7 +88,7 @@ class DiskWriter(threading.Thread):
             return
         self._unsynced += 1
         self.counts["messages"] += 1
-        self.counts["pictures"] += message.topic is PICTURES
+        self.counts["pictures"] += message.topic is IMAGES
 
     def _made_ready(self) -> RecordingFile | None:
         """The file to go on with, a new one if need be; None: the disk does not let us, and is asked again later."""

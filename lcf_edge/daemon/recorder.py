@@ -20,7 +20,7 @@ from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.messages import Kind, PipelineScene, View
 from lcf_edge.recording.write.destination import MIB, Destination
 from lcf_edge.recording.write.messages import (
-    PICTURES,
+    IMAGES,
     Encoder,
     FrameAndScene,
     KnownLens,
@@ -108,7 +108,7 @@ class Recorder(Sink):
         return self._inbox.dropped + self._backlog.dropped + self._disk.counts["lost"]
 
     @property
-    def pictures(self) -> int:
+    def frames(self) -> int:
         """That were written."""
         return self._disk.counts["pictures"]
 
@@ -182,7 +182,7 @@ class Recorder(Sink):
             self._ring.add(message, limit_bytes - self._backlog.bytes)
 
     def _pass_on(self, message: RecordedMessage) -> None:
-        reserve_bytes = round(self._backlog.limit_bytes * _RESERVE) if message.topic is PICTURES else 0
+        reserve_bytes = round(self._backlog.limit_bytes * _RESERVE) if message.topic is IMAGES else 0
         self._backlog.put(message, size_bytes(message), reserve_bytes)
 
 

@@ -229,10 +229,10 @@ class Service:
         if self._ready:
             self._notifier.ready()
 
-    def _take(self, wanted: Config) -> None:
-        """Go on with ``wanted``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
-        config = merged(self._config, wanted)
-        keys, refused = changed(self._config, config), wants_restart(changed(self._config, wanted))
+    def _take(self, requested: Config) -> None:
+        """Go on with ``requested``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
+        config = merged(self._config, requested)
+        keys, refused = changed(self._config, config), wants_restart(changed(self._config, requested))
         check_budget(config)
         if wants_pipeline(keys):
             self._loop.rebuild(config)

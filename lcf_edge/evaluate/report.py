@@ -83,7 +83,7 @@ class Event(msgspec.Struct, frozen=True, array_like=True):
     last: int
 
 
-class PictureRow(msgspec.Struct, frozen=True):
+class ImageRow(msgspec.Struct, frozen=True):
     """A picture of the report, and why it is there. ``file``: below the report's folder."""
 
     seq: int
@@ -108,7 +108,7 @@ class RecordingRow(msgspec.Struct, frozen=True):
     events: list[Event] = []
     warnings: list[str] = []
     differing: int | None = None
-    pictures: list[PictureRow] = []
+    pictures: list[ImageRow] = []
     frames: str = ""  # file below the report's folder
 
 

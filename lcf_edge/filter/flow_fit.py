@@ -158,11 +158,11 @@ def quantile(fit: FlowFit, share: float, turned_px: float, turn_share: float) ->
             rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
             fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
             counted += 1
-    wanted = share * counted
+    rank = share * counted
     below = 0.0
     for b in range(BINS):
-        if below + fit.bins[b] >= wanted:
-            return BIN_PX * (b + (wanted - below) / max(fit.bins[b], 1))
+        if below + fit.bins[b] >= rank:
+            return BIN_PX * (b + (rank - below) / max(fit.bins[b], 1))
         below += fit.bins[b]
     return BIN_PX * BINS
 

@@ -30,7 +30,7 @@ class PreviewPublisher:
         self.counts = self._publisher.counts
 
     @property
-    def wanted(self) -> bool:
+    def has_subscriber(self) -> bool:
         """Somebody subscribes, and the last preview was long enough ago."""
         if self._pause_ns is None:
             return False

@@ -51,7 +51,7 @@ def world(*bodies: Body, **values) -> World:
 
 def ended(drawn: World, driver: Watching, seconds: float = math.inf) -> Log:
     course = Course(min(seconds * drawn.cruise_mps, drawn.course.length_m))
-    return drive(replace(drawn, course=course), driver, pictures=False)
+    return drive(replace(drawn, course=course), driver, with_images=False)
 
 
 def digest(drawn: World) -> str:
@@ -156,7 +156,7 @@ def test_a_leg_waits_for_the_vehicle() -> None:
 def test_the_gyro_shows_how_the_vehicle_turns_and_the_wheels_how_fast_it_is() -> None:
     turning = Course(10.0, ((0.0, 0.2), (10.0, 0.2)))
     driver = Watching(1.0)
-    drive(world(course=turning), driver, pictures=False)
+    drive(world(course=turning), driver, with_images=False)
     samples = [sample for moment in driver.moments[60:] for sample in moment.samples]
     yaw = [sample.gyro[1] for sample in samples if isinstance(sample, ImuSample)]
     wheels = [(sample.speed_mps, sample.yaw_rate_radps) for sample in samples if isinstance(sample, SpeedSample)]

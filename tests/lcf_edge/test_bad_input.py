@@ -93,7 +93,7 @@ class Drive:
     root: Path
     rows: dict[str, list[str]] = field(default_factory=dict)
 
-    def picture(self, seq: int) -> Path:
+    def image_path(self, seq: int) -> Path:
         return self.root / "mav0/cam0/data" / self.rows["cam0"][1 + seq].split(",")[1]
 
     def csv(self, sensor: str) -> Path:
@@ -117,15 +117,15 @@ def items(approach: Callable[..., Any]) -> list[Any]:
 @pytest.fixture(scope="module")
 def good_drive(items: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Drive:
     drive = Drive(tmp_path_factory.mktemp("good"))
-    pictures = drive.root / "mav0/cam0/data"
-    pictures.mkdir(parents=True)
+    images_folder = drive.root / "mav0/cam0/data"
+    images_folder.mkdir(parents=True)
     rows = drive.rows
     rows["cam0"] = ["#timestamp [ns],filename"]
     rows["imu0"] = ["#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z"]
     rows["odom0"] = ["#timestamp [ns],v_x [m s^-1],w_z [rad s^-1]"]
     for item in items:
         if isinstance(item, Frame):
-            cv2.imwrite(str(pictures / f"{item.stamp_ns}.png"), item.image)
+            cv2.imwrite(str(images_folder / f"{item.stamp_ns}.png"), item.image)
             rows["cam0"].append(f"{item.stamp_ns},{item.stamp_ns}.png")
         elif isinstance(item, ImuSample):
             rows["imu0"].append(",".join(map(str, (item.stamp_ns, *item.gyro, *item.accel))))
@@ -167,7 +167,7 @@ def test_an_empty_folder(replay: Callable[..., Replayed], tmp_path: Path) -> Non
 
 def test_no_picture_that_can_be_read(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in range(FRAMES):
-        drive.picture(seq).write_bytes(b"")
+        drive.image_path(seq).write_bytes(b"")
     done = replay(drive.root)
     assert (done.status, done.lines) == (1, [])
     assert f"{drive.root}: not one picture could be read ({FRAMES} times: picture empty)" in done.error
@@ -195,7 +195,7 @@ def test_a_configuration_that_does_not_fit(
 
 
 def test_a_truncated_png(replay: Callable[..., Replayed], drive: Drive) -> None:
-    victim = drive.picture(4)
+    victim = drive.image_path(4)
     victim.write_bytes(victim.read_bytes()[:2000])
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(4))
@@ -205,17 +205,17 @@ def test_a_truncated_png(replay: Callable[..., Replayed], drive: Drive) -> None:
 
 def test_pictures_that_change_size(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in (3, 7):
-        image = cv2.imread(str(drive.picture(seq)), cv2.IMREAD_GRAYSCALE)
+        image = cv2.imread(str(drive.image_path(seq)), cv2.IMREAD_GRAYSCALE)
         assert image is not None
-        cv2.imwrite(str(drive.picture(seq)), cv2.resize(image, (160, 120)))
+        cv2.imwrite(str(drive.image_path(seq)), cv2.resize(image, (160, 120)))
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(3, 7))
-    assert done.warned_of(str(drive.picture(3)), "another size")
+    assert done.warned_of(str(drive.image_path(3)), "another size")
     assert done.skipped == {"picture of another size than the first": 2}
 
 
 def test_a_picture_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
-    cv2.imwrite(str(drive.picture(5)), np.full((240, 320), 128, np.uint8))
+    cv2.imwrite(str(drive.image_path(5)), np.full((240, 320), 128, np.uint8))
     done = replay(drive.root)
     assert (done.status, done.warnings, done.sequence) == (0, [], without())
     assert "no corners: 1" in done.summary["notes"]
@@ -379,10 +379,10 @@ def test_a_truncated_mcap(replay: Callable[..., Replayed], items: list[Any], tmp
 
 def test_all_of_it_in_one_recording(replay: Callable[..., Replayed], drive: Drive, tmp_path: Path) -> None:
     (drive.root / "mav0/cam0/sensor.yaml").unlink()
-    drive.picture(1).write_bytes(drive.picture(1).read_bytes()[:-500])
-    cv2.imwrite(str(drive.picture(3)), np.zeros((10, 10), np.uint8))
-    cv2.imwrite(str(drive.picture(5)), np.zeros((240, 320), np.uint8))
-    drive.picture(8).unlink()
+    drive.image_path(1).write_bytes(drive.image_path(1).read_bytes()[:-500])
+    cv2.imwrite(str(drive.image_path(3)), np.zeros((10, 10), np.uint8))
+    cv2.imwrite(str(drive.image_path(5)), np.zeros((240, 320), np.uint8))
+    drive.image_path(8).unlink()
     drive.change("imu0", 5, "garbage")
     drive.change("odom0", 5, "1,nan,0")
     video = tmp_path / "overlay.webm"

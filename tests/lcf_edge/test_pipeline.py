@@ -21,7 +21,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.messages import Kind, Scene, Sizes, View
 from lcf_edge.pipeline import Pipeline, run
 from lcf_edge.recording.read import Recording
-from lcf_edge.recording.read.recording import Picture
+from lcf_edge.recording.read.recording import UndecodedFrame
 
 Grey = npt.NDArray[np.uint8]
 Item = Frame | ImuSample | SpeedSample
@@ -141,7 +141,7 @@ class Recorded(Recording):
         for item in self._recorded:
             if isinstance(item, Frame):
                 image = item.image
-                yield Picture(item.stamp_ns, str(item.seq), lambda image=image: image)
+                yield UndecodedFrame(item.stamp_ns, str(item.seq), lambda image=image: image)
             else:
                 yield item
 
@@ -396,13 +396,13 @@ def test_repeated_and_earlier_stamps_do_no_harm(approach: Approach) -> None:
     assert len(seen) == 13
 
 
-PICTURES = st.sampled_from(("wall", "noise", "black", "half"))
+IMAGE_KINDS = st.sampled_from(("wall", "noise", "black", "half"))
 STEPS_NS = st.sampled_from((0, 1, 10**6, 33 * 10**6, 5 * 10**7, 10**9, 10**11, -(10**8)))
 
 
 @settings(max_examples=25, phases=(Phase.explicit, Phase.generate))  # to shrink a drive takes minutes
 @given(
-    plan=st.lists(st.tuples(PICTURES, STEPS_NS), min_size=2, max_size=12),
+    plan=st.lists(st.tuples(IMAGE_KINDS, STEPS_NS), min_size=2, max_size=12),
     lens=st.sampled_from(sorted(LENSES)),
     memory=st.sampled_from((Memory(), SMALL)),
     rates=st.lists(st.floats(-3, 3), min_size=3, max_size=3),
@@ -429,7 +429,7 @@ def test_whatever_comes_in_the_outcome_is_in_order(
     pipeline = Pipeline(config, LENSES[lens])
     stamp_ns = 10**12
     for seq, (kind, step_ns) in enumerate(plan):
-        image = drive.picture(seq) if kind != "noise" else noise(seq, 320, 240)
+        image = drive.image(seq) if kind != "noise" else noise(seq, 320, 240)
         if kind in ("black", "half"):
             image[:, : 320 if kind == "black" else 160] = 0
         stamp_ns += step_ns

@@ -190,7 +190,7 @@ class Server:
 
     async def _want_preview(self) -> None:
         async with self._wanting:
-            await asyncio.to_thread(self._monitor.want_preview, bool(self._sockets))
+            await asyncio.to_thread(self._monitor.switch_preview, bool(self._sockets))
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         if self._saving >= MAX_SAVES_AT_ONCE:

@@ -11,11 +11,11 @@ from lcf_edge import cdr
 from lcf_edge.config import Config
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
 from lcf_edge.lens import Lens
-from lcf_edge.recording.read.decoding import RAW_ENCODINGS, decode_picture, raw_picture
+from lcf_edge.recording.read.decoding import RAW_ENCODINGS, image_from_bytes, image_from_message
 from lcf_edge.recording.read.distortion import distortion
+from lcf_edge.recording.read.images import natural_order
 from lcf_edge.recording.read.mcap_file import McapFile, McapMessage, McapTopic
-from lcf_edge.recording.read.pictures import natural_order
-from lcf_edge.recording.read.recording import MAX_STAMP_NS, Picture, Recording, Sample, reorder
+from lcf_edge.recording.read.recording import MAX_STAMP_NS, Recording, Sample, UndecodedFrame, reorder
 
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
@@ -65,10 +65,10 @@ class RosBag(Recording):
         if imu and not config.imu.axes:
             self._check_axes(image, imu)
 
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         return reorder(self._stamped(), self._late)
 
-    def _stamped(self) -> Iterator[Picture | Sample]:
+    def _stamped(self) -> Iterator[UndecodedFrame | Sample]:
         for message in self._messages():
             if (kind := self._kinds.get(message.topic)) is None:
                 continue
@@ -80,8 +80,8 @@ class RosBag(Recording):
             except cdr.CdrError:
                 self._skip(f"{kind} message malformed", where)
 
-    def _late(self, item: Picture | Sample) -> None:
-        kind = {Picture: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
+    def _late(self, item: UndecodedFrame | Sample) -> None:
+        kind = {UndecodedFrame: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
         self._skip(f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s")
 
     def _open_files(self) -> list[McapFile]:
@@ -182,15 +182,17 @@ def _is_usable(topic: McapTopic, first: bytes) -> bool:
     return True
 
 
-def _parse(message: McapMessage, where: str) -> Picture | Sample:
+def _parse(message: McapMessage, where: str) -> UndecodedFrame | Sample:
     """Raises ``CdrError`` or ``_MessageError``."""
     match message.topic.schema:
         case schema if schema == IMAGE:
             image = cdr.decode_image(message.data)
-            return Picture(_stamp_ns(image.header, message), where, partial(raw_picture, image))
+            return UndecodedFrame(_stamp_ns(image.header, message), where, partial(image_from_message, image))
         case schema if schema == COMPRESSED_IMAGE:
             compressed = cdr.decode_compressed_image(message.data)
-            return Picture(_stamp_ns(compressed.header, message), where, partial(decode_picture, compressed.data))
+            return UndecodedFrame(
+                _stamp_ns(compressed.header, message), where, partial(image_from_bytes, compressed.data)
+            )
         case schema if schema == IMU:
             imu = cdr.decode_imu(message.data)
             if imu.gyro is None or imu.accel is None:

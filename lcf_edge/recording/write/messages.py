@@ -42,7 +42,7 @@ class RecordedTopic(NamedTuple):
         return f"/{self.name}" if self.is_global else f"/{prefix}/{self.name}"
 
 
-PICTURES = RecordedTopic("camera/image_raw/compressed", "sensor_msgs/msg/CompressedImage")
+IMAGES = RecordedTopic("camera/image_raw/compressed", "sensor_msgs/msg/CompressedImage")
 CAMERA_INFO = RecordedTopic("camera/camera_info", "sensor_msgs/msg/CameraInfo")
 IMU = RecordedTopic("imu", "sensor_msgs/msg/Imu")
 SPEED = RecordedTopic("speed", "geometry_msgs/msg/TwistStamped")
@@ -52,7 +52,7 @@ MARKERS = RecordedTopic("markers", markers.MESSAGE, is_stamped=False)
 TRANSFORM = RecordedTopic("tf_static", camera_transform.MESSAGE, is_global=True, is_stamped=False, is_lasting=True)
 DIAGNOSTICS = RecordedTopic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 
-TOPICS = (PICTURES, CAMERA_INFO, IMU, SPEED, SCENE, ANNOTATIONS, MARKERS, TRANSFORM, DIAGNOSTICS)
+TOPICS = (IMAGES, CAMERA_INFO, IMU, SPEED, SCENE, ANNOTATIONS, MARKERS, TRANSFORM, DIAGNOSTICS)
 
 
 @dataclass(frozen=True, slots=True)
@@ -100,7 +100,7 @@ class Encoder:
                 yield RecordedMessage(
                     CAMERA_INFO, frame.stamp_ns, self._camera_info(scene.image_width, scene.image_height)
                 )
-                yield RecordedMessage(PICTURES, frame.stamp_ns, self._picture(frame))
+                yield RecordedMessage(IMAGES, frame.stamp_ns, self._image(frame))
                 yield RecordedMessage(SCENE, frame.stamp_ns, cdr.encode_scene(scene, publish.frame_id))
                 yield RecordedMessage(ANNOTATIONS, frame.stamp_ns, encode_image_annotations(scene))
                 setup = self._setup(scene.image_width, scene.image_height)
@@ -119,7 +119,7 @@ class Encoder:
                 place = Setup.from_config(self.config, Lens.from_config(camera, camera.width, camera.height))
                 yield RecordedMessage(TRANSFORM, stamp_ns, encode_camera_transform(0, place))
 
-    def _picture(self, frame: Frame) -> bytes:
+    def _image(self, frame: Frame) -> bytes:
         record = self.config.record
         flags = {
             "jpeg": (cv2.IMWRITE_JPEG_QUALITY, record.jpeg_quality),

@@ -31,7 +31,7 @@ from drivers.errors import (
 )
 from drivers.samples import Frame
 from hil_mocks.libcamera_device import MODES, World, command
-from hil_mocks.v4l2_device import picture
+from hil_mocks.v4l2_device import drawn_image
 
 SIZE = {"width": 160, "height": 120, "fps": 30.0}
 
@@ -80,7 +80,7 @@ class TestPictures:
     def test_luminance_arrives_as_the_camera_saw_it(self, open_camera: Open, offered: str, padding: int) -> None:
         camera = open_camera(World(formats=(offered,), padding=padding))
         for frame in take(camera, 3):
-            assert np.array_equal(frame.image, picture(frame.seq, 160, 120))
+            assert np.array_equal(frame.image, drawn_image(frame.seq, 160, 120))
 
     def test_the_cheapest_format_is_taken(self, open_camera: Open) -> None:
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420"))).mode.pixel_format == "YU12"

@@ -25,7 +25,7 @@ from drivers.errors import (
     WrongDeviceError,
 )
 from drivers.samples import Frame
-from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel, picture
+from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel, drawn_image
 from hil_mocks.virtual_clock import VirtualClock
 
 PATH = "/dev/video0"
@@ -106,16 +106,16 @@ class TestPictures:
         webcam.modes = {pixel_format: {(640, 480): (30.0,)}}
         webcam.row_padding = 64 * (pixel_format != "NV12")
         first, second = take(open_camera(pixel_format=pixel_format), 2)
-        assert np.array_equal(first.image, picture(0, 640, 480))
-        assert np.array_equal(second.image, picture(1, 640, 480))
+        assert np.array_equal(first.image, drawn_image(0, 640, 480))
+        assert np.array_equal(second.image, drawn_image(1, 640, 480))
 
     def test_jpegs_are_decoded(self, open_camera: Open) -> None:
         frame = take(open_camera(pixel_format="MJPG"), 1)[0]
-        assert np.abs(frame.image.astype(int) - picture(0, 640, 480)).max() < 10
+        assert np.abs(frame.image.astype(int) - drawn_image(0, 640, 480)).max() < 10
 
     def test_a_picture_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         frames = take(open_camera(), 2 * BUFFERS)
-        assert all(np.array_equal(frame.image, picture(n, 640, 480)) for n, frame in enumerate(frames))
+        assert all(np.array_equal(frame.image, drawn_image(n, 640, 480)) for n, frame in enumerate(frames))
 
     def test_stamps_are_the_kernels_and_numbers_count_without_gaps(
         self, open_camera: Open, clock: VirtualClock
@@ -190,11 +190,11 @@ class TestMultiPlanar:
         camera = open_camera()
         assert camera.mode.pixel_format == "NM12"
         for number, frame in enumerate(take(camera, 6)):
-            assert np.array_equal(frame.image, picture(number, 640, 480))
+            assert np.array_equal(frame.image, drawn_image(number, 640, 480))
 
     def test_formats_in_one_memory_are_read_as_well(self, open_camera: Open) -> None:
         frame = take(open_camera(pixel_format="YUYV"), 1)[0]
-        assert np.array_equal(frame.image, picture(0, 640, 480))
+        assert np.array_equal(frame.image, drawn_image(0, 640, 480))
 
     def test_half_a_picture_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.short = 1
@@ -242,7 +242,7 @@ class TestNewest:
         clock.sleep_s(5.0)
         (frame,) = take(camera, 1)
         exposed = round((clock.monotonic_ns() - VirtualClock().monotonic_ns()) * 30 / 1e9 - webcam.transfer)
-        assert np.array_equal(frame.image, picture(exposed, 640, 480))
+        assert np.array_equal(frame.image, drawn_image(exposed, 640, 480))
 
     def test_being_away_is_not_a_stall(self, open_camera: Open, clock: VirtualClock) -> None:
         camera = open_camera()
@@ -324,7 +324,7 @@ class TestBadPictures:
     def test_what_the_kernel_flags_is_corrupt(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera()
         webcam.flag_error = 2
-        assert np.array_equal(take(camera, 1)[0].image, picture(2, 640, 480))
+        assert np.array_equal(take(camera, 1)[0].image, drawn_image(2, 640, 480))
         assert counted(camera) == {"corrupt": 2}
 
     @pytest.mark.parametrize(("pixel_format", "reason"), [("YUYV", "short"), ("MJPG", "corrupt")])
@@ -339,7 +339,7 @@ class TestBadPictures:
     def test_a_picture_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera(pixel_format="MJPG")
         take(camera, 1)
-        webcam.pictures = lambda seq, _width, _height: picture(seq, 320, 240)
+        webcam.images = lambda seq, _width, _height: drawn_image(seq, 320, 240)
         assert camera.read() == []
         assert counted(camera) == {"wrong size": 1}
 
@@ -375,7 +375,7 @@ class TestSettings:
         camera = open_camera(width=640, height=480)
         assert (camera.mode.pixel_format, camera.mode.reduction) == ("MJPG", reduction)
         image = take(camera, 1)[0].image
-        assert np.abs(image.astype(int) - picture(0, 640, 480)).max() < 8
+        assert np.abs(image.astype(int) - drawn_image(0, 640, 480)).max() < 8
 
     def test_a_jpeg_that_is_no_multiple_is_not_bent_to_fit(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.modes = {"MJPG": {(1280, 720): (30.0,)}}

@@ -86,7 +86,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return scenes.write(drive, tmp_path_factory.mktemp("drive"))
 
 
-def pictures(video: Path) -> Iterator[tuple[int, ...]]:
+def frame_shapes(video: Path) -> Iterator[tuple[int, ...]]:
     capture = cv2.VideoCapture(str(video))
     while (got := capture.read())[0]:
         yield got[1].shape
@@ -253,14 +253,14 @@ def test_the_video_has_two_panels_and_every_frame(
     replayed: tuple[Done, Path],
 ) -> None:
     video = replayed[1] / "overlay.webm"
-    assert list(pictures(video)) == [(240, 640, 3)] * FRAMES
+    assert list(frame_shapes(video)) == [(240, 640, 3)] * FRAMES
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
 
 
 def test_the_plot_is_a_picture(replayed: tuple[Done, Path]) -> None:
-    picture = cv2.imread(str(replayed[1] / "sizes.png"))
-    assert picture is not None
-    assert picture.std() > 10
+    image = cv2.imread(str(replayed[1] / "sizes.png"))
+    assert image is not None
+    assert image.std() > 10
 
 
 def without_timing(line: bytes) -> dict[str, object]:
@@ -570,9 +570,9 @@ def test_the_demo_goes_the_whole_way(shown: tuple[Done, Path]) -> None:
     assert len(lines) == 20
     assert "received 20 of 20 scenes in the second process" in done.stdout
     assert ", 0 broken" in done.stdout
-    assert len(list(pictures(folder / "overlay.webm"))) == 20
-    for picture in (folder / "sizes.png", folder / "picture-1.png"):
-        assert cv2.imread(str(picture)) is not None
+    assert len(list(frame_shapes(folder / "overlay.webm"))) == 20
+    for image in (folder / "sizes.png", folder / "picture-1.png"):
+        assert cv2.imread(str(image)) is not None
     memory = re.search(r"memory +(\d+) MiB", done.stdout)
     assert memory
     assert 20 < int(memory[1]) < 400

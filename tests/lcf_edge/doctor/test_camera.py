@@ -45,7 +45,7 @@ def plain(grey: int) -> Callable[[int, int, int], Grey]:
 
 @pytest.fixture
 def webcam() -> MockCamera:
-    return MockCamera(pictures=lambda _, width, height: drawn(width, height))
+    return MockCamera(images=lambda _, width, height: drawn(width, height))
 
 
 @pytest.fixture
@@ -227,7 +227,7 @@ def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera)
 
 @pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "burnt out")])
 def test_a_picture_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
-    webcam.pictures = plain(grey)
+    webcam.images = plain(grey)
     found = one(look(), Severity.WARN)
     assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")
 

@@ -267,7 +267,7 @@ class TestBias:
         assert about(ego.bias, BIAS)
         np.testing.assert_allclose(ego.bias.mean_radps, BIAS, atol=2e-3)
 
-    @pytest.mark.parametrize("rest_by", ["odometry", "picture"])
+    @pytest.mark.parametrize("rest_by", ["odometry", "image"])
     @pytest.mark.parametrize("bias", [BIAS, (0.35, -0.35, 0.35)], ids=["small", "20 degrees a second"])
     def test_is_learnt_at_rest_although_motors_shake_the_vehicle(
         self, rest_by: str, bias: tuple[float, float, float]
@@ -282,7 +282,7 @@ class TestBias:
             )
             if rest_by == "odometry":
                 ego.add_speed(SpeedSample(ns(t), 0.0, 0.0))
-            motion = ego.advance(ns(t + 0.045), still=t > 0.5 if rest_by == "picture" else None)
+            motion = ego.advance(ns(t + 0.045), still=t > 0.5 if rest_by == "image" else None)
         assert about(ego.bias, bias)
         assert ego.bias.known
         assert motion.speed_mps == 0.0
@@ -381,7 +381,7 @@ class TestBrokenGyro:
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(1.4))
         assert "no imu" in ego.advance(ns(1.5)).notes
-        motion = ego.see_picture(np.array([0.0, -0.06, 0.0]), np.full(3, 0.002))
+        motion = ego.add_image_rotation(np.array([0.0, -0.06, 0.0]), np.full(3, 0.002))
         assert "rotation from pictures" in motion.notes
         np.testing.assert_allclose(motion.rotation, turned_by((0.0, 0.06, 0.0)), atol=1e-3)
         assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.1)
@@ -392,7 +392,7 @@ class TestBrokenGyro:
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(0.5))
         rest_by = ego.advance(ns(0.55))
-        seen = ego.see_picture(np.array([0.0, 0.08, 0.0]), np.full(3, 0.002))
+        seen = ego.add_image_rotation(np.array([0.0, 0.08, 0.0]), np.full(3, 0.002))
         np.testing.assert_array_equal(seen.rotation, rest_by.rotation)
         assert ego.bias.known
 
@@ -402,7 +402,7 @@ class TestBrokenGyro:
         ego.advance(ns(0.5))
         for t in 0.5 + np.arange(1, 30) * 0.05:
             ego.advance(ns(t))
-            ego.see_picture(np.array([0.0, -0.045, 0.0]), np.full(3, 0.002))  # 0.9 rad/s: the bias is -0.3
+            ego.add_image_rotation(np.array([0.0, -0.045, 0.0]), np.full(3, 0.002))  # 0.9 rad/s: the bias is -0.3
         assert ego.bias.mean_radps[1] == pytest.approx(-0.3, abs=0.02)
 
 

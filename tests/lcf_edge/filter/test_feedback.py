@@ -99,7 +99,7 @@ def test_nothing_on_the_path_is_omitted_however_far(crowd: Any, drive: Drive, bo
     way = crowd + far
     seen = range(len(crowd.points_m), len(way.points_m))
     for seq, tables, _ in steps(way):
-        assert not inside(tables, way.in_picture(seq)[seen]).any()
+        assert not inside(tables, way.in_image(seq)[seen]).any()
 
 
 def test_a_wide_vehicle_omits_less(crowd: Any) -> None:
@@ -125,7 +125,7 @@ def test_a_region_goes_along_with_what_it_was_written_on(crowd: Any, psi_at: Cal
     held: dict[int, npt.NDArray[np.intp]] = {}
     compared = 0
     for seq, tables, _ in steps(crowd):
-        at = crowd.in_picture(seq)
+        at = crowd.in_image(seq)
         holder = psi_at(tables.psi, *at.T)
         for number, row in ids(tables).items():
             before = held.setdefault(number, np.flatnonzero(holder == row))

@@ -17,8 +17,8 @@ CONFIG = Config(vehicle=VEHICLE)
 def driven(board: Board, config: Config = CONFIG) -> list[LineCircleFilter]:
     """The filter after the drive, once for each frame in which it told of a rebel circle; the last one always."""
     tables, reported = LineCircleFilter(config, LENS), []
-    for corners, motion, picture in board:
-        tables.step(corners, motion, picture)
+    for corners, motion, image in board:
+        tables.step(corners, motion, image)
         if (tables.rebel.active & (tables.rebel.trust >= config.filter.tr_s)).any():
             reported.append(tables)
     return reported
@@ -33,8 +33,8 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
     assert not driven(board, without_patches(CONFIG))
     tables = LineCircleFilter(CONFIG, LENS)
     ranges_m = []
-    for seq, (corners, motion, picture) in enumerate(board):
-        tables.step(corners, motion, picture)
+    for seq, (corners, motion, image) in enumerate(board):
+        tables.step(corners, motion, image)
         rebel = tables.rebel
         for c in np.flatnonzero(rebel.active & (rebel.trust >= 3)):
             assert rebel.cause[c] == Cause.INCOMING
@@ -48,8 +48,8 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
 def test_it_is_an_object_that_stands() -> None:
     tables = LineCircleFilter(CONFIG, LENS)
     reported = 0
-    for corners, motion, picture in Board():
-        tables.step(corners, motion, picture)
+    for corners, motion, image in Board():
+        tables.step(corners, motion, image)
         reported += int((tables.objects.active & (tables.objects.trust >= 3)).any())
     assert reported > 5
 

@@ -73,7 +73,7 @@ class Watched:
 
     def place(self, seq: int) -> npt.NDArray[np.float32]:
         """(2, n) px."""
-        at = self.drive.in_picture(seq).T
+        at = self.drive.in_image(seq).T
         return np.asarray(np.rint(at) if self.rounded else at, np.float32)
 
     def judged(self, edges: EdgeTable, baselines: Baselines, slot: int) -> Verdicts:

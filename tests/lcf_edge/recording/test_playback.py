@@ -275,8 +275,8 @@ class TestRefusals:
 
     def test_pictures_that_cannot_be_read(self, recording: Path, clock: VirtualClock) -> None:
         camera = RecordedCamera(recording, Config(), clock)
-        for picture in (recording / "mav0/cam0/data").iterdir():
-            picture.write_bytes(b"no picture")
+        for image_path in (recording / "mav0/cam0/data").iterdir():
+            image_path.write_bytes(b"no picture")
         with pytest.raises(DeviceLostError, match="not one picture"):
             camera.read()
         camera.close()

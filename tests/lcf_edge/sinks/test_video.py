@@ -29,10 +29,10 @@ def test_the_video_holds_every_frame(tmp_path: Path, suffix: str, odd: int) -> N
     path = filmed(tmp_path / f"overlay{suffix}", 48 + odd, 128 + odd)
     capture = cv2.VideoCapture(str(path))
     assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(29.97, abs=0.01)
-    pictures = [frame for got, frame in iter(capture.read, (False, None)) if got]
+    frames = [frame for got, frame in iter(capture.read, (False, None)) if got]
     capture.release()
-    assert [frame.shape for frame in pictures] == [(48, 128, 3)] * 12
-    assert [frame.mean() for frame in pictures] == pytest.approx(GREYS, abs=4)
+    assert [frame.shape for frame in frames] == [(48, 128, 3)] * 12
+    assert [frame.mean() for frame in frames] == pytest.approx(GREYS, abs=4)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)

@@ -113,7 +113,7 @@ def test_a_link_without_a_session_loses_what_is_put_and_counts_it(endpoint: str,
     assert not link.renew()
     assert not link.renew()
     link.put_scene(scene())
-    assert not link.preview_wanted()
+    assert not link.has_preview_subscriber()
     assert link.take_speeds() == []
     assert link.counts == {"scene failed": 1, "renewals failed": 2}
     link.close()

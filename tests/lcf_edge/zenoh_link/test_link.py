@@ -113,13 +113,13 @@ def test_a_preview_is_wanted_only_while_somebody_looks(session: zenoh.Session, p
 
     publisher = session.declare_publisher("lcf/preview/compressed")
     with publisher.declare_matching_listener(tell):
-        assert not link.preview_wanted()
+        assert not link.has_preview_subscriber()
         peer.subscribe("lcf/preview/*")
         assert looking.wait(PATIENCE_S)
-        assert link.preview_wanted()
+        assert link.has_preview_subscriber()
         peer.end()
         assert gone.wait(PATIENCE_S)
-        assert not link.preview_wanted()
+        assert not link.has_preview_subscriber()
     link.close()
 
 
@@ -139,7 +139,7 @@ def test_previews_keep_to_their_rate(
     until_matched(session, "lcf/preview/compressed")
     wanted = 0
     for _ in range(10):  # 18 ms
-        if link.preview_wanted():
+        if link.has_preview_subscriber():
             wanted += 1
             link.put_preview(JPEG, STAMP_NS)
         now_ns += 2_000_000
@@ -220,7 +220,7 @@ def test_after_the_end_nothing_is_raised_and_everything_counted(
     link.put_scene(scene())
     link.put_diagnostics(STATUS, STAMP_NS)
     link.put_preview(JPEG, STAMP_NS)
-    assert not link.preview_wanted()
+    assert not link.has_preview_subscriber()
     assert link.take_speeds() == []
     assert link.counts == {"scene sent": 1, "scene failed": 1, "diagnostics failed": 1, "preview failed": 1}
     link.close()

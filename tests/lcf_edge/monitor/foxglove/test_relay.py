@@ -112,7 +112,7 @@ def test_clients_that_take_nothing_do_not_fill_its_memory(endpoint: str) -> None
         )
         wanted_by_somebody = threading.Event()
         listener = publisher.declare_matching_listener(lambda _: wanted_by_somebody.set())
-        picture = encode_compressed_image(1, "camera", "jpeg", bytes(100_000))
+        preview = encode_compressed_image(1, "camera", "jpeg", bytes(100_000))
 
         async def look_away() -> float:
             async with aiohttp.ClientSession() as client:
@@ -123,7 +123,7 @@ def test_clients_that_take_nothing_do_not_fill_its_memory(endpoint: str) -> None
                     await socket.send_str(json.dumps(wanted))
                 assert await asyncio.to_thread(wanted_by_somebody.wait, PATIENCE_S)
                 before_mib = resident_mib(process.pid)
-                await asyncio.to_thread(lambda: [publisher.put(picture) for _ in range(1500)])
+                await asyncio.to_thread(lambda: [publisher.put(preview) for _ in range(1500)])
                 return resident_mib(process.pid) - before_mib
 
         assert (

@@ -9,13 +9,13 @@ from lcf_edge.monitor.live.traces import Point, Traces
 SECOND_NS = 10**9
 
 arrivals = st.lists(
-    st.tuples(st.sampled_from(["scene", "picture"]), st.integers(0, 3 * SECOND_NS), st.integers(0, 60)), max_size=60
+    st.tuples(st.sampled_from(["scene", "preview"]), st.integers(0, 3 * SECOND_NS), st.integers(0, 60)), max_size=60
 )
 
 
 @given(arrivals)
 def test_it_holds_what_came_within_its_length_and_its_bytes(came: list[tuple[str, int, int]]) -> None:
-    limits = {"scene": 100, "picture": 200}
+    limits = {"scene": 100, "preview": 200}
     history = History(5.0, limits)
     now_ns, sent = 0, []
     for topic, pause_ns, size in came:

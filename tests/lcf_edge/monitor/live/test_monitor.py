@@ -109,15 +109,15 @@ def test_an_answer_that_is_no_configuration_leaves_it_unknown(endpoint: str, ans
 def test_pictures_come_only_while_they_are_wanted_and_with_their_scene(rover: Any, watched: Watched) -> None:
     watched.until(lambda known: known.scene)
     assert rover.previews == 0
-    watched.monitor.want_preview(True)
-    snapshot = watched.until(lambda known: known.picture and known.picture.scene)
-    assert snapshot.picture
-    assert bytes(snapshot.picture.image.data[:3]) == b"\xff\xd8\xff"  # JPEG
-    assert snapshot.picture.scene
-    assert snapshot.picture.scene.stamp_ns == snapshot.picture.image.header.stamp_ns
-    watched.monitor.want_preview(False)
+    watched.monitor.switch_preview(True)
+    snapshot = watched.until(lambda known: known.preview and known.preview.scene)
+    assert snapshot.preview
+    assert bytes(snapshot.preview.image.data[:3]) == b"\xff\xd8\xff"  # JPEG
+    assert snapshot.preview.scene
+    assert snapshot.preview.scene.stamp_ns == snapshot.preview.image.header.stamp_ns
+    watched.monitor.switch_preview(False)
     rover.wait_for(lambda: rover.unseen > 20)  # one in four would be due
-    assert watched.monitor.snapshot().picture is None
+    assert watched.monitor.snapshot().preview is None
 
 
 def test_who_claims_to_be_many_rovers_does_not_fill_its_memory(endpoint: str) -> None:
@@ -156,7 +156,7 @@ def test_nobody_there_yet(watched: Watched) -> None:
 def test_what_is_no_message_is_counted_and_not_kept(endpoint: str) -> None:
     with opened_session(Zenoh(listen=[endpoint])) as session, closing(Watched(endpoint).monitor) as monitor:
         watched_keys = ("lcf/scene", "lcf/diagnostics", "lcf/preview/compressed")
-        monitor.want_preview(True)
+        monitor.switch_preview(True)
         publishers = [session.declare_publisher(key) for key in watched_keys]
         deadline_s = time.monotonic() + PATIENCE_S
         while monitor.snapshot().broken < 3 and time.monotonic() < deadline_s:

@@ -52,7 +52,7 @@ def test_samples_come_before_the_frame_that_needs_them(asl: Any, read: Read) -> 
 
 
 def test_reading_again_gives_the_same(asl: Any) -> None:
-    asl.picture(FRAMES[2]).unlink()
+    asl.image_path(FRAMES[2]).unlink()
     recording = open_recording(asl.path, Config())
     first = [repr(item) for item in recording]
     warned = (list(recording.warnings), dict(recording.skipped))
@@ -188,7 +188,7 @@ def test_rows_without_numbers_at_all_and_very_long_ones(asl: Any, read: Read) ->
 def test_a_bad_picture_is_skipped_and_the_rest_is_read(
     asl: Any, read: Read, capfd: pytest.CaptureFixture[str], fault: str, reason: str
 ) -> None:
-    path = asl.picture(FRAMES[2])
+    path = asl.image_path(FRAMES[2])
     data = path.read_bytes()
     path.unlink()
     if fault == "folder":
@@ -206,28 +206,28 @@ def test_a_bad_picture_is_skipped_and_the_rest_is_read(
 
 
 def test_pictures_of_another_size_are_skipped(asl: Any, read: Read) -> None:
-    cv2.imwrite(str(asl.picture(FRAMES[1])), np.zeros((24, 32), np.uint8))
+    cv2.imwrite(str(asl.image_path(FRAMES[1])), np.zeros((24, 32), np.uint8))
     recording, items = read(asl.path)
     assert frames(items) == FRAMES[:1] + FRAMES[2:]
     assert recording.skipped == {"picture of another size than the first": 1}
 
 
 def test_the_first_good_picture_tells_the_size(asl: Any, read: Read) -> None:
-    asl.picture(FRAMES[0]).write_bytes(b"")
+    asl.image_path(FRAMES[0]).write_bytes(b"")
     _, items = read(asl.path)
     assert frames(items) == FRAMES[1:]
 
 
 def test_no_good_picture_at_all_is_an_error(asl: Any, read: Read) -> None:
     for stamp in FRAMES:
-        asl.picture(stamp).write_bytes(b"")
+        asl.image_path(stamp).write_bytes(b"")
     with pytest.raises(RecordingError, match=r"not one picture could be read \(5 times: picture empty\)"):
         read(asl.path)
 
 
 def test_a_gap_of_seconds_is_passed_on(asl: Any, read: Read) -> None:
     late = 7_000_000_000
-    asl.picture(FRAMES[4]).rename(asl.picture(late))
+    asl.image_path(FRAMES[4]).rename(asl.image_path(late))
     asl.edit("cam0", 6, f"{late},{late}.png")
     recording, items = read(asl.path)
     assert frames(items) == [*FRAMES[:4], late]
