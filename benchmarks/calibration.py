@@ -343,7 +343,7 @@ class _Onlooker:
         self._world, self._found = world, found
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         for sample in moment.samples:
             self._method.add(sample)
         assert moment.frame is not None

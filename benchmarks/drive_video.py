@@ -40,15 +40,15 @@ class _Filmed:
 
     def decide(self, moment: Moment) -> float:
         """The speed that the driver wants now, m/s."""
-        wanted = self._driver.decide(moment)
+        target_mps = self._driver.decide(moment)
         assert moment.frame is not None
         assert self._driver.scene is not None
-        image = draw(moment, self._driver.scene, self._driver.reported(self._driver.scene), wanted)
+        image = draw(moment, self._driver.scene, self._driver.reported(self._driver.scene), target_mps)
         self.writer.write(image)
-        return wanted
+        return target_mps
 
 
-def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], wanted_mps: float) -> Image:
+def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps: float) -> Image:
     """One picture (height, width, 3): threats by the truth (red below them), what the planner is told, speeds."""
     assert moment.frame is not None
     image = np.asarray(cv2.cvtColor(moment.frame.image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
@@ -67,9 +67,9 @@ def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], wanted_mps
         text = f"{thing['id']} {kind.name.lower()} {thing['ttc']:.1f}s {thing['range']:.1f}m {thing['lateral']:+.1f}"
         _write(image, text, (max(low[0], 2), max(low[1] - HEIGHT_PX - 5, 20)), colour)
     height = image.shape[0]
-    braking = wanted_mps < 0.95 * moment.cruise_mps
+    braking = target_mps < 0.95 * moment.cruise_mps
     text = (
-        f"{moment.time_s:.1f} s  speed {moment.speed_mps:.2f}  wanted {wanted_mps:.2f} of {moment.cruise_mps:.2f} m/s"
+        f"{moment.time_s:.1f} s  speed {moment.speed_mps:.2f}  wanted {target_mps:.2f} of {moment.cruise_mps:.2f} m/s"
     )
     _write(image, text, (8, height - HEIGHT_PX - 6), _RED if braking else _GREEN)
     _write(image, ", ".join(scene.notes), (8, 4), _WHITE)

@@ -49,16 +49,16 @@ class TruthDriver:
         self._planner, self._memory, self._dt_s = planner_of(world), Memory(), 1 / world.fps
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         objects = self._memory.objects(moment.time_s, moment.known)
-        return self._planner.wanted(objects, moment.speed_mps, moment.cruise_mps, self._dt_s, moment.curvature)
+        return self._planner.target_mps(objects, moment.speed_mps, moment.cruise_mps, self._dt_s, moment.curvature)
 
 
 class BlindDriver:
     """Brakes for nothing."""
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         return moment.cruise_mps
 
 
@@ -68,22 +68,22 @@ class SceneDriver:
     def __init__(self, world: World, name: str, reported: Reported) -> None:
         self._planner, self._dt_s = planner_of(world), 1 / world.fps
         self._method, self.reported = method_of(world, name), reported
-        self._wanted_mps = world.start_mps
+        self._target_mps = world.start_mps
         self.scene: Scene | None = None
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         for sample in moment.samples:
             self._method.add(sample)
         assert moment.frame is not None
         self.scene = self._method.process(moment.frame)
         speed = self.scene.vehicle_speed
         if not math.isfinite(speed):  # nobody measures it: it is what was wanted
-            speed = self._wanted_mps
-        self._wanted_mps = self._planner.wanted(
+            speed = self._target_mps
+        self._target_mps = self._planner.target_mps(
             self.reported(self.scene), speed, moment.cruise_mps, self._dt_s, moment.curvature
         )
-        return self._wanted_mps
+        return self._target_mps
 
 
 def driver(world: World, name: str) -> Driver:

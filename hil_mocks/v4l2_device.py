@@ -259,8 +259,8 @@ class MockKernel:
         """What is not there becomes the nearest that is, as the kernel's drivers do."""
         _refuse(file.camera.format_error)
         modes = file.camera.modes
-        wanted = v4l2.fourcc_text(answer.pixelformat)
-        file.pixel_format = wanted if wanted in modes else next(iter(modes))
+        requested = v4l2.fourcc_text(answer.pixelformat)
+        file.pixel_format = requested if requested in modes else next(iter(modes))
         sizes = modes[file.pixel_format]
         asked = (answer.width, answer.height)
         file.width, file.height = asked if asked in sizes else next(iter(sizes))

@@ -39,7 +39,7 @@ class Driver(Protocol):
     """Who decides."""
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Log:
     """What a drive was, one entry a picture."""
 
     cruise_mps: list[float] = field(default_factory=list)
-    wanted_mps: list[float] = field(default_factory=list)
+    target_mps: list[float] = field(default_factory=list)
     speed_mps: list[float] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     distance_m: float = 0.0
@@ -100,10 +100,10 @@ def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
         rest_s -= 1 / world.fps if vehicle.speed_mps < STANDS_MPS else 0.0
         moment = Moment(time_s, cruise_mps, speed_mps, curvature, tuple(samples), frame, known)
         samples.clear()
-        wanted_mps = min(driver.decide(moment), cruise_mps)
-        vehicle.tell(time_s, wanted_mps)
+        target_mps = min(driver.decide(moment), cruise_mps)
+        vehicle.tell(time_s, target_mps)
         log.cruise_mps.append(cruise_mps)
-        log.wanted_mps.append(wanted_mps)
+        log.target_mps.append(target_mps)
         log.speed_mps.append(speed_mps)
         advance(seq * steps + LATE_STEPS, (seq + 1) * steps)
         left_m = world.course.length_m - vehicle.travelled_m

@@ -81,11 +81,11 @@ class Daemon:
         new.write_text(text, encoding="utf-8")
         new.replace(self.config)
 
-    def look(self, *, wanted: bool) -> None:
+    def look(self, *, on: bool) -> None:
         """Subscribe to the preview, or no longer."""
-        if wanted and self._preview is None:
+        if on and self._preview is None:
             self._preview = self._session.declare_subscriber("lcf/preview/compressed", lambda _: None)
-        elif not wanted and self._preview is not None:
+        elif not on and self._preview is not None:
             self._preview.undeclare()  # type: ignore[no-untyped-call]
             self._preview = None
 
@@ -127,7 +127,7 @@ class Daemon:
         """Leave nothing behind."""
         self._process.kill()
         self._process.wait()
-        self.look(wanted=False)
+        self.look(on=False)
         for subscriber in self._subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]
 
@@ -142,7 +142,7 @@ class Daemon:
 def live(daemon: Daemon, life: Life, frame_limit: int, seconds: float) -> None:
     """One life, until so many pictures or seconds are over. Raises ``SoakError``."""
     begin_s = time.monotonic()
-    daemon.look(wanted=True)  # what the first look costs belongs to the warm-up
+    daemon.look(on=True)  # what the first look costs belongs to the warm-up
     while life.balance.put < frame_limit and time.monotonic() - begin_s < seconds:
         life.note(daemon.next())
         disturb(daemon)
@@ -167,7 +167,7 @@ def disturb(daemon: Daemon) -> None:
     if daemon.random.random() < 1 / RELOAD_EACH_S:
         daemon.random.choice((daemon.spoil_configuration, lambda: daemon.configure(daemon.random.uniform(0.2, 0.6))))()
     if daemon.random.random() < 1 / LOOK_EACH_S:
-        daemon.look(wanted=daemon.random.random() < 0.5)
+        daemon.look(on=daemon.random.random() < 0.5)
 
 
 def soak(frame_limit: int, seconds: float, lives: int, seed: int, folder: Path) -> list[Life]:

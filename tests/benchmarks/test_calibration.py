@@ -169,5 +169,5 @@ def test_circles_without_trust_and_normal_ones_are_left_out() -> None:
 def test_every_driver_wants_a_speed(name: str) -> None:
     world = worlds.make(5).changed(course=Course(0.3), start_mps=1.0)
     log = drive(world, driver(world, name), pictures=name not in (TRUTH, "blind"))
-    assert log.wanted_mps
-    assert all(0 <= wanted <= world.cruise_mps for wanted in log.wanted_mps)
+    assert log.target_mps
+    assert all(0 <= target_mps <= world.cruise_mps for target_mps in log.target_mps)

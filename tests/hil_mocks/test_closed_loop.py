@@ -32,12 +32,12 @@ QUIET = 1e-9
 class Watching:
     """Wants a speed, and keeps what it is shown."""
 
-    def __init__(self, *wanted: float) -> None:
-        self.wanted, self.moments = wanted, []
+    def __init__(self, *targets_mps: float) -> None:
+        self.targets_mps, self.moments = targets_mps, []
 
     def decide(self, moment: Moment) -> float:
         self.moments.append(moment)
-        return self.wanted[min(len(self.moments), len(self.wanted)) - 1]
+        return self.targets_mps[min(len(self.moments), len(self.targets_mps)) - 1]
 
 
 def body(x: float, z: float, *legs: Leg, name="walker_0", width=0.5, length=0.3) -> Body:
@@ -229,8 +229,8 @@ def test_worlds_refuse_a_negative_seed() -> None:
 # What came of a drive.
 
 
-def log_of(*wanted: float, contacts: tuple[Contact, ...] = ()) -> Log:
-    return Log([1.0] * len(wanted), list(wanted), list(wanted), list(contacts), 10.0, 10.0)
+def log_of(*targets_mps: float, contacts: tuple[Contact, ...] = ()) -> Log:
+    return Log([1.0] * len(targets_mps), list(targets_mps), list(targets_mps), list(contacts), 10.0, 10.0)
 
 
 def test_a_braking_is_one_until_it_is_over() -> None:
@@ -274,7 +274,7 @@ def test_the_newest_speed_is_obeyed_and_what_is_none_is_left_alone() -> None:
     live = LiveDriver(fps=1000.0)
     for line in ("1.5\n", "stop\n", "nan\n", ""):
         live.obey(line)
-    assert live.wanted_mps == 1.5
+    assert live.target_mps == 1.5
 
 
 def test_in_real_time_it_starts_at_rest() -> None:
