@@ -131,13 +131,13 @@ def test_the_size_is_that_which_the_decoder_will_see(content: bytes, reason: str
 
 DECODED = """
 import resource, sys
-from lcf_edge.recording.read.decoding import PictureError, decode_picture
+from lcf_edge.recording.read.decoding import ImageDecodeError, image_from_bytes
 def peak_kib():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 data, before = sys.stdin.buffer.read(), peak_kib()
 try:
-    decode_picture(data)
-except PictureError as error:
+    image_from_bytes(data)
+except ImageDecodeError as error:
     print(f"{error},{(peak_kib() - before) // 1024}")
 """
 
