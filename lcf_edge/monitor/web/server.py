@@ -153,13 +153,13 @@ class Server:
         await browser.prepare(request)
         self._sockets[browser] = request
         try:
-            await self._want_preview()
+            await self._switch_preview()
             await self._tell(browser)
         except (TimeoutError, ConnectionError):  # it neither asks nor takes any more; it is gone
             _abort(request)
         finally:
             self._sockets.pop(browser)
-            await self._want_preview()
+            await self._switch_preview()
             await browser.close()
         return browser
 
@@ -188,7 +188,7 @@ class Server:
         command.give(self._player)
         return web.Response(status=204)
 
-    async def _want_preview(self) -> None:
+    async def _switch_preview(self) -> None:
         async with self._wanting:
             await asyncio.to_thread(self._monitor.switch_preview, bool(self._sockets))
 

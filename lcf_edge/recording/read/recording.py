@@ -30,7 +30,7 @@ class UndecodedFrame:
 
     stamp_ns: int
     name: str  # for warnings
-    decode: Callable[[], Grey]  # raises PictureError
+    decode: Callable[[], Grey]  # raises ImageDecodeError
 
 
 class Recording(ABC):
