@@ -25,7 +25,7 @@ import aiohttp
 from msgspec.structs import replace as changed
 
 from benchmarks.report import Table, write
-from benchmarks.session import PICTURES_HZ, config_in, cpu_s, free_port, save, status_mib
+from benchmarks.session import FRAMES_HZ, config_in, cpu_s, free_port, save, status_mib
 from hil_mocks.siege.place import certificates, planner_settings, rover_settings
 from lcf_edge.config import to_toml
 from lcf_edge.errors import LcfError
@@ -83,7 +83,7 @@ def measure(seconds: float, *, drive_s: float = 10.0) -> dict[str, Use]:
     """Measure every process for so long. Raises ``LcfError`` where one does not begin, or openssl is missing."""
     with tempfile.TemporaryDirectory() as name:
         place = Place(Path(name), f"tcp/127.0.0.1:{free_port()}", free_port())
-        drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=PICTURES_HZ)
+        drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=FRAMES_HZ)
         save(drive, place.folder)
         certificates(place.folder / "tls")
         config = config_in(place.folder, drive, place.local, f"tls/127.0.0.1:{place.inner_port}")
@@ -194,9 +194,9 @@ def _foxglove(place: Place) -> Iterator[int]:
                 if message.type == aiohttp.WSMsgType.BINARY:
                     seen.set()
                     continue
-                told = json.loads(message.data)
-                if told["op"] == "advertise":
-                    wanted = [{"id": each["id"], "channelId": each["id"]} for each in told["channels"]]
+                received = json.loads(message.data)
+                if received["op"] == "advertise":
+                    wanted = [{"id": each["id"], "channelId": each["id"]} for each in received["channels"]]
                     await socket.send_str(json.dumps({"op": "subscribe", "subscriptions": wanted}))
 
     with _served(place, "foxglove", "ws://", look) as number:

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from tqdm import tqdm
 
-from benchmarks.drivers import CIRCLES, OBJECTS, TruthDriver, method_of, objects_of_circles, told_of
+from benchmarks.drivers import CIRCLES, OBJECTS, TruthDriver, method_of, objects_of_circles, reported_objects
 from benchmarks.methods import FILTER
 from benchmarks.playing import config_of, play_drive
 from benchmarks.report import Table, number
@@ -338,18 +338,18 @@ class _Onlooker:
     """The planner with the truth drives, the pipeline looks on."""
 
     def __init__(self, world: World, found: Calibration, of: str) -> None:
-        self._told = told_of(world, of)
+        self._reported = reported_objects(world, of)
         self._driver, self._method = TruthDriver(world), method_of(world, FILTER)
         self._world, self._found = world, found
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         for sample in moment.samples:
             self._method.add(sample)
         assert moment.frame is not None
         scene: Scene = self._method.process(moment.frame)
         name = f"world {self._world.seed}"
-        self._found.see(name, moment.time_s, self._told(scene), moment.known, self._world.build.half_width_m)
+        self._found.see(name, moment.time_s, self._reported(scene), moment.known, self._world.build.half_width_m)
         return self._driver.decide(moment)
 
 

@@ -60,7 +60,7 @@ def contest(seed: int, names: Sequence[str]) -> Result:
     rights: dict[str, list[bool]] = {}
     for name in (TRUTH, BLIND, *(name for name in names if name not in _SIGHTED)):
         judged = _Judged(world, name)
-        logs[name] = drive(world, judged, pictures=name not in _SIGHTED)
+        logs[name] = drive(world, judged, with_images=name not in _SIGHTED)
         rights[name] = judged.right
     for name in names:
         result.outcomes[name] = judge(logs[name], rights[name], world.fps, logs[TRUTH], logs[BLIND])

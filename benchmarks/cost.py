@@ -95,14 +95,14 @@ def by_valgrind(drive: Path, core: Core) -> Callable[[str, int], Cost]:
     return count
 
 
-def read_cachegrind(told: str) -> Cost:
+def read_cachegrind(output: str) -> Cost:
     """What cachegrind says at the end. Raises ``LcfError`` where it did not come to that."""
-    found = dict(re.findall(r"^==\d+== (\S+) +(?:refs|misses): +([\d,]+)", told, re.MULTILINE))
+    found = dict(re.findall(r"^==\d+== (\S+) +(?:refs|misses): +([\d,]+)", output, re.MULTILINE))
     try:
         counts = {name: float(number.replace(",", "")) for name, number in found.items()}
         return Cost(counts["I"], counts["I1"] + counts["D1"], counts["LLi"] + counts["LLd"])
     except KeyError as missing:
-        raise LcfError(f"valgrind did not count {missing}: {told.strip().splitlines()[-1:]}") from missing
+        raise LcfError(f"valgrind did not count {missing}: {output.strip().splitlines()[-1:]}") from missing
 
 
 def by_qemu(drive: Path, wheel: Path, place: Path) -> Callable[[str, int], Cost]:
@@ -116,13 +116,13 @@ def by_qemu(drive: Path, wheel: Path, place: Path) -> Callable[[str, int], Cost]
     def count(part: str, frames: int) -> Cost:
         child = (str(root / "usr/bin/python3"), str(HERE / "cost_of_frames.py"), str(drive), part, str(frames))
         environment = {**os.environ, "PYTHONPATH": str(place / "wheel"), "PYTHONHOME": str(root / "usr")}
-        told = run(
+        output = run(
             *("sh", "-c", 'exec "$@" 2>&1', "sh", "qemu-aarch64", "-L", str(root), "-plugin", str(plugin), *child),
             environment=environment,
         )
-        found = re.search(r"^instructions: (\d+)$", told, re.MULTILINE)
+        found = re.search(r"^instructions: (\d+)$", output, re.MULTILINE)
         if found is None:
-            raise LcfError(f"qemu counted nothing: {told.strip().splitlines()[-1:]}")
+            raise LcfError(f"qemu counted nothing: {output.strip().splitlines()[-1:]}")
         return Cost(float(found[1]))
 
     return count

@@ -12,7 +12,7 @@ from hil_mocks.closed_loop.world import World
 from lcf_edge.messages import ObjectClass, Scene
 from lcf_edge.sinks.lettering import HEIGHT_PX, lettering
 
-Picture = npt.NDArray[np.uint8]
+Image = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
 
 _WHITE, _BLACK, _RED, _GREEN, _GREY = (255, 255, 255), (0, 0, 0), (60, 60, 255), (80, 220, 80), (160, 160, 160)
@@ -40,47 +40,47 @@ class _Filmed:
 
     def decide(self, moment: Moment) -> float:
         """The speed that the driver wants now, m/s."""
-        wanted = self._driver.decide(moment)
+        target_mps = self._driver.decide(moment)
         assert moment.frame is not None
         assert self._driver.scene is not None
-        picture = draw(moment, self._driver.scene, self._driver.told(self._driver.scene), wanted)
-        self.writer.write(picture)
-        return wanted
+        image = draw(moment, self._driver.scene, self._driver.reported(self._driver.scene), target_mps)
+        self.writer.write(image)
+        return target_mps
 
 
-def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], wanted_mps: float) -> Picture:
+def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps: float) -> Image:
     """One picture (height, width, 3): threats by the truth (red below them), what the planner is told, speeds."""
     assert moment.frame is not None
-    picture = np.asarray(cv2.cvtColor(moment.frame.image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
+    image = np.asarray(cv2.cvtColor(moment.frame.image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     for body in moment.known:
         if body.in_sight and body.threat:
             x, y, width, height = (round(value) for value in body.box)
-            cv2.line(picture, (x, y + height + 3), (x + width, y + height + 3), _RED, 3)
+            cv2.line(image, (x, y + height + 3), (x + width, y + height + 3), _RED, 3)
     for thing in objects:
         kind = ObjectClass(int(thing["class_id"]))
         colour = _COLOURS[kind]
         middle = np.array([thing["x"], thing["y"]])
         half = np.array([thing["width"], thing["height"]]) / 2
         low, high = (tuple(np.rint(corner).astype(int).tolist()) for corner in (middle - half, middle + half))
-        cv2.rectangle(picture, low, high, _BLACK, 3)
-        cv2.rectangle(picture, low, high, colour, 2 if thing["probability"] >= 0.3 else 1)
+        cv2.rectangle(image, low, high, _BLACK, 3)
+        cv2.rectangle(image, low, high, colour, 2 if thing["probability"] >= 0.3 else 1)
         text = f"{thing['id']} {kind.name.lower()} {thing['ttc']:.1f}s {thing['range']:.1f}m {thing['lateral']:+.1f}"
-        _write(picture, text, (max(low[0], 2), max(low[1] - HEIGHT_PX - 5, 20)), colour)
-    height = picture.shape[0]
-    braking = wanted_mps < 0.95 * moment.cruise_mps
+        _write(image, text, (max(low[0], 2), max(low[1] - HEIGHT_PX - 5, 20)), colour)
+    height = image.shape[0]
+    braking = target_mps < 0.95 * moment.cruise_mps
     text = (
-        f"{moment.time_s:.1f} s  speed {moment.speed_mps:.2f}  wanted {wanted_mps:.2f} of {moment.cruise_mps:.2f} m/s"
+        f"{moment.time_s:.1f} s  speed {moment.speed_mps:.2f}  wanted {target_mps:.2f} of {moment.cruise_mps:.2f} m/s"
     )
-    _write(picture, text, (8, height - HEIGHT_PX - 6), _RED if braking else _GREEN)
-    _write(picture, ", ".join(scene.notes), (8, 4), _WHITE)
-    return picture
+    _write(image, text, (8, height - HEIGHT_PX - 6), _RED if braking else _GREEN)
+    _write(image, ", ".join(scene.notes), (8, 4), _WHITE)
+    return image
 
 
-def _write(picture: Picture, text: str, at: tuple[int, int], colour: Colour) -> None:
+def _write(image: Image, text: str, at: tuple[int, int], colour: Colour) -> None:
     """Text whose upper left corner is at a point, px."""
     ink = np.pad(lettering(text), _HALO_PX)
     left, top = at
-    region = picture[max(top, 0) :, max(left, 0) :][: ink.shape[0], : ink.shape[1]]
+    region = image[max(top, 0) :, max(left, 0) :][: ink.shape[0], : ink.shape[1]]
     ink = ink[: region.shape[0], : region.shape[1]]
     region[cv2.dilate(ink, np.ones((3, 3), np.uint8)) > 0] = _BLACK
     region[ink > 127] = colour

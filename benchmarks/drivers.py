@@ -26,7 +26,7 @@ _SIGMA_M, _SIGMA_SHARE = 0.2, 0.15  # of what circles say
 _FARTHEST_M = 30.0
 _FORWARD_MPS, _RIGHT_MPS = (-2.0, 4.0), (-2.5, 2.5)  # nothing is faster
 
-Told = Callable[[Scene], npt.NDArray[np.void]]
+Reported = Callable[[Scene], npt.NDArray[np.void]]
 
 
 def planner_of(world: World) -> Planner:
@@ -49,41 +49,41 @@ class TruthDriver:
         self._planner, self._memory, self._dt_s = planner_of(world), Memory(), 1 / world.fps
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         objects = self._memory.objects(moment.time_s, moment.known)
-        return self._planner.wanted(objects, moment.speed_mps, moment.cruise_mps, self._dt_s, moment.curvature)
+        return self._planner.target_mps(objects, moment.speed_mps, moment.cruise_mps, self._dt_s, moment.curvature)
 
 
 class BlindDriver:
     """Brakes for nothing."""
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         return moment.cruise_mps
 
 
 class SceneDriver:
-    """The planner on what a method finds; ``told``: what of it the planner is given."""
+    """The planner on what a method finds; ``reported``: what of it the planner is given."""
 
-    def __init__(self, world: World, name: str, told: Told) -> None:
+    def __init__(self, world: World, name: str, reported: Reported) -> None:
         self._planner, self._dt_s = planner_of(world), 1 / world.fps
-        self._method, self.told = method_of(world, name), told
-        self._wanted_mps = world.start_mps
+        self._method, self.reported = method_of(world, name), reported
+        self._target_mps = world.start_mps
         self.scene: Scene | None = None
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         for sample in moment.samples:
             self._method.add(sample)
         assert moment.frame is not None
         self.scene = self._method.process(moment.frame)
         speed = self.scene.vehicle_speed
         if not math.isfinite(speed):  # nobody measures it: it is what was wanted
-            speed = self._wanted_mps
-        self._wanted_mps = self._planner.wanted(
-            self.told(self.scene), speed, moment.cruise_mps, self._dt_s, moment.curvature
+            speed = self._target_mps
+        self._target_mps = self._planner.target_mps(
+            self.reported(self.scene), speed, moment.cruise_mps, self._dt_s, moment.curvature
         )
-        return self._wanted_mps
+        return self._target_mps
 
 
 def driver(world: World, name: str) -> Driver:
@@ -92,10 +92,10 @@ def driver(world: World, name: str) -> Driver:
         return TruthDriver(world)
     if name == BLIND:
         return BlindDriver()
-    return SceneDriver(world, FILTER if name in (OBJECTS, CIRCLES) else name, told_of(world, name))
+    return SceneDriver(world, FILTER if name in (OBJECTS, CIRCLES) else name, reported_objects(world, name))
 
 
-def told_of(world: World, name: str) -> Told:
+def reported_objects(world: World, name: str) -> Reported:
     """What a planner is given of the scenes of a driver's method."""
     if name == OBJECTS:
         return lambda scene: scene.objects

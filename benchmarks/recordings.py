@@ -17,24 +17,24 @@ from benchmarks.report import Table, number
 from lcf_edge.config import Config, load
 from lcf_edge.errors import RecordingError
 from lcf_edge.evaluate.corpus import Entry, find
-from lcf_edge.evaluate.pictures import WIDTH_PX, Colours, draw
+from lcf_edge.evaluate.drawings import WIDTH_PX, Colours, draw
 from lcf_edge.evaluate.report import line_of
 from lcf_edge.evaluate.score import Score, rebels
 from lcf_edge.evaluate.truth import Known, read_truth
 from lcf_edge.recording.read import open_recording
 
 VARIABLE = "LCF_EDGE_DATA"
-PICTURES = 6  # of each recording on the sheet
+FRAMES = 6  # of each recording on the sheet
 _WHITE = (255, 255, 255)
 
 
 @dataclass(slots=True)
 class Result:
-    """One recording, scored for each method. ``pictures``: some of it, with what the filter found."""
+    """One recording, scored for each method. ``images``: some of it, with what the filter found."""
 
     name: str
     scores: dict[str, Score]
-    pictures: list[Colours]
+    images: list[Colours]
 
 
 def run(folder: Path, into: list[Result]) -> Iterable[str]:
@@ -51,7 +51,7 @@ def _score(entry: Entry, config: Config) -> Result:
     truth = read_truth(entry.truth)
     result = Result(entry.name, {name: Score() for name in NAMES}, [])
     count = open_recording(entry.path, config).frame_count or 1
-    shown = set(np.linspace(0.1 * count, 0.95 * count, PICTURES).astype(int).tolist())
+    shown = set(np.linspace(0.1 * count, 0.95 * count, FRAMES).astype(int).tolist())
     for number_of, moment in enumerate(play_recording(entry.path, config, NAMES)):
         stamp_ns = moment.frame.stamp_ns
         known = truth.of(stamp_ns)
@@ -61,7 +61,7 @@ def _score(entry: Entry, config: Config) -> Result:
             if known is not None:
                 score.add(stamp_ns, rebels(scene.circles), known)
         if number_of in shown:
-            result.pictures.append(_drawn(moment, known or ()))
+            result.images.append(_drawn(moment, known or ()))
     return result
 
 
@@ -107,11 +107,11 @@ def write_sheet(results: Sequence[Result], path: Path) -> Path:
     """Write all pictures, a row a recording; return where. Raises OSError."""
     rows = []
     for each in results:
-        height = max((picture.shape[0] for picture in each.pictures), default=0) + 16
-        row = np.zeros((height, PICTURES * WIDTH_PX, 3), np.uint8)
+        height = max((image.shape[0] for image in each.images), default=0) + 16
+        row = np.zeros((height, FRAMES * WIDTH_PX, 3), np.uint8)
         cv2.putText(row, each.name, (3, 12), cv2.FONT_HERSHEY_SIMPLEX, 0.4, _WHITE)
-        for place, picture in enumerate(each.pictures):
-            row[16 : 16 + picture.shape[0], place * WIDTH_PX : (place + 1) * WIDTH_PX] = picture
+        for place, image in enumerate(each.images):
+            row[16 : 16 + image.shape[0], place * WIDTH_PX : (place + 1) * WIDTH_PX] = image
         rows.append(row)
     path.parent.mkdir(parents=True, exist_ok=True)
     _, encoded = cv2.imencode(".png", np.concatenate(rows))

@@ -29,7 +29,7 @@ from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import Drive, stamp_ns
 from lcf_edge.zenoh_link import opened_session
 
-PICTURES_HZ = 30.0
+FRAMES_HZ = 30.0
 _WARM_UP_S = 3.0
 _STARTS_WITHIN_S = 30.0
 _ENDS_WITHIN_S = 10.0
@@ -40,7 +40,7 @@ _TICKS_HZ = os.sysconf("SC_CLK_TCK")
 class Session:
     """What was measured. ``latency_ms``: from a picture's stamp to its scene at the subscriber."""
 
-    pictures: int
+    frame_count: int
     received: int
     latency_p50_ms: float
     latency_p99_ms: float
@@ -53,7 +53,7 @@ def measure(seconds: float, *, drive_s: float = 10.0) -> Session:
     """Let the daemon run for so long on a drive that begins again and again. Raises ``LcfError``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=PICTURES_HZ)
+        drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=FRAMES_HZ)
         save(drive, folder)
         endpoint = f"tcp/127.0.0.1:{free_port()}"
         (folder / "config.toml").write_text(to_toml(config_in(folder, drive, endpoint)), encoding="utf-8")
@@ -90,8 +90,8 @@ def save(drive: Drive, folder: Path) -> None:
 def _run(folder: Path, endpoint: str, seconds: float) -> Session:
     command = (sys.executable, "-m", "benchmarks.session_daemon", folder, "run", "-c", folder / "config.toml")
     log = folder / "log.txt"
-    with log.open("wb") as told:
-        daemon = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=told)
+    with log.open("wb") as errors:
+        daemon = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=errors)
     try:
         return _listened(daemon, endpoint, seconds)
     except (LcfError, ValueError) as error:
@@ -126,11 +126,11 @@ def _listened(daemon: "subprocess.Popen[bytes]", endpoint: str, seconds: float) 
     out, _ = daemon.communicate(timeout=_ENDS_WITHIN_S)
     measured = took_ns[from_scene:to_scene]
     taken = np.array([each for _, each in measured]) / 1e6
-    pictures = measured[-1][0] - measured[0][0] + 1
+    frame_count = measured[-1][0] - measured[0][0] + 1
     read_s = float(out.split()[-1]) / (took_ns[-1][0] - took_ns[0][0] + 1)  # a picture
-    reading = read_s * pictures / lasted_s
+    reading = read_s * frame_count / lasted_s
     return Session(
-        pictures,
+        frame_count,
         len(measured),
         float(np.percentile(taken, 50)),
         float(np.percentile(taken, 99)),
@@ -162,11 +162,11 @@ def status_mib(process: int, what: str) -> float:
 def tables(session: Session) -> list[Table]:
     """One table."""
     rows = [
-        ["pictures, and scenes that were received", f"{session.pictures}, {session.received}"],
+        ["pictures, and scenes that were received", f"{session.frame_count}, {session.received}"],
         ["stamp to received, ms: median (p99)", f"{session.latency_p50_ms:.1f} ({session.latency_p99_ms:.1f})"],
         ["share of a core", f"{session.core_share:.1%}"],
         ["reading the stand-in's pictures, not in it", f"{session.reading_share:.1%}"],
         ["resident memory, MiB", number(session.resident_mib, 1)],
     ]
-    title = f"The daemon, 640×480 at {PICTURES_HZ:g} pictures a second, IMU 200 Hz, a subscriber in another process"
+    title = f"The daemon, 640×480 at {FRAMES_HZ:g} pictures a second, IMU 200 Hz, a subscriber in another process"
     return [Table(title, ["", "value"], rows)]

@@ -32,7 +32,7 @@ class Drive:
         size = json.loads((folder / "size.json").read_text("utf-8"))
         self.shape = size["height"], size["width"]
         self.lap_ns = round(1e9 * size["seconds"])
-        self.pictures = os.open(folder / "pictures.raw", os.O_RDONLY)
+        self.images_file = os.open(folder / "pictures.raw", os.O_RDONLY)
         self.count = size["count"]
         self.imu = np.fromfile(folder / "imu.raw").reshape(-1, 7)  # np.load would take memory that no vehicle needs
         self.speed = np.fromfile(folder / "speed.raw").reshape(-1, 3)
@@ -85,7 +85,7 @@ class Camera(Device):
         """A picture."""
         before = time.thread_time()
         image = np.empty(self.drive.shape, np.uint8)
-        os.preadv(self.drive.pictures, [image], number % self.drive.count * image.nbytes)
+        os.preadv(self.drive.images_file, [image], number % self.drive.count * image.nbytes)
         self.drive.read_s += time.thread_time() - before
         return Frame(stamp_ns, number, image)
 

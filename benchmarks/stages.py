@@ -33,7 +33,7 @@ STEPS = {
     "_detect": "5. key frame, α, rebels",
     "_update_circles": "6. circles, 7. feedback",
 }
-PICTURE, SAMPLES, MESSAGE, PUT = "picture out of a YUYV buffer", "samples taken", "scene as a message", "put"
+FRAME_READ, SAMPLES, MESSAGE, PUT = "picture out of a YUYV buffer", "samples taken", "scene as a message", "put"
 _WARM_UP = 20
 
 
@@ -60,13 +60,13 @@ def measure_frame(drive: Drive, config: Config) -> list[Stage]:
     method = FilterMethod(config, Lens.from_config(config.camera, drive.lens.width, drive.lens.height))
     spent = _parts(method.pipeline)
     samples_us = _timed(method.pipeline, "add")
-    spent |= {name: [] for name in (PICTURE, SAMPLES, MESSAGE, PUT)}
+    spent |= {name: [] for name in (FRAME_READ, SAMPLES, MESSAGE, PUT)}
     with opened_session(Zenoh(listen=[])) as session:
         publisher = MessagePublisher(session, config.publish, SCENE)
         for moment in feed(drive, {FILTER: method}):
             height, width = moment.frame.image.shape
             buffer = memoryview(np.stack([moment.frame.image] * 2, axis=2).tobytes())
-            _note(spent[PICTURE], luminance, "YUYV", buffer, width, height, 2 * width)
+            _note(spent[FRAME_READ], luminance, "YUYV", buffer, width, height, 2 * width)
             scene: Scene = moment.scenes[FILTER]
             message = _note(spent[MESSAGE], encode_scene, scene, config.publish.frame_id)
             _note(spent[PUT], publisher.put, message)

@@ -13,7 +13,7 @@ import numpy as np
 from lcf_edge.config import load
 from lcf_edge.pipeline import run
 from lcf_edge.recording.read import open_recording
-from lcf_edge.sinks.overlay import Picture, draw
+from lcf_edge.sinks.overlay import Image, draw
 
 EVERY = 2  # of 20 pictures a second
 INTERVAL_MS = 100
@@ -21,10 +21,10 @@ QUALITY = 30
 MAX_BYTES = 2_000_000
 
 
-def pictures(demo: Path) -> list[Picture]:
+def images(demo: Path) -> list[Image]:
     """What becomes of every other frame: the right panel. Grain is smoothed, which costs bytes."""
     config = load(demo / "config.toml", [])
-    drawn: list[Picture] = []
+    drawn: list[Image] = []
     for frame, outcome in run(open_recording(demo / "recording", config), config):
         if frame.seq % EVERY == 0:
             smooth = cv2.bilateralFilter(frame.image, 7, 30, 5).astype(np.uint8)
@@ -33,7 +33,7 @@ def pictures(demo: Path) -> list[Picture]:
     return drawn
 
 
-def write(drawn: list[Picture], path: Path) -> int:
+def write(drawn: list[Image], path: Path) -> int:
     """Write an animated WebP that repeats for ever. Return its size, bytes."""
     animation = cv2.Animation()
     animation.frames = drawn
@@ -44,5 +44,5 @@ def write(drawn: list[Picture], path: Path) -> int:
 
 
 if __name__ == "__main__":
-    size = write(pictures(Path(sys.argv[1])), Path(sys.argv[2]))
+    size = write(images(Path(sys.argv[1])), Path(sys.argv[2]))
     sys.exit(f"{size} bytes: too large" if size > MAX_BYTES else 0)

@@ -12,7 +12,7 @@ from pathlib import Path
 from lcf_edge.filter import tables
 
 ROOT = Path(__file__).parents[1]
-PICTURE = ROOT / "docs/pictures/shape.svg"
+DRAWING = ROOT / "docs/pictures/shape.svg"
 PAGE = ROOT / "docs/developing.md"
 BEGIN, END = "<!-- columns: begin -->\n", "<!-- columns: end -->\n"
 
@@ -135,5 +135,5 @@ def page() -> str:
 
 
 if __name__ == "__main__":
-    PICTURE.write_text(svg(), encoding="utf-8")
+    DRAWING.write_text(svg(), encoding="utf-8")
     PAGE.write_text(page(), encoding="utf-8")

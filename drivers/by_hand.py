@@ -45,7 +45,7 @@ def describe_imu(sample: ImuSample) -> str:
     return f"gyro {gyro} rad/s  accel {accel} m/s²{'  saturated' * sample.saturated}"
 
 
-def describe_picture(frame: Frame) -> str:
+def describe_frame(frame: Frame) -> str:
     """Size and brightness of a picture."""
     height, width = frame.image.shape
     return f"{width}x{height}, mean {frame.image.mean():.0f}"

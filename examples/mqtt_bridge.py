@@ -36,17 +36,17 @@ def objects_message(scene: Scene) -> bytes:
         }
         for thing in scene.objects
     ]
-    told = {"stamp_ns": scene.stamp_ns, "speed_mps": _number(scene.vehicle_speed), "objects": things}
-    return json.dumps(told, allow_nan=False).encode()
+    payload = {"stamp_ns": scene.stamp_ns, "speed_mps": _number(scene.vehicle_speed), "objects": things}
+    return json.dumps(payload, allow_nan=False).encode()
 
 
 def health_messages(diagnostics: DiagnosticArray, robot: str) -> Iterator[tuple[str, bytes]]:
     """Topic and JSON of each part."""
     for status in diagnostics.status:
-        told = {"level": status.level.name.lower(), "message": status.message, "values": dict(status.values)}
+        payload = {"level": status.level.name.lower(), "message": status.message, "values": dict(status.values)}
         sane = (sign if sign.isprintable() and sign not in "/+#" else "_" for sign in status.name)  # for a topic
         part = "".join(sane)[:MAX_PART]
-        yield f"lcf/{robot}/health/{part}", json.dumps(told).encode()
+        yield f"lcf/{robot}/health/{part}", json.dumps(payload).encode()
 
 
 def _number(value: float) -> float | None:

@@ -2,7 +2,7 @@
 
     python examples/planner.py tcp/127.0.0.1:7447 1.5 0.3 500
 
-prints the wanted speed, m/s, for every scene; hand it to the motors. The arguments are the daemon's endpoint, the
+prints the target speed, m/s, for every scene; hand it to the motors. The arguments are the daemon's endpoint, the
 cruise speed, m/s, half the vehicle's width, m, and the camera's focal length, px.
 
 The rule: A speed is good if the vehicle, driving it from now on, comes near to nothing within the horizon, or if it is
@@ -95,30 +95,30 @@ def good_speed(
 
 
 class Planner:
-    """Keeps what was wanted before."""
+    """Chooses a speed, and remembers the last one."""
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        self._wanted = 0.0
+        self._target_mps = 0.0
         self._good_s = 0.0
 
-    def wanted(
+    def target_mps(
         self, objects: npt.NDArray[np.void], speed: float, cruise: float, dt_s: float, curvature: float = 0.0
     ) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
         good = good_speed(objects, speed, cruise, self.vehicle, curvature)
-        self._good_s = self._good_s + dt_s if good > self._wanted else 0.0
-        if good <= self._wanted or self._good_s >= (REST_S if abs(speed) < RESTS_MPS else PATIENCE_S):
-            self._wanted = good
-        return min(self._wanted, cruise)
+        self._good_s = self._good_s + dt_s if good > self._target_mps else 0.0
+        if good <= self._target_mps or self._good_s >= (REST_S if abs(speed) < RESTS_MPS else PATIENCE_S):
+            self._target_mps = good
+        return min(self._target_mps, cruise)
 
 
 def main(endpoint: str, cruise: float, half_width_m: float, focal_px: float) -> None:
-    """Print the wanted speed for every scene."""
+    """Print the target speed for every scene."""
     planner, before_ns, speed = Planner(Vehicle(half_width_m, focal_px=focal_px)), 0, 0.0
     for scene in scenes(endpoint):
         measured = scene.vehicle_speed if isfinite(scene.vehicle_speed) else speed
-        speed = planner.wanted(scene.objects, measured, cruise, min((scene.stamp_ns - before_ns) * 1e-9, 0.2))
+        speed = planner.target_mps(scene.objects, measured, cruise, min((scene.stamp_ns - before_ns) * 1e-9, 0.2))
         before_ns = scene.stamp_ns
         sys.stdout.write(f"{speed:.2f}\n")
         sys.stdout.flush()

@@ -13,11 +13,11 @@ from lcf_edge.pipeline import run
 from lcf_edge.recording.read import open_recording
 from lcf_edge.sinks.overlay import draw
 
-recording, config_file, picture = sys.argv[1:]
+recording, config_file, image_path = sys.argv[1:]
 config = load(Path(config_file))
 counts = []
 for frame, outcome in run(open_recording(Path(recording), config), config):
     counts.append(len(outcome.scene.objects))
     if counts[-1] == max(counts):
-        cv2.imwrite(picture, draw(frame.image, outcome.scene, outcome.view()))
-print(f"{len(counts)} frames, {sum(counts) / len(counts):.2f} objects a frame, at most {max(counts)}: {picture}")
+        cv2.imwrite(image_path, draw(frame.image, outcome.scene, outcome.view()))
+print(f"{len(counts)} frames, {sum(counts) / len(counts):.2f} objects a frame, at most {max(counts)}: {image_path}")

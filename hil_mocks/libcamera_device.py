@@ -25,7 +25,7 @@ import msgspec
 
 from drivers.camera import libcamera_process
 from drivers.camera.luminance import least_stride
-from hil_mocks.v4l2_device import encode, picture
+from hil_mocks.v4l2_device import drawn_image, encode
 
 SENSOR_TIMESTAMP = "SensorTimestamp"
 FULL = (3280, 2464)  # of the sensor, px
@@ -46,7 +46,7 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     focuses: bool = False
     newer: bool = False  # has the controls of libcamera 0.5
     chooses_modes: bool = True
-    told_in: str = ""  # a file in which the mode and the controls are told at every start
+    log_path: str = ""  # a file in which the mode and the controls are told at every start
 
     installed: bool = True
     busy: bool = False
@@ -253,10 +253,10 @@ class Camera:
 
     def start(self, controls: dict[Control, Any]) -> None:
         """Pictures come from now on."""
-        told = {control.name: value for control, value in controls.items()}
-        if self._world.told_in:
-            Path(self._world.told_in).write_text(json.dumps({"mode": self._mode, **told}), encoding="utf-8")
-        threading.Thread(target=self._run, args=(told["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
+        started_with = {control.name: value for control, value in controls.items()}
+        if self._world.log_path:
+            Path(self._world.log_path).write_text(json.dumps({"mode": self._mode, **started_with}), encoding="utf-8")
+        threading.Thread(target=self._run, args=(started_with["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
 
     def stop(self) -> None:
         """No more pictures."""
@@ -286,7 +286,7 @@ class Camera:
         stream, buffer = self._configuration.stream, request.buffers["stream"]
         stamp_ns = time.monotonic_ns() + round(self._world.stamp_offset_s * 1e9)
         name = libcamera_process.PIXEL_FORMATS[stream.pixel_format]
-        image = picture(number, stream.size.width, stream.size.height)
+        image = drawn_image(number, stream.size.width, stream.size.height)
         data = encode(image, name, self._world.padding)[: buffer.planes[0].length]
         os.pwrite(buffer.descriptor, data, 0)
         buffer.metadata = SimpleNamespace(

@@ -54,7 +54,7 @@ def webcam_controls() -> dict[int, MockControl]:
     }
 
 
-def picture(seq: int, width: int, height: int) -> Grey:
+def drawn_image(seq: int, width: int, height: int) -> Grey:
     """A slope of grey whose brightness tells ``seq`` (modulo 128)."""
     ramp = np.linspace(0, 100, width, dtype=np.uint8)[None, :]
     return np.repeat(ramp + np.uint8(seq % 128), height, axis=0)
@@ -69,7 +69,7 @@ class MockCamera:
     modes: Modes = field(default_factory=lambda: WEBCAM)
     controls: dict[int, MockControl] = field(default_factory=webcam_controls)
     caps: int = v4l2.CAP_VIDEO_CAPTURE | v4l2.CAP_STREAMING
-    pictures: Callable[[int, int, int], Grey] = picture
+    images: Callable[[int, int, int], Grey] = drawn_image
     transfer: float = 0.5  # share of an interval from start of exposure to the filled buffer
     row_padding: int = 0  # bytes after each row
     data_offset: int = 0  # bytes before the picture, of a multi-planar device
@@ -208,7 +208,7 @@ class MockKernel:
 
     def _fill(self, file: _Open, index: int, number: int) -> v4l2.Buffer:
         camera = file.camera
-        data = encode(camera.pictures(number, file.width, file.height), file.pixel_format, camera.row_padding)
+        data = encode(camera.images(number, file.width, file.height), file.pixel_format, camera.row_padding)
         if camera.spoil:
             data = camera.spoil(data)
         if camera.short:
@@ -259,8 +259,8 @@ class MockKernel:
         """What is not there becomes the nearest that is, as the kernel's drivers do."""
         _refuse(file.camera.format_error)
         modes = file.camera.modes
-        wanted = v4l2.fourcc_text(answer.pixelformat)
-        file.pixel_format = wanted if wanted in modes else next(iter(modes))
+        requested = v4l2.fourcc_text(answer.pixelformat)
+        file.pixel_format = requested if requested in modes else next(iter(modes))
         sizes = modes[file.pixel_format]
         asked = (answer.width, answer.height)
         file.width, file.height = asked if asked in sizes else next(iter(sizes))

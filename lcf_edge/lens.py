@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from lcf_edge.config import Camera
 from lcf_edge.errors import ConfigError
-from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.image_limit import MAX_PIXELS
 
 Points = npt.NDArray[np.float32]
 """(n, 2) positions x, y in px, pixel centres at whole numbers."""
@@ -55,8 +55,8 @@ class Lens:
 
     def __post_init__(self) -> None:
         if len(self.coefficients) not in _COEFFICIENTS[self.model]:
-            wanted = " or ".join(map(str, _COEFFICIENTS[self.model]))
-            raise ConfigError(f"lens: {self.model} takes {wanted} distortion coefficients")
+            counts = " or ".join(map(str, _COEFFICIENTS[self.model]))
+            raise ConfigError(f"lens: {self.model} takes {counts} distortion coefficients")
         if not np.isfinite((self.fx, self.fy, self.cx, self.cy, *self.coefficients)).all():
             raise ConfigError("lens: intrinsics and distortion must be finite numbers")
         if min(self.fx, self.fy) <= 0:

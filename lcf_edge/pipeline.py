@@ -15,7 +15,7 @@ from lcf_edge import scene_records
 from lcf_edge.config import Config
 from lcf_edge.corners import own_parts
 from lcf_edge.corners.detector import CornerDetector
-from lcf_edge.corners.picture_quality import PictureQuality
+from lcf_edge.corners.image_quality import ImageQuality
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.ego_motion.image_rotation import ImageRotation
@@ -68,10 +68,10 @@ class Pipeline:
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
         self._lens = lens
-        seen = own_parts.in_sight(config.camera, lens.width, lens.height)
-        self._detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
+        visible = own_parts.in_sight(config.camera, lens.width, lens.height)
+        self._detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
         self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
-        self._quality = PictureQuality()
+        self._quality = ImageQuality()
         self._speed_mps = math.nan  # of the last frame
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._image_rotation = ImageRotation(lens)
@@ -79,9 +79,9 @@ class Pipeline:
         self._lost = False  # the last step found too few edges to tell its rotation
         self.filter = LineCircleFilter(config, lens)
         memory, self._plane = config.memory, ImagePlane(lens)
-        self._told_circles = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
-        self._told_objects, self._told_psi = Records(memory.objects, OBJECT), Records(memory.psi, PSI_REGION)
-        self._seen = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
+        self._circle_records = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
+        self._object_records, self._psi_records = Records(memory.objects, OBJECT), Records(memory.psi, PSI_REGION)
+        self._last_corners = NO_CORNERS, np.empty(0, np.bool_)  # of the last frame: corners, and which ψ omitted
         self._refuse_excess(config.memory.budget_mib)
 
     def _refuse_excess(self, budget_mib: float) -> None:
@@ -153,7 +153,7 @@ class Pipeline:
             notes.append("stands still")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
-        self._seen = corners, step.omitted
+        self._last_corners = corners, step.omitted
         self._speed_mps = ego.speed_mps
         return PipelineScene(
             stamp_ns=frame.stamp_ns,
@@ -182,11 +182,11 @@ class Pipeline:
 
     def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
         """The motion, with the rotation that the picture tells where it is not known well."""
-        if not self._lost and not self._motion.wants_picture(self._image_rotation.sigma_rad):
+        if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego
         turn = self._image_rotation.turn(frame.image)
-        return ego if turn is None else self._motion.see_picture(turn.turn_rad, turn.sigma_rad)
+        return ego if turn is None else self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
 
     def _expansion_hz(self) -> float:
         """Mean V/Z of the normal circles, weighed by their edges; 0 without any."""
@@ -196,30 +196,30 @@ class Pipeline:
 
     def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
         """The circles from Tr_s up, rebels first, and the object of each, 0: none."""
-        told, least = self._told_circles, self._config.filter.tr_s
-        told.count = 0
+        records, least = self._circle_records, self._config.filter.tr_s
+        records.count = 0
         objects = self.filter.objects.columns
         for kind, table in ((Kind.REBEL, self.filter.rebel), (Kind.NORMAL, self.filter.normal)):
-            scene_records.add_circles(told, table.columns, objects, kind, self._plane, least)
-        return told.told(), told.told_owners()
+            scene_records.add_circles(records, table.columns, objects, kind, self._plane, least)
+        return records.written(), records.written_owners()
 
     def _objects(self) -> Rows:
         """The objects from Tr_s up."""
-        told = self._told_objects
-        told.count = 0
+        records = self._object_records
+        records.count = 0
         least = self._config.filter.tr_s
-        scene_records.add_objects(told, self.filter.objects.columns, self._plane, least)
-        return told.told()
+        scene_records.add_objects(records, self.filter.objects.columns, self._plane, least)
+        return records.written()
 
     def _psi(self) -> Rows:
-        told = self._told_psi
-        told.count = 0
-        scene_records.add_psi(told, self.filter.psi.columns, self._plane)
-        return told.told()
+        records = self._psi_records
+        records.count = 0
+        scene_records.add_psi(records, self.filter.psi.columns, self._plane)
+        return records.written()
 
     def view(self) -> View:
         """What the last scene was made of, for those who draw it."""
-        corners, omitted = self._seen
+        corners, omitted = self._last_corners
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
         place = self._lens.distort(_points(edges.x[:n], edges.y[:n]))

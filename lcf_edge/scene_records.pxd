@@ -18,8 +18,8 @@ cdef class Records:
     cdef float[:, ::1] floats
     cdef unsigned int[::1] owner
 
-    cpdef told(self)
-    cpdef told_owners(self)
+    cpdef written(self)
+    cpdef written_owners(self)
 
 cdef bint place(Records records, ImagePlane plane, double x, double y) noexcept nogil
 cdef double right_of_axis(ImagePlane plane, double x) noexcept nogil

@@ -38,11 +38,11 @@ class Records:
         self.words, self.floats = memory_of(self.array), memory_of(self.array.view(np.float32))
         self.owner = memory_of(self.owners)
 
-    def told(self) -> npt.NDArray[np.void]:
+    def written(self) -> npt.NDArray[np.void]:
         """Those in use."""
         return self.array[: self.count].copy().view(self.record)[:, 0]
 
-    def told_owners(self) -> npt.NDArray[np.uint32]:
+    def written_owners(self) -> npt.NDArray[np.uint32]:
         """Of those in use."""
         return self.owners[: self.count].copy()
 

@@ -18,7 +18,7 @@ _FILTERS = (
 
 def try_out(machine: Machine, archive: Path) -> str:
     """What was tried, in one line. Raises ``ReleaseError`` where the archive does not do what it should."""
-    told = []
+    outcomes = []
     for suite in SUITES:
         with tempfile.TemporaryDirectory() as place:
             root = Path(place, "root")
@@ -26,8 +26,8 @@ def try_out(machine: Machine, archive: Path) -> str:
             with tarfile.open(archive) as packed:
                 packed.extractall(root / "archive", filter="data")
             (root / "dev/null").touch()  # nothing here is a device
-            told.append(f"Debian {suite}: {_tried_in(root, archive.stem)}")
-    return "; ".join(told)
+            outcomes.append(f"Debian {suite}: {_tried_in(root, archive.stem)}")
+    return "; ".join(outcomes)
 
 
 def _tried_in(root: Path, name: str) -> str:

@@ -95,8 +95,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except LcfError as error:
         sys.stderr.write(f"tests: {error}\n")
         return error.exit_status
-    for version, told in outcomes.items():
-        sys.stdout.write(f"Python {version}, {machine.name}: {told or 'passed'}\n")
+    for version, outcome in outcomes.items():
+        sys.stdout.write(f"Python {version}, {machine.name}: {outcome or 'passed'}\n")
     return 1 if any(outcomes.values()) else 0
 
 

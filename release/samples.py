@@ -15,7 +15,7 @@ from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Camera, Config, Record, Vehicle, to_toml
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
-from lcf_edge.recording.write.messages import Encoder, Seen
+from lcf_edge.recording.write.messages import Encoder, FrameAndScene
 from lcf_edge.recording.write.recording_file import RecordingFile
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.scenes import Drive, Truth
@@ -64,7 +64,7 @@ def write(drive: Drive, path: Path) -> None:
         if isinstance(item, tuple):
             frame, truth = item
             lines.append(_line(truth))
-            for message in encoder.encode(Seen(frame, pipeline.process(frame))):
+            for message in encoder.encode(FrameAndScene(frame, pipeline.process(frame))):
                 file.add(message)
         else:
             pipeline.add(item)

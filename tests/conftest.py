@@ -65,22 +65,22 @@ class Approach:
                 if self.odometry:
                     yield SpeedSample(sample_ns, self.speed_mps, 0.0)
                 sample_ns += step_ns
-            yield Frame(frame_ns, seq, self.picture(seq))
+            yield Frame(frame_ns, seq, self.image(seq))
 
     def stamp_ns(self, seq: int) -> int:
         """Time of a picture."""
         return self.start_ns + round(seq * 1e9 / self.fps)
 
-    def picture(self, seq: int) -> Grey:
+    def image(self, seq: int) -> Grey:
         """(height, width); black where the lens sees nothing."""
         scale = (self.wall_m - self.speed_mps * seq / self.fps) / self.wall_m
         middle = np.float32(self._wall.shape[0] / 2)
         at = self._rays * np.float32(scale * PINHOLE.fx) + middle
         seen = cv2.remap(self._wall, at[..., 0], at[..., 1], cv2.INTER_LINEAR, borderMode=cv2.BORDER_WRAP)
-        picture = np.asarray(np.where(np.isfinite(at[..., 0]), seen, 0), np.uint8)
+        image = np.asarray(np.where(np.isfinite(at[..., 0]), seen, 0), np.uint8)
         x = 60 + round(80 * seq / self.fps)
-        picture[60:108, x : x + 48] = self._wall[:48, :48]
-        return picture
+        image[60:108, x : x + 48] = self._wall[:48, :48]
+        return image
 
     @cached_property
     def _rays(self) -> npt.NDArray[np.float32]:

@@ -33,7 +33,7 @@ class DenseFlow:
         self._ego = Ego(config, lens)
         self._backdrop = Backdrop(config, self._ego, _SHRINK)
         self._circles = TrustedCircles()
-        self._pictures = [np.zeros((0, 0), np.uint8)] * SLOTS
+        self._images = [np.zeros((0, 0), np.uint8)] * SLOTS
         width, height = self._backdrop.size
         grid = np.meshgrid(np.arange(_BORDER, width - _BORDER, _GRID), np.arange(_BORDER, height - _BORDER, _GRID))
         self._u, self._v = (each.ravel() for each in grid)
@@ -50,11 +50,11 @@ class DenseFlow:
             judged = residual(self._tracks(small, slot), ego, self._config, _NOISE_PX, _MOVER_PX)
             circles = self._circles.update(cluster(judged, least=5, link_px=24.0, share=0.3), ego)
         if ego.due():
-            self._pictures[ego.remember()] = small
+            self._images[ego.remember()] = small
         return circles
 
     def _tracks(self, small: Grey, slot: int) -> Tracks:
-        before, _ = self._backdrop.lay(self._pictures[slot], slot)
+        before, _ = self._backdrop.lay(self._images[slot], slot)
         back, forth = self._calc(small, before), self._calc(before, small)  # back: where each pixel was
         good = np.flatnonzero(self._sure(small, back, forth))
         u, v = self._u[good], self._v[good]

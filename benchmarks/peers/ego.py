@@ -75,9 +75,9 @@ class Ego:
         self.number += 1
         return slot
 
-    def slot_back(self, pictures: int) -> int | None:
-        """Slot of the picture remembered ``pictures`` ago, or the oldest; None: there is none yet."""
-        back = min(pictures, self.number, SLOTS)
+    def slot_back(self, back_by: int) -> int | None:
+        """Slot of the picture remembered ``back_by`` ago, or the oldest; None: there is none yet."""
+        back = min(back_by, self.number, SLOTS)
         return (self.number - back) % SLOTS if back else None
 
     def homography(self, slot: int) -> Vectors:

@@ -35,7 +35,7 @@ class FrameDifference:
         self._ego = Ego(config, lens)
         self._backdrop = Backdrop(config, self._ego, _SHRINK)
         self._circles = TrustedCircles()
-        self._pictures = [np.zeros((0, 0), np.uint8)] * SLOTS
+        self._images = [np.zeros((0, 0), np.uint8)] * SLOTS
         rows, columns = self._backdrop.size[1], self._backdrop.size[0]
         self._x, self._y = np.ascontiguousarray(self._backdrop.pixels.T).reshape(2, rows, columns)
 
@@ -50,12 +50,12 @@ class FrameDifference:
         else:
             circles = self._circles.update(self._blobs(self._differs(small, slot)), ego)
         if ego.due():
-            self._pictures[ego.remember()] = small
+            self._images[ego.remember()] = small
         return circles
 
     def _differs(self, small: Grey, slot: int) -> Bytes:
         """Mask of what does not fit; 0 or 1."""
-        before, covered = self._backdrop.lay(self._pictures[slot], slot)
+        before, covered = self._backdrop.lay(self._images[slot], slot)
         gain = float(small[covered].mean()) / max(float(before[covered].mean()), 1.0)  # the exposure may have changed
         before = np.asarray(cv2.convertScaleAbs(before, alpha=gain), np.uint8)
         over = cv2.subtract(small, cv2.dilate(before, _SLACK))

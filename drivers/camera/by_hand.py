@@ -5,7 +5,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drivers.by_hand import describe_picture, watch
+from drivers.by_hand import describe_frame, watch
 from drivers.device import Device
 from drivers.errors import DriverError
 from drivers.samples import Frame
@@ -60,4 +60,4 @@ def run(
             power_line_hz=arguments.power_line_hz,
         )
 
-    return watch(open_device, arguments.seconds, describe_picture)
+    return watch(open_device, arguments.seconds, describe_frame)

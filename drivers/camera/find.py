@@ -69,13 +69,13 @@ def _by_name(name: str, kernel: Kernel) -> Node:
                     through_libcamera.add(node.card.casefold())
         except OSError as error:
             refused = error
-    wanted = name.casefold()
-    whole = [path for path, card in cards.items() if card == wanted]
-    paths = whole or [path for path, card in cards.items() if wanted in card]
+    card_or_name = name.casefold()
+    whole = [path for path, card in cards.items() if card == card_or_name]
+    paths = whole or [path for path, card in cards.items() if card_or_name in card]
     if not paths:
         if refused is not None and refused.errno in {errno.EACCES, errno.EPERM}:
             raise driver_error(name, refused) from refused
-        if any(wanted in card for card in through_libcamera):
+        if any(card_or_name in card for card in through_libcamera):
             raise WrongDeviceError(f"{name}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
         raise DeviceMissingError(f"{name}: no camera of that name; {_found(kernel)}")
     if len(paths) > 1:

@@ -88,7 +88,7 @@ class _Ready(msgspec.Struct, frozen=True, tag_field="type", tag="ready"):
     buffers: list[tuple[int, int]]  # offset and length in each descriptor
 
 
-class _Picture(msgspec.Struct, frozen=True, tag_field="type", tag="picture"):
+class _FilledBuffer(msgspec.Struct, frozen=True, tag_field="type", tag="picture"):
     index: int  # of the buffer
     sequence: int
     stamp_ns: int
@@ -101,7 +101,7 @@ class _Failure(msgspec.Struct, frozen=True, tag_field="type", tag="failure"):
     text: str
 
 
-_Message = _Cameras | _Ready | _Picture | _Failure
+_Message = _Cameras | _Ready | _FilledBuffer | _Failure
 _DECODER = msgspec.json.Decoder(_Message)
 
 
@@ -244,18 +244,18 @@ class LibcameraCamera:
 
     def _take(self) -> list[Frame]:
         """The newest of the filled buffers; all go back to libcamera."""
-        filled: list[_Picture] = []
+        filled: list[_FilledBuffer] = []
         while len(filled) < len(self._memory) and (received := self._process.receive()) is not None:
-            picture = received[0]
-            if isinstance(picture, _Picture) and 0 <= picture.index < len(self._memory):
-                self._arrivals.number(picture.sequence)
-                filled.append(picture)
+            filled_buffer = received[0]
+            if isinstance(filled_buffer, _FilledBuffer) and 0 <= filled_buffer.index < len(self._memory):
+                self._arrivals.number(filled_buffer.sequence)
+                filled.append(filled_buffer)
         if not filled:
             return []
         now_ns = self._clock.monotonic_ns()
         *older, newest = filled
-        for picture in older:
-            self._give_back(picture.index)
+        for filled_buffer in older:
+            self._give_back(filled_buffer.index)
         self.counts["overtaken"] += len(older)
         claimed_ns = monotonic(newest.stamp_ns, now_ns + self._interval_ns)
         stamp_ns = self._arrivals.stamp(claimed_ns, self._queued_ns[newest.index], now_ns)
@@ -277,15 +277,15 @@ class LibcameraCamera:
         self._queued_ns[index] = self._clock.monotonic_ns()
         self._process.give_back(index)
 
-    def _luminance(self, picture: _Picture) -> Grey:
-        if not picture.good:
+    def _luminance(self, filled_buffer: _FilledBuffer) -> Grey:
+        if not filled_buffer.good:
             raise FrameError("corrupt")
-        mode, descriptor = self.mode, self._descriptors[picture.index]
-        offset, length = self._places[picture.index]
-        end = offset + min(picture.size, length)
+        mode, descriptor = self.mode, self._descriptors[filled_buffer.index]
+        offset, length = self._places[filled_buffer.index]
+        end = offset + min(filled_buffer.size, length)
         _sync(descriptor, _BEGIN_READ)
         try:
-            with memoryview(self._memory[picture.index]) as memory, memory[offset:end] as data:
+            with memoryview(self._memory[filled_buffer.index]) as memory, memory[offset:end] as data:
                 return luminance(mode.pixel_format, data, mode.width, mode.height, mode.stride)
         finally:
             _sync(descriptor, _END_READ)

@@ -77,13 +77,13 @@ def _find(manager: Any, device: str) -> Any:
     cameras = list(manager.cameras)
     if not cameras:
         raise why_none(sorted(Path("/dev").glob("media*")))
-    wanted = device.casefold()
+    device_name = device.casefold()
     if device.startswith("/dev/"):
         found = [camera for camera in cameras if _node(device) in _property(camera, "SystemDevices", ())]
     else:
         names = [(camera, (camera.id.casefold(), _model(camera).casefold())) for camera in cameras]
-        found = [camera for camera, own in names if wanted in own]
-        found = found or [camera for camera, own in names if any(wanted in name for name in own)]
+        found = [camera for camera, own in names if device_name in own]
+        found = found or [camera for camera, own in names if any(device_name in name for name in own)]
     listed = ", ".join(f"{_model(camera)} ({camera.id})" for camera in cameras)
     if not found:
         raise Refused("missing", f"no camera of libcamera's; found: {listed}; set camera.device to one of these names")
@@ -178,9 +178,9 @@ def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[An
     width, height, fps = request["width"], request["height"], request["fps"]
     offered = camera.generate_configuration([libcamera.StreamRole.Viewfinder]).at(0).formats
     readable = {PIXEL_FORMATS[str(one)]: one for one in offered.pixel_formats if str(one) in PIXEL_FORMATS}
-    asked = request["format"]
+    requested = request["format"]
     for name in PIXEL_FORMATS.values():
-        if name not in readable or asked not in {"auto", name}:
+        if name not in readable or requested not in {"auto", name}:
             continue
         config = _configuration(libcamera, camera, readable[name], width, height)
         if config is None:
@@ -191,7 +191,9 @@ def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[An
         stream = config.at(0)
         return stream.stream, {"format": name, "width": width, "height": height, "stride": stream.stride, "fps": fps}
     described = "; ".join(f"{name}: {_sizes(offered, one)}" for name, one in readable.items())
-    raise Refused("unsupported", f"no {asked} of {width}x{height}; offered: {described or 'nothing that can be read'}")
+    raise Refused(
+        "unsupported", f"no {requested} of {width}x{height}; offered: {described or 'nothing that can be read'}"
+    )
 
 
 def _configuration(libcamera: Any, camera: Any, pixel_format: Any, width: int, height: int, mode: Any = None) -> Any:
@@ -214,7 +216,7 @@ def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: 
     Left alone, libcamera takes the mode whose size is nearest, which on many sensors is a part of the picture. What a
     mode sees is only known once it is set up. ``fallback``: where modes cannot be chosen.
     """
-    seen: list[tuple[int, int, Any]] = []
+    offers: list[tuple[int, int, Any]] = []
     for mode in _modes(libcamera, camera):
         size = request["width"], request["height"]
         config = _configuration(libcamera, camera, pixel_format, *size, mode)
@@ -225,9 +227,9 @@ def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: 
         fastest_us = _limits(camera)[0]
         if crop is not None and fastest_us * request["fps"] <= 1.01e6:
             output = mode.output_size
-            seen.append((crop.size.width * crop.size.height, output.width * output.height, config))
-    most = max((field for field, *_ in seen), default=0)
-    wide = [one for one in seen if one[0] >= _MAX_SHARE * most]
+            offers.append((crop.size.width * crop.size.height, output.width * output.height, config))
+    most = max((field for field, *_ in offers), default=0)
+    wide = [one for one in offers if one[0] >= _MAX_SHARE * most]
     return min(wide, key=lambda one: one[1])[2] if wide else fallback
 
 

@@ -38,8 +38,8 @@ class SizeOffer:
         if self.largest is None:
             return (width, height) == (self.width, self.height)
         return all(
-            low <= wanted <= high and (wanted - low) % max(step, 1) == 0
-            for wanted, low, high, step in zip(
+            low <= value <= high and (value - low) % max(step, 1) == 0
+            for value, low, high, step in zip(
                 (width, height), (self.width, self.height), self.largest, self.step, strict=True
             )
         )

@@ -178,9 +178,9 @@ class V4l2Camera:
 
 def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, height: int, fps: float) -> Mode:
     """Format, size and rate, set and read back. Raises ``UnsupportedSettingError``, ``OSError``."""
-    wanted = PIXEL_FORMATS if pixel_format == "auto" else (pixel_format,)
+    candidates = PIXEL_FORMATS if pixel_format == "auto" else (pixel_format,)
     readable = [name for name in offers.formats(node) if name in PIXEL_FORMATS]
-    choices = [(name, 1) for name in wanted if name in readable]
+    choices = [(name, 1) for name in candidates if name in readable]
     choices += [("MJPG", reduction) for reduction in REDUCTIONS if reduction > 1 and ("MJPG", 1) in choices]
     fitting = [
         (name, reduction)

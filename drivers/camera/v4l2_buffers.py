@@ -78,10 +78,10 @@ class SinglePlanar:
 
     def set_format(self, node: Node, pixel_format: str, width: int, height: int) -> Granted:
         """Ask for progressive pictures; the device grants what it can. Raises ``OSError``."""
-        asked = Format(
+        requested = Format(
             type=VIDEO_CAPTURE, width=width, height=height, pixelformat=fourcc(pixel_format), field=FIELD_NONE
         )
-        got = node.ask(S_FMT, asked)
+        got = node.ask(S_FMT, requested)
         return Granted(fourcc_text(got.pixelformat), got.width, got.height, got.bytesperline, got.field)
 
     def place(self, node: Node, index: int) -> tuple[int, int]:
@@ -104,10 +104,10 @@ class MultiPlanar:
 
     def set_format(self, node: Node, pixel_format: str, width: int, height: int) -> Granted:
         """Ask for progressive pictures; the device grants what it can. Raises ``OSError``."""
-        asked = PlanesFormat(
+        requested = PlanesFormat(
             type=VIDEO_CAPTURE_MPLANE, width=width, height=height, pixelformat=fourcc(pixel_format), field=FIELD_NONE
         )
-        got = node.ask(S_FMT, asked)
+        got = node.ask(S_FMT, requested)
         return Granted(fourcc_text(got.pixelformat), got.width, got.height, got.planes[0].bytesperline, got.field)
 
     def place(self, node: Node, index: int) -> tuple[int, int]:

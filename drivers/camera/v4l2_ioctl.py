@@ -382,8 +382,8 @@ class Node:
             raise
         self.card = text(capability.card)
         self._driver = text(capability.driver)
-        told_apart = capability.capabilities & CAP_DEVICE_CAPS
-        self.caps = int(capability.device_caps if told_apart else capability.capabilities)
+        has_own_caps = capability.capabilities & CAP_DEVICE_CAPS
+        self.caps = int(capability.device_caps if has_own_caps else capability.capabilities)
 
     @property
     def is_camera(self) -> bool:

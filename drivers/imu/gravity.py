@@ -14,7 +14,7 @@ class Gravity:
     """Looks at windows of ``WINDOW_S`` until one was at rest."""
 
     def __init__(self, rate_hz: float) -> None:
-        self._wanted = max(round(WINDOW_S * rate_hz), 4)
+        self._window_samples = max(round(WINDOW_S * rate_hz), 4)
         self._window: list[ImuSample] = []
         self._known = False
 
@@ -24,7 +24,7 @@ class Gravity:
             return None
         for sample in samples:
             self._window.append(sample)
-            if len(self._window) == self._wanted:
+            if len(self._window) == self._window_samples:
                 window, self._window = self._window, []
                 if _rests(window):
                     self._known = True

@@ -83,9 +83,11 @@ def run_by_hand(driver: str, argv: Sequence[str] | None) -> int:
     parser.add_argument("--identity", type=_number, help="of a copy, taken for the chip all the same")
     parser.add_argument("--firmware", type=Path, default=DEFAULT_SETTINGS.firmware, help="of a BMI270 (%(default)s)")
     parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
-    asked = parser.parse_args(argv)
-    settings = ImuSettings(asked.rate, asked.gyro_range, asked.accel_range, asked.identity, asked.firmware)
-    return watch(lambda: open_chip(driver, asked.bus, asked.address, settings), asked.seconds, describe_imu)
+    arguments = parser.parse_args(argv)
+    settings = ImuSettings(
+        arguments.rate, arguments.gyro_range, arguments.accel_range, arguments.identity, arguments.firmware
+    )
+    return watch(lambda: open_chip(driver, arguments.bus, arguments.address, settings), arguments.seconds, describe_imu)
 
 
 def _number(text: str) -> int:

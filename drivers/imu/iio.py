@@ -214,10 +214,10 @@ class _Buffer:
         with suppress(OSError):
             (folder / "current_timestamp_clock").write_text("monotonic")
         self._stamped = text_of(folder / "current_timestamp_clock") == "monotonic" and has(folder, STAMP)
-        wanted = (*GYRO, *ACCEL, *([STAMP] if self._stamped else []))
+        elements = (*GYRO, *ACCEL, *([STAMP] if self._stamped else []))
         for switch in (folder / "scan_elements").glob("*_en"):
-            write_to(switch, str(int(switch.name.removesuffix("_en") in wanted)))
-        self._scan = scan_of(folder, wanted)
+            write_to(switch, str(int(switch.name.removesuffix("_en") in elements)))
+        self._scan = scan_of(folder, elements)
         write_to(folder / "buffer/length", str(BUFFER_SCANS))
         watermark = folder / "buffer/watermark"
         if watermark.exists():
@@ -260,9 +260,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--gyro-range", type=int, default=DEFAULT_SETTINGS.gyro_range_dps, help="°/s (%(default)s)")
     parser.add_argument("--accel-range", type=int, default=DEFAULT_SETTINGS.accel_range_g, help="g (%(default)s)")
     parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
-    asked = parser.parse_args(argv)
-    settings = ImuSettings(asked.rate, asked.gyro_range, asked.accel_range)
-    return watch(lambda: Iio(asked.device, settings), asked.seconds, describe_imu)
+    arguments = parser.parse_args(argv)
+    settings = ImuSettings(arguments.rate, arguments.gyro_range, arguments.accel_range)
+    return watch(lambda: Iio(arguments.device, settings), arguments.seconds, describe_imu)
 
 
 if __name__ == "__main__":

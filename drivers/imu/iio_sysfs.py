@@ -58,13 +58,13 @@ def find(device: str, root: Path) -> tuple[Path, Path]:
 
 def set_rate(gyro: Path, accel: Path, rate_hz: float) -> float:
     """Set the closest rate on offer and return the one that holds; sensors may share one."""
-    held = []
+    written = []
     for folder, own in ((gyro, "in_anglvel_sampling_frequency"), (accel, "in_accel_sampling_frequency")):
         name = own if (folder / own).exists() else "sampling_frequency"
         if (folder / name).exists():
             _choose(folder / name, folder / f"{name}_available", rate_hz)
-            held.append(number_of(folder / name))
-    granted_hz = min(held, default=rate_hz)
+            written.append(number_of(folder / name))
+    granted_hz = min(written, default=rate_hz)
     if not granted_hz > 0:
         raise UnsupportedSettingError(f"{gyro.name}: says that its rate is {granted_hz:g} Hz; set imu.rate_hz")
     return granted_hz
@@ -84,15 +84,15 @@ def _set_range(folder: Path, kind: str, full_scale: float) -> None:
         _choose(folder / f"{kind}_scale", available, full_scale / end)
 
 
-def _choose(attribute: Path, available: Path, wanted: float) -> None:
+def _choose(attribute: Path, available: Path, target: float) -> None:
     """Write the closest value on offer, spelled as it is offered; nothing when it holds already."""
     text = text_of(available)
     try:
         if text.startswith("["):
             least, _, most = map(float, text.strip("[]").split())
-            choice = f"{min(max(wanted, least), most):g}"
+            choice = f"{min(max(target, least), most):g}"
         else:
-            choice = min(text.split(), key=lambda offered: abs(float(offered) - wanted), default=f"{wanted:g}")
+            choice = min(text.split(), key=lambda offered: abs(float(offered) - target), default=f"{target:g}")
     except ValueError as error:
         raise WrongDeviceError(f"{available}: not a list of numbers; is this an IMU?") from error
     if float(choice) != number_of(attribute):

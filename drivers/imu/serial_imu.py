@@ -109,10 +109,10 @@ class SerialImu:
             return
         if self._parser.frames - self._frames > FRAMES_BY_CHANCE:
             raise WrongDeviceError(f"{self.name}: frames, but no sample in them; make it send {self._protocol.needs}")
-        usual = ", ".join(map(str, self._protocol.bauds))
+        default = ", ".join(map(str, self._protocol.bauds))
         raise WrongDeviceError(
             f"{self.name}: {self._noise_bytes} bytes at {self._port.baud} baud and no valid frame; "
-            f"usual are {usual}: set imu.baud, or imu.driver if it is another IMU"
+            f"usual are {default}: set imu.baud, or imu.driver if it is another IMU"
         )
 
     def _stamps_ns(self, now_ns: int, readings: Sequence[Reading]) -> list[int]:
@@ -123,8 +123,8 @@ class SerialImu:
         if 0 in steps:
             self.counts["restarted"] += 1
             self._stamps.restart()
-        usual = max(round(self._unit_hz / self._rate_hz), 1)
-        return self._stamps.stamps_of_steps_ns(now_ns, [step or usual for step in steps])
+        step_by_rate = max(round(self._unit_hz / self._rate_hz), 1)
+        return self._stamps.stamps_of_steps_ns(now_ns, [step or step_by_rate for step in steps])
 
     def _step(self, reading: Reading) -> int:
         """Units of the clock since the reading before; 0: unknown, the device's clock began anew."""

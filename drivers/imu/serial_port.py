@@ -22,7 +22,7 @@ from drivers.errors import (
 
 READ_S = 0.1
 MAX_READ_BYTES = 4096
-USUAL_PORTS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "serial[0-9]*")
+PORT_PATTERNS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "serial[0-9]*")
 
 
 class SerialPort:
@@ -72,7 +72,7 @@ class SerialPort:
 
 def ports(devices: Path = Path("/dev")) -> list[str]:
     """The serial ports that are there, those with a lasting name first."""
-    return [str(path) for pattern in USUAL_PORTS for path in sorted(devices.glob(pattern))]
+    return [str(path) for pattern in PORT_PATTERNS for path in sorted(devices.glob(pattern))]
 
 
 def _explained(error: Exception, path: str, baud: int) -> DriverError:

@@ -118,19 +118,19 @@ class Memory:
 
     def objects(self, time_s: float, known: Sequence[Exact]) -> npt.NDArray[np.void]:
         """OBJECT records of one moment."""
-        told: dict[int, tuple[float, Exact]] = {each.number: (time_s, each) for each in known if each.in_sight}
+        known_objects: dict[int, tuple[float, Exact]] = {each.number: (time_s, each) for each in known if each.in_sight}
         hidden = {each.number: each for each in known}
         for number, (seen_s, _) in self._last.items():
-            if number in told or time_s - seen_s > REMEMBERED_S:
+            if number in known_objects or time_s - seen_s > REMEMBERED_S:
                 continue
             after = hidden.get(number)
             if after is not None:
-                told[number] = (seen_s, after)
-        self._last = told
-        for number in told:
+                known_objects[number] = (seen_s, after)
+        self._last = known_objects
+        for number in known_objects:
             self._first.setdefault(number, time_s)
-        rows = np.zeros(len(told), OBJECT)
-        for row, (seen_s, each) in zip(rows, told.values(), strict=True):
+        rows = np.zeros(len(known_objects), OBJECT)
+        for row, (seen_s, each) in zip(rows, known_objects.values(), strict=True):
             x, y, width, height = each.box
             row["id"], row["class_id"] = each.number + 1, each.class_id
             row["state"] = ObjectState.SEEN if seen_s == time_s else ObjectState.HIDDEN

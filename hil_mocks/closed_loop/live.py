@@ -41,7 +41,7 @@ class LiveDriver:
     """Hands pictures and samples to the devices as they come, and obeys the newest speed."""
 
     def __init__(self, fps: float) -> None:
-        self.wanted_mps = 0.0
+        self.target_mps = 0.0
         self._interval_s = 1 / fps
         self._due_ns = time.monotonic_ns()
         self.offset_ns = self._due_ns - START_NS  # from the world's stamps to the computer's
@@ -58,7 +58,7 @@ class LiveDriver:
         now_ns = time.monotonic_ns()
         self._due_ns = max(self._due_ns + round(self._interval_s * 1e9), now_ns)
         time.sleep((self._due_ns - now_ns) * 1e-9)
-        return self.wanted_mps
+        return self.target_mps
 
     def obey(self, line: str) -> None:
         """Take a line of the planner's; what is no speed is left alone."""
@@ -67,7 +67,7 @@ class LiveDriver:
         except ValueError:
             return
         if isfinite(speed):
-            self.wanted_mps = speed
+            self.target_mps = speed
 
     def come(self, kind: type) -> list[Item]:
         """What came of a kind since the last call; waits for it a little."""

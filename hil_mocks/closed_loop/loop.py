@@ -39,7 +39,7 @@ class Driver(Protocol):
     """Who decides."""
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted now, m/s."""
+        """The speed to drive at now, m/s."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,7 +57,7 @@ class Log:
     """What a drive was, one entry a picture."""
 
     cruise_mps: list[float] = field(default_factory=list)
-    wanted_mps: list[float] = field(default_factory=list)
+    target_mps: list[float] = field(default_factory=list)
     speed_mps: list[float] = field(default_factory=list)
     contacts: list[Contact] = field(default_factory=list)
     distance_m: float = 0.0
@@ -65,10 +65,10 @@ class Log:
     arrived: bool = False
 
 
-def drive(world: World, driver: Driver, *, pictures: bool = True) -> Log:
+def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
     """Let a driver drive through a world until its end, or until the time is over."""
     stage = Stage(world.drawn())
-    renderer = Renderer(stage) if pictures else None
+    renderer = Renderer(stage) if with_images else None
     vehicle, bodies, sensors = Vehicle(world.build, world.course, world.start_mps), Bodies(world), Sensors(world)
     log = Log()
     steps = round(IMU_HZ / world.fps)
@@ -92,7 +92,7 @@ def drive(world: World, driver: Driver, *, pictures: bool = True) -> Log:
         speed_mps, curvature = vehicle.speed_mps, world.course.curvature(vehicle.travelled_m)
         motion = Motion(vehicle.position.copy(), vehicle.axes, speed_mps, vehicle.yaw_rate_radps, curvature)
         known = tuple(exact(stage, view, motion, footprints, bodies.velocity))
-        frame = Frame(stamp_ns(time_s), seq, renderer.picture(view)) if renderer else None
+        frame = Frame(stamp_ns(time_s), seq, renderer.image(view)) if renderer else None
         advance(seq * steps, seq * steps + LATE_STEPS)
         if waits and vehicle.travelled_m >= waits[0][0]:
             rest_s = waits.pop(0)[1]
@@ -100,10 +100,10 @@ def drive(world: World, driver: Driver, *, pictures: bool = True) -> Log:
         rest_s -= 1 / world.fps if vehicle.speed_mps < STANDS_MPS else 0.0
         moment = Moment(time_s, cruise_mps, speed_mps, curvature, tuple(samples), frame, known)
         samples.clear()
-        wanted_mps = min(driver.decide(moment), cruise_mps)
-        vehicle.tell(time_s, wanted_mps)
+        target_mps = min(driver.decide(moment), cruise_mps)
+        vehicle.tell(time_s, target_mps)
         log.cruise_mps.append(cruise_mps)
-        log.wanted_mps.append(wanted_mps)
+        log.target_mps.append(target_mps)
         log.speed_mps.append(speed_mps)
         advance(seq * steps + LATE_STEPS, (seq + 1) * steps)
         left_m = world.course.length_m - vehicle.travelled_m

@@ -53,19 +53,19 @@ def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
             around = right[max(first - before, 0) : last + after + 1]
             found.append(Braking(first, last, not any(around)))
 
-    for picture, (wanted, cruise) in enumerate(zip(log.wanted_mps, log.cruise_mps, strict=True)):
-        if first is None and wanted < _BRAKES * cruise:
-            first = picture
-        elif first is not None and wanted >= _DONE * cruise:
-            end(picture - 1)
+    for number, (target_mps, cruise) in enumerate(zip(log.target_mps, log.cruise_mps, strict=True)):
+        if first is None and target_mps < _BRAKES * cruise:
+            first = number
+        elif first is not None and target_mps >= _DONE * cruise:
+            end(number - 1)
             first = None
-    end(len(log.wanted_mps) - 1)
+    end(len(log.target_mps) - 1)
     return found
 
 
-def brakes(wanted_mps: float, cruise_mps: float) -> bool:
+def brakes(target_mps: float, cruise_mps: float) -> bool:
     """Whether it is less than the cruise speed, so that a braking at the same time is not for nothing."""
-    return wanted_mps < _DONE * cruise_mps
+    return target_mps < _DONE * cruise_mps
 
 
 def judge(log: Log, right: Sequence[bool], fps: float, truth: Log, blind: Log) -> Outcome:

@@ -43,8 +43,8 @@ class Vehicle:
         self.travelled_m = 0.0  # along its course
         self.wheels_m = [0.0, 0.0]  # way of the left and of the right wheel
         self._steering_rad = 0.0
-        self._wanted_mps = speed_mps
-        self._told: deque[tuple[float, float]] = deque()  # when it takes effect, speed
+        self._target_mps = speed_mps
+        self._commands: deque[tuple[float, float]] = deque()  # when it takes effect, speed
 
     @property
     def ahead(self) -> Floats:
@@ -66,17 +66,17 @@ class Vehicle:
 
     def tell(self, time_s: float, speed_mps: float) -> None:
         """Decide a speed on the picture of a time."""
-        self._told.append((time_s + self.build.delay_s, max(speed_mps, 0.0)))
+        self._commands.append((time_s + self.build.delay_s, max(speed_mps, 0.0)))
 
     def step(self, time_s: float, dt_s: float, track_m: float) -> None:
         """Move from a time on for a short while."""
-        while self._told and self._told[0][0] <= time_s + 1e-9:
-            self._wanted_mps = self._told.popleft()[1]
+        while self._commands and self._commands[0][0] <= time_s + 1e-9:
+            self._target_mps = self._commands.popleft()[1]
         build, before = self.build, self.speed_mps
-        asked = (self._wanted_mps - before) / build.drive_lag_s
-        self.acceleration_mps2 = min(max(asked, -build.braking_mps2), build.acceleration_mps2)
+        acceleration = (self._target_mps - before) / build.drive_lag_s
+        self.acceleration_mps2 = min(max(acceleration, -build.braking_mps2), build.acceleration_mps2)
         self.speed_mps = max(before + self.acceleration_mps2 * dt_s, 0.0)
-        if self.speed_mps < 1e-3 and self._wanted_mps == 0.0:  # the brake holds it
+        if self.speed_mps < 1e-3 and self._target_mps == 0.0:  # the brake holds it
             self.speed_mps = 0.0
         self.acceleration_mps2 = (self.speed_mps - before) / dt_s
         speed = (before + self.speed_mps) / 2

@@ -99,7 +99,7 @@ def _dressed(draft: Draft, seed: int, condition: str) -> World:
         tuple(bias),
         accel_bias_mps2=tuple(random.normal(0, 0.1, 3).tolist()),
         speed_scale=float(random.normal(1, 0.015)),
-        picture=4.0 if condition == "dusk" else 2.0,
+        image=4.0 if condition == "dusk" else 2.0,
     )
     gain = Profile(((0.0, 1.0),))
     if condition == "dusk":

@@ -38,9 +38,9 @@ class Icm20948(SimulatedChip):
         """What FIFO_EN_2 asks for, in the order of the registers."""
         if not self.registers[0x03] & 0x40 or self.registers[0x68]:
             return
-        wanted = self.registers[0x67]
+        requested = self.registers[0x67]
         for bits, register in ((0x10, 0x2D), (0x0E, 0x33), (0x01, 0x39)):
-            if wanted & bits == bits:
+            if requested & bits == bits:
                 self._fifo += packed[register]
         del self._fifo[: max(len(self._fifo) - FIFO_BYTES, 0)]
 

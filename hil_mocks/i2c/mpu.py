@@ -41,9 +41,9 @@ class Mpu6050(SimulatedChip):
         """What FIFO_EN asks for, in the order of the registers."""
         if not self.registers[0x6A] & 0x40:
             return
-        wanted = self.registers[0x23]
+        requested = self.registers[0x23]
         for bits, register in ((0x08, 0x3B), (0x80, 0x41), (0x70, 0x43)):
-            if wanted & bits == bits:
+            if requested & bits == bits:
                 self._fifo += packed[register]
         del self._fifo[: max(len(self._fifo) - self.fifo_bytes, 0)]
 
@@ -95,9 +95,9 @@ class Icm20602(Mpu6500):
         """4 GYRO_FIFO_EN, 3 ACCEL_FIFO_EN; nothing else is known to it."""
         if not self.registers[0x6A] & 0x40:
             return
-        wanted = self.registers[0x23]
+        requested = self.registers[0x23]
         for bits, register in ((0x08, 0x3B), (0x18, 0x41), (0x10, 0x43)):
-            if wanted & bits:
+            if requested & bits:
                 self._fifo += packed[register]
         del self._fifo[: max(len(self._fifo) - self.fifo_bytes, 0)]
 

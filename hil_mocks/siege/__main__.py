@@ -70,7 +70,7 @@ class Figures:
 
     def judge(self, least_share: float) -> None:
         """Complain of what must not be; of frames, where fewer than this share came."""
-        for told, wrong in (
+        for complaint, wrong in (
             (
                 f"a planner was let in after {max(self.let_in_s, default=0):.1f} s",
                 max(self.let_in_s, default=0) > LET_IN_S,
@@ -81,7 +81,7 @@ class Figures:
             (f"only {self.frames_share:.0%} of the frames", self.frames_share < least_share),
         ):
             if wrong:
-                self.complaints.append(told)
+                self.complaints.append(complaint)
         for name, number in self.descriptors.items():
             if number > MAX_DESCRIPTORS[name]:
                 self.complaints.append(f"{name}: {number} descriptors")

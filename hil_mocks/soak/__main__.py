@@ -81,11 +81,11 @@ class Daemon:
         new.write_text(text, encoding="utf-8")
         new.replace(self.config)
 
-    def look(self, *, wanted: bool) -> None:
+    def look(self, *, on: bool) -> None:
         """Subscribe to the preview, or no longer."""
-        if wanted and self._preview is None:
+        if on and self._preview is None:
             self._preview = self._session.declare_subscriber("lcf/preview/compressed", lambda _: None)
-        elif not wanted and self._preview is not None:
+        elif not on and self._preview is not None:
             self._preview.undeclare()  # type: ignore[no-untyped-call]
             self._preview = None
 
@@ -127,7 +127,7 @@ class Daemon:
         """Leave nothing behind."""
         self._process.kill()
         self._process.wait()
-        self.look(wanted=False)
+        self.look(on=False)
         for subscriber in self._subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]
 
@@ -139,11 +139,11 @@ class Daemon:
         self.received += 1
 
 
-def live(daemon: Daemon, life: Life, pictures: int, seconds: float) -> None:
+def live(daemon: Daemon, life: Life, frame_limit: int, seconds: float) -> None:
     """One life, until so many pictures or seconds are over. Raises ``SoakError``."""
     begin_s = time.monotonic()
-    daemon.look(wanted=True)  # what the first look costs belongs to the warm-up
-    while life.balance.put < pictures and time.monotonic() - begin_s < seconds:
+    daemon.look(on=True)  # what the first look costs belongs to the warm-up
+    while life.balance.put < frame_limit and time.monotonic() - begin_s < seconds:
         life.note(daemon.next())
         disturb(daemon)
     life.seconds = time.monotonic() - begin_s
@@ -167,10 +167,10 @@ def disturb(daemon: Daemon) -> None:
     if daemon.random.random() < 1 / RELOAD_EACH_S:
         daemon.random.choice((daemon.spoil_configuration, lambda: daemon.configure(daemon.random.uniform(0.2, 0.6))))()
     if daemon.random.random() < 1 / LOOK_EACH_S:
-        daemon.look(wanted=daemon.random.random() < 0.5)
+        daemon.look(on=daemon.random.random() < 0.5)
 
 
-def soak(pictures: int, seconds: float, lives: int, seed: int, folder: Path) -> list[Life]:
+def soak(frame_limit: int, seconds: float, lives: int, seed: int, folder: Path) -> list[Life]:
     """As many lives of the daemon, ended in turn by SIGTERM and SIGKILL, with log and memory of each in ``folder``.
 
     Raises ``LcfError``.
@@ -188,7 +188,7 @@ def soak(pictures: int, seconds: float, lives: int, seed: int, folder: Path) -> 
         with opened_session(ZenohKeys(connect=[endpoint], listen=[])) as session:
             daemon = Daemon(place / "drive.npz", place, life.seed, endpoint, session)
             try:
-                live(daemon, life, pictures // lives, seconds / lives)
+                live(daemon, life, frame_limit // lives, seconds / lives)
                 how = signal.SIGKILL if number % 2 else signal.SIGTERM
                 life.end, life.ended_s = how.name, daemon.end(how)
             finally:
@@ -217,11 +217,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--logs", type=Path, metavar="DIR", help="keep log and memory of each life here")
     arguments = parser.parse_args(argv)
-    pictures = arguments.frames or sys.maxsize
+    frame_limit = arguments.frames or sys.maxsize
     seconds = 60 * arguments.minutes if arguments.minutes else float("inf")
     with TemporaryDirectory(prefix="lcf-edge-soak-") as temporary:
         try:
-            lived = soak(pictures, seconds, arguments.lives, arguments.seed, Path(temporary))
+            lived = soak(frame_limit, seconds, arguments.lives, arguments.seed, Path(temporary))
         except LcfError as error:
             sys.stderr.write(f"soak: {error}\n")
             return error.exit_status

@@ -59,7 +59,7 @@ class Life:
         self.memory.append((self.balance.put, float(parts["memory"].values["resident_mib"])))
         if parts["memory"].message.startswith("gave up"):
             self.gave_up = parts["memory"].message
-        told = {
+        reported = {
             f"{name} {what}": int(value)
             for name in ("camera", "imu", "speed")
             if name in parts
@@ -67,7 +67,7 @@ class Life:
             if what.startswith(("fault", "opened", "failed", "dropped"))
         }
         refused = {what: int(value) for what, value in parts["pipeline"].values.items() if what.startswith("refused")}
-        self.counts = Counter(told | refused)
+        self.counts = Counter(reported | refused)
 
 
 def slope(lives: Sequence[Sequence[tuple[int, float]]]) -> tuple[float, float]:

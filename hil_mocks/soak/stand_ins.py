@@ -37,7 +37,7 @@ def save(drive: scenes.Drive, path: Path) -> None:
     frames = [frame for frame, _ in scenes.frames(drive)]
     np.savez(
         path,
-        pictures=np.stack([frame.image for frame in frames]),
+        images=np.stack([frame.image for frame in frames]),
         imu=np.array([((one.stamp_ns - start_ns) / 1e9, *one.gyro, *one.accel) for one in scenes.imu(drive)]),
         speed=np.array(
             [((one.stamp_ns - start_ns) / 1e9, one.speed_mps, one.yaw_rate_radps) for one in scenes.odometry(drive)]
@@ -51,7 +51,7 @@ class Feed:
 
     def __init__(self, path: Path, seed: int, start_ns: int) -> None:
         with np.load(path) as drive:
-            self.pictures: npt.NDArray[np.uint8] = drive["pictures"]
+            self.images: npt.NDArray[np.uint8] = drive["images"]
             self.imu: Table = drive["imu"]
             self.speed: Table = drive["speed"]
             self.lap_s = float(drive["seconds"])
@@ -59,7 +59,7 @@ class Feed:
         self.faults: Counter[str] = Counter()
         self.seq = 0  # of the next picture
         self.start_ns = start_ns
-        self.interval_ns = round(self.lap_s / len(self.pictures) * 1e9)
+        self.interval_ns = round(self.lap_s / len(self.images) * 1e9)
         self._horizon_ns = start_ns
         self._passed = threading.Condition()
         self._taken = threading.Event()
@@ -82,10 +82,10 @@ class Feed:
             return True
         return False
 
-    def advance(self, pictures: int = 1) -> int:
+    def advance(self, frames: int = 1) -> int:
         """Let time pass, with all samples up to the next picture and one more. Return its stamp."""
         with self._passed:
-            self.seq += pictures
+            self.seq += frames
             stamp_ns = self.start_ns + (self.seq - 1) * self.interval_ns
             self._horizon_ns = stamp_ns + self.interval_ns // 4
             self._passed.notify_all()
@@ -126,7 +126,7 @@ class FastCamera:
             return []
         self._begin_fault()
         stamp_ns = feed.advance(1 + self._skipped())
-        image = feed.pictures[(feed.seq - 1) % len(feed.pictures)].copy()
+        image = feed.images[(feed.seq - 1) % len(feed.images)].copy()
         if self._fault == "dark":
             image[:] = 3
         elif self._fault == "noise":

@@ -12,7 +12,7 @@ from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.calibrate.target import Sighting, Target
 from lcf_edge.calibrate.views import CELLS, Views
 from lcf_edge.lens import Lens
@@ -59,13 +59,13 @@ class Solution:
         return float(np.sqrt((np.concatenate(self.residuals) ** 2).sum(axis=1).mean()))
 
 
-def calibrate_camera(source: Source, board: Target, model: Model, wanted: int, guide: Guide) -> Result:
-    """Lens by ``wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
-    views = collect(source, board, wanted, guide)
+def calibrate_camera(source: SensorSource, board: Target, model: Model, views_wanted: int, guide: Guide) -> Result:
+    """Lens by ``views_wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
+    views = collect(source, board, views_wanted, guide)
     return solve(views, model)
 
 
-def collect(source: Source, board: Target, wanted: int, guide: Guide) -> Views:
+def collect(source: SensorSource, board: Target, views_wanted: int, guide: Guide) -> Views:
     """Views of the board, with prompts where it should be held."""
     views = Views(board, source.film)
     if source.live:
@@ -75,20 +75,20 @@ def collect(source: Source, board: Target, wanted: int, guide: Guide) -> Views:
             continue
         reason = views.consider(item)
         if not reason and source.live:
-            guide.say(f"view {len(views.kept)} of {wanted} taken")
-        if len(views.kept) >= wanted and source.live:
+            guide.say(f"view {len(views.kept)} of {views_wanted} taken")
+        if len(views.kept) >= views_wanted and source.live:
             break
         guide.progress(f"{len(views.kept)} views; {f'{reason}; ' if reason else ''}{views.wish()}")
     guide.end()
-    if not source.live and len(views.kept) > wanted:
-        _thin_out(views, wanted)
+    if not source.live and len(views.kept) > views_wanted:
+        _thin_out(views, views_wanted)
     return views
 
 
-def _thin_out(views: Views, wanted: int) -> None:
-    """Keep ``wanted`` views, spread over the recording."""
-    rows = np.linspace(0, len(views.kept) - 1, wanted).round().astype(int)
-    views.left_out["more than asked for"] += len(views.kept) - wanted
+def _thin_out(views: Views, views_wanted: int) -> None:
+    """Keep ``views_wanted`` views, spread over the recording."""
+    rows = np.linspace(0, len(views.kept) - 1, views_wanted).round().astype(int)
+    views.left_out["more than asked for"] += len(views.kept) - views_wanted
     views.kept = [views.kept[row] for row in rows]
 
 

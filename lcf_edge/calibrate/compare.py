@@ -8,7 +8,7 @@ import numpy.typing as npt
 from drivers.samples import Frame, ImuSample
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.image_rotation import Turn, turn
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.calibrate.tracks import Tracker
 from lcf_edge.config import Config
 from lcf_edge.lens import Lens
@@ -34,7 +34,7 @@ class Watched:
             self.brisk_s += (turned.end_ns - turned.start_ns) * 1e-9
 
 
-def watch(source: Source, config: Config, seconds: float | None, guide: Guide) -> Watched:
+def watch(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Watched:
     """Everything from ``source``; live for ``seconds``, 20 unless given. Raises what the source raises."""
     if source.live:
         seconds = seconds or LIVE_S
@@ -42,28 +42,28 @@ def watch(source: Source, config: Config, seconds: float | None, guide: Guide) -
             f"Turn it in place for {seconds:g} s: to and fro, nod, tilt, briskly and unevenly, before something still "
             "that is some metres away."
         )
-    seen, tracker = Watched(), None
+    watched, tracker = Watched(), None
     for item in for_a_while(source.items(), seconds, Frame):
         if isinstance(item, ImuSample):
-            seen.samples.append(item)
+            watched.samples.append(item)
             continue
         if tracker is None:
-            lens, seen.guessed = lens_of(source, config, item)
+            lens, watched.guessed = lens_of(source, config, item)
             tracker = Tracker(lens)
         tracks = tracker.add(item)
         if tracks is not None:
-            seen.add(turn(tracks, travel(config)))
+            watched.add(turn(tracks, travel(config)))
         guide.progress(
-            f"{len(seen.turns)} pictures, {len(seen.samples)} samples, {seen.brisk_s:.0f} s of brisk turning"
+            f"{len(watched.turns)} pictures, {len(watched.samples)} samples, {watched.brisk_s:.0f} s of brisk turning"
         )
     guide.end()
     if tracker is not None:
         for reason, count in tracker.left_out.items():
             guide.say(f"left out: {count} intervals, {reason}")
-    return seen
+    return watched
 
 
-def lens_of(source: Source, config: Config, frame: Frame) -> tuple[Lens, bool]:
+def lens_of(source: SensorSource, config: Config, frame: Frame) -> tuple[Lens, bool]:
     """The lens for ``frame``, and whether it is only guessed."""
     height, width = frame.image.shape
     lens = source.lens(width, height)

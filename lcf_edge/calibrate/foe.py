@@ -20,7 +20,7 @@ from lcf_edge.calibrate.compare import lens_of
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.image_rotation import motion_field, turn
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.calibrate.tracks import Tracker, Tracks
 from lcf_edge.config import Config
 from lcf_edge.lens import Lens
@@ -71,7 +71,7 @@ class Focus:
         return float(np.arctan(self.slope[1]))
 
 
-def calibrate_foe(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+def calibrate_foe(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``camera.yaw_rad`` and ``camera.pitch_rad``. Raises ``CalibrationError``."""
     if source.live:
         seconds = seconds or LIVE_S

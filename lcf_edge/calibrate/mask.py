@@ -16,7 +16,7 @@ from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ Polygon = list[list[float]]
 LIVE_S = 30.0
 
 _APART_S = 0.2  # pictures that are closer tell the same again
-_MIN_PICTURES = 20
+_MIN_FRAMES = 20
 _SMOOTH_PX = 1.0
 _STILL = 0.8  # mean gradient to the root mean square
 _TEXTURED = 6.0  # root mean square of the gradients; by Sobel's weights, 8 are one grey level a px
@@ -46,7 +46,7 @@ class Stillness:
     """How much of every pixel's gradient stays over the pictures of a drive."""
 
     def __init__(self, height: int, width: int) -> None:
-        self.pictures = 0
+        self.frames = 0
         self._sum = np.zeros((2, height, width), np.float32)
         self._squares = np.zeros((height, width), np.float32)
 
@@ -57,19 +57,19 @@ class Stillness:
         self._sum[0] += gx
         self._sum[1] += gy
         self._squares += gx * gx + gy * gy
-        self.pictures += 1
+        self.frames += 1
 
     def textured(self) -> Marked:
         """Where there is something to see, still or not."""
-        return np.asarray(self._squares >= _TEXTURED**2 * self.pictures)
+        return np.asarray(self._squares >= _TEXTURED**2 * self.frames)
 
     def still(self) -> Marked:
         """Where it never moves."""
         along, down = self._sum
-        return np.asarray(along**2 + down**2 > _STILL**2 * self.pictures * self._squares) & self.textured()
+        return np.asarray(along**2 + down**2 > _STILL**2 * self.frames * self._squares) & self.textured()
 
 
-def calibrate_mask(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``camera.mask`` by what never moves. Raises ``CalibrationError``."""
     if source.live:
         seconds = seconds or LIVE_S
@@ -82,7 +82,7 @@ def calibrate_mask(source: Source, config: Config, seconds: float | None, guide:
         stillness = stillness or Stillness(*item.image.shape)
         image, last_ns = item.image, item.stamp_ns
         stillness.add(image)
-        guide.progress(f"{stillness.pictures} pictures")
+        guide.progress(f"{stillness.frames} pictures")
     guide.end()
     if stillness is None:
         raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
@@ -90,13 +90,13 @@ def calibrate_mask(source: Source, config: Config, seconds: float | None, guide:
     polygons = outlines(own)
     if not polygons:
         raise CalibrationError(
-            f"camera: nothing stands still in {stillness.pictures} pictures; outline what is in view with --polygon"
+            f"camera: nothing stands still in {stillness.frames} pictures; outline what is in view with --polygon"
         )
-    words = f"{stillness.pictures} pictures; {len(polygons)} own parts, {own.mean():.1%} of the picture"
+    words = f"{stillness.frames} pictures; {len(polygons)} own parts, {own.mean():.1%} of the picture"
     return _result(polygons, image, config, (words,))
 
 
-def given_mask(source: Source, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
+def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
     """``camera.mask`` as given, px of the source's pictures. Raises ``CalibrationError``."""
     image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
     guide.end()
@@ -107,9 +107,9 @@ def given_mask(source: Source, config: Config, polygons: Sequence[Polygon], guid
 
 def own_parts(stillness: Stillness) -> Marked:
     """What stands still, and the plain surfaces that it encloses. Raises ``CalibrationError``."""
-    if stillness.pictures < _MIN_PICTURES:
+    if stillness.frames < _MIN_FRAMES:
         raise CalibrationError(
-            f"camera: {stillness.pictures} pictures {_APART_S:g} s apart, {_MIN_PICTURES} are needed; drive longer"
+            f"camera: {stillness.frames} pictures {_APART_S:g} s apart, {_MIN_FRAMES} are needed; drive longer"
         )
     textured, still = stillness.textured(), stillness.still()
     moves = 1 - still.sum() / max(textured.sum(), 1)

@@ -19,7 +19,7 @@ from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.rest import Rest, measure
 from lcf_edge.calibrate.result import CalibrationError, Result
 from lcf_edge.calibrate.rotations import best_rotation
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.config import Camera, Config
 
 if TYPE_CHECKING:
@@ -163,7 +163,7 @@ class Motions:
         return self.samples[first:]
 
 
-def calibrate_motions(source: Source, config: Config, snap_rad: float, guide: Guide) -> Result:
+def calibrate_motions(source: SensorSource, config: Config, snap_rad: float, guide: Guide) -> Result:
     """``imu.axes`` and ``imu.gyro_noise_radps``. Raises ``CalibrationError``."""
     motions = Motions()
     if source.live:

@@ -12,7 +12,7 @@ from drivers.samples import ImuSample
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source, for_a_while
+from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.config import Config, Vehicle
 from lcf_edge.ego_motion.estimator import EgoMotionEstimator
 
@@ -79,7 +79,7 @@ class Rest:
         )
 
 
-def calibrate_rest(source: Source, seconds: float | None, guide: Guide) -> Result:
+def calibrate_rest(source: SensorSource, seconds: float | None, guide: Guide) -> Result:
     """``imu.gyro_noise_radps``. Raises ``CalibrationError``."""
     if source.live:
         seconds = seconds or LIVE_S

@@ -21,17 +21,17 @@ from lcf_edge.devices import open_camera, open_imu
 from lcf_edge.errors import ConfigError, RecordingError
 from lcf_edge.lens import Lens
 from lcf_edge.recording.read import open_recording
-from lcf_edge.recording.read.pictures import PictureFolder
+from lcf_edge.recording.read.images import ImageFolder
 
 Item = Frame | ImuSample
 
 _AS_IT_COMES = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-_HELD = 512
+_MAX_WAITING = 512
 _MAX_CLOSE_S = 2.0
 _POLL_S = 0.2
 
 
-class Source(Protocol):
+class SensorSource(Protocol):
     """``live``: a person can still do something; ``film``: pictures follow each other closely."""
 
     live: bool
@@ -55,7 +55,7 @@ class RecordedSource:
         self._config = in_imu_axes(config)
         self._recording = open_recording(path, self._config)
         self._guide = guide
-        self.film = not isinstance(self._recording, PictureFolder)
+        self.film = not isinstance(self._recording, ImageFolder)
         if imu and not self._recording.has_imu:
             raise RecordingError(f"{path}: no inertial samples in it; name a recording with an IMU")
 
@@ -90,8 +90,8 @@ class LiveSource:
         """In the order of arrival, for ever."""
         with ExitStack() as stack:
             devices: list[Device[Any]] = []
-            for wanted, open_device in ((self._camera, open_camera), (self._imu, open_imu)):
-                device = open_device(self._config) if wanted else None
+            for is_needed, open_device in ((self._camera, open_camera), (self._imu, open_imu)):
+                device = open_device(self._config) if is_needed else None
                 if device is not None:
                     stack.callback(device.close)
                     devices.append(device)
@@ -124,7 +124,7 @@ def _configured_lens(config: Config, width: int, height: int) -> Lens | None:
 
 def _merged(devices: list[Device[Any]]) -> Iterator[Item]:
     """What several devices deliver, each read in a thread of its own. Raises ``DriverError``."""
-    arrived: queue.Queue[Item | DriverError] = queue.Queue(_HELD)
+    arrived: queue.Queue[Item | DriverError] = queue.Queue(_MAX_WAITING)
     ended = threading.Event()
 
     def put(item: Item | DriverError) -> None:

@@ -116,11 +116,11 @@ class Target:
 
         drawn = self.draw(_PIXELS_PER_SQUARE)
         margin = (_PIXELS_PER_SQUARE // 2,) * 4
-        picture = cv2.copyMakeBorder(drawn, *margin, cv2.BORDER_CONSTANT, value=255)
-        height_mm, width_mm = (1000 * self.square_m * side / _PIXELS_PER_SQUARE for side in picture.shape[:2])
+        image = cv2.copyMakeBorder(drawn, *margin, cv2.BORDER_CONSTANT, value=255)
+        height_mm, width_mm = (1000 * self.square_m * side / _PIXELS_PER_SQUARE for side in image.shape[:2])
         figure = Figure(figsize=(width_mm / _MM_PER_INCH, height_mm / _MM_PER_INCH), dpi=_PRINT_DPI)
         axes = figure.add_axes((0, 0, 1, 1))
-        axes.imshow(picture, cmap="gray", vmin=0, vmax=255, interpolation="nearest", aspect="auto")
+        axes.imshow(image, cmap="gray", vmin=0, vmax=255, interpolation="nearest", aspect="auto")
         axes.set_axis_off()
         axes.text(
             0.01, 0.01, f"{self.name}, print at 100 %", fontsize=7, color="0.4", transform=axes.transAxes, va="bottom"

@@ -10,7 +10,7 @@ from lcf_edge.calibrate.alignment import Alignment, align
 from lcf_edge.calibrate.compare import Watched, watch
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import Source
+from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.config import Config
 
 if TYPE_CHECKING:
@@ -19,21 +19,21 @@ if TYPE_CHECKING:
 _MAX_SIGMA_S = 0.004
 
 
-def calibrate_time(source: Source, config: Config, seconds: float | None, guide: Guide) -> Result:
+def calibrate_time(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
     """``imu.time_offset_s``. Raises ``CalibrationError``."""
-    seen = watch(source, config, seconds, guide)
-    alignment = align(seen.turns, seen.samples, config.imu.time_offset_s)
+    watched = watch(source, config, seconds, guide)
+    alignment = align(watched.turns, watched.samples, config.imu.time_offset_s)
     if alignment.offset_sigma_s > _MAX_SIGMA_S:
         raise CalibrationError(
             f"camera and imu: the offset is only known to {1000 * alignment.offset_sigma_s:.1f} ms; turn more briskly, "
             "or for more seconds"
         )
     findings = (
-        f"{len(alignment.camera)} intervals between pictures, {len(seen.samples)} inertial samples",
+        f"{len(alignment.camera)} intervals between pictures, {len(watched.samples)} inertial samples",
         f"turned {_rates(alignment)} about the camera's x, y, z (root mean square)",
         f"offset: {1000 * alignment.offset_s:.1f} ± {1000 * alignment.offset_sigma_s:.1f} ms (camera less IMU time)",
         f"correlation: {alignment.correlation:.3f}; 50 ms beside: {beside(alignment):.3f}",
-        *guessed(seen),
+        *guessed(watched),
     )
     return Result(findings, "imu", {"time_offset_s": round(alignment.offset_s, 4)}, painter(alignment))
 
@@ -44,9 +44,9 @@ def beside(alignment: Alignment, by_s: float = 0.05) -> float:
     return float(np.interp(both, alignment.offsets_s, alignment.correlations).max())
 
 
-def guessed(seen: Watched) -> tuple[str, ...]:
+def guessed(watched: Watched) -> tuple[str, ...]:
     """A line where the lens is not known."""
-    return ("the lens is guessed; better: lcf-edge calibrate camera first",) if seen.guessed else ()
+    return ("the lens is guessed; better: lcf-edge calibrate camera first",) if watched.guessed else ()
 
 
 def _rates(alignment: Alignment) -> str:

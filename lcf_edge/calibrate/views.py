@@ -18,10 +18,10 @@ _MAX_EDGE_PX = 5.0
 _MAX_MOTION_PX = 1.0  # between two pictures of a film
 _MAX_INTERVAL_S = 1.0  # finding a board takes a small computer most of that
 _MIN_CORNER_SHIFT = 0.08  # of the picture's width, that the board's corners are from where they were in any other view
-_MIN_CORNER_SHIFT_OF_PICTURES = 0.01  # somebody chose these
+_MIN_CORNER_SHIFT_OF_IMAGES = 0.01  # somebody chose these
 _SIDES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 _TILTED = 1.12  # ratio of opposite sides
-_WANTED_TILTED = 0.5  # share of the views
+_MIN_TILTED = 0.5  # share of the views
 
 
 @dataclass
@@ -42,54 +42,54 @@ class Views:
     def consider(self, frame: Frame) -> str:
         """Keep the board in ``frame``, or return the reason why not; "" when it is kept."""
         self.size = frame.image.shape[1], frame.image.shape[0]
-        seen = self.board.find(frame.image)
-        before, self._before = self._before, None if seen is None else (frame.stamp_ns, seen)
-        reason = "no board" if seen is None else self._flaw(seen, before, frame.stamp_ns)
+        sighting = self.board.find(frame.image)
+        before, self._before = self._before, None if sighting is None else (frame.stamp_ns, sighting)
+        reason = "no board" if sighting is None else self._flaw(sighting, before, frame.stamp_ns)
         if reason:
             self.left_out[reason] += 1
         return reason
 
-    def _flaw(self, seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> str:
-        if seen.edge_px > _MAX_EDGE_PX:
+    def _flaw(self, sighting: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> str:
+        if sighting.edge_px > _MAX_EDGE_PX:
             return "blurred"
-        if self.film and not _stands(seen, before, stamp_ns):
+        if self.film and not _stands(sighting, before, stamp_ns):
             return "moving"
-        outline = self._outline(seen)
+        outline = self._outline(sighting)
         if outline is None:
             return "too few corners"
         news = min((np.hypot(*(outline - other).T).mean() for other in self._outlines), default=np.inf)
-        if news < (_MIN_CORNER_SHIFT if self.film else _MIN_CORNER_SHIFT_OF_PICTURES) * self.size[0]:
+        if news < (_MIN_CORNER_SHIFT if self.film else _MIN_CORNER_SHIFT_OF_IMAGES) * self.size[0]:
             return "seen like this before"
-        self.kept.append(seen)
+        self.kept.append(sighting)
         self._outlines.append(outline)
         return ""
 
     def covered(self) -> npt.NDArray[np.bool_]:
         """(down, across) cells of the picture in which a corner was seen."""
-        seen = np.zeros(CELLS[::-1], np.bool_)
+        sighting = np.zeros(CELLS[::-1], np.bool_)
         for view in self.kept:
             column, row = (np.clip(view.corners / self.size, 0, 0.999) * CELLS).astype(int).T
-            seen[row, column] = True
-        return seen
+            sighting[row, column] = True
+        return sighting
 
     def wish(self) -> str:
         """What the next view should be like."""
         tilted = sum(_foreshortening(outline) > _TILTED for outline in self._outlines)
-        if len(self.kept) >= 4 and tilted < _WANTED_TILTED * len(self.kept):
+        if len(self.kept) >= 4 and tilted < _MIN_TILTED * len(self.kept):
             return "tilt it, by 30 to 45°, another way than before"
-        held = np.zeros((3, 3), int)
+        views_in = np.zeros((3, 3), int)
         for view in self.kept:
             column, row = np.clip(view.corners.mean(axis=0) / self.size * 3, 0, 2.999).astype(int)
-            held[row, column] += 1
-        held[1, 1] += 1  # the middle comes by itself
-        row, column = np.unravel_index(np.argmin(held), held.shape)
+            views_in[row, column] += 1
+        views_in[1, 1] += 1  # the middle comes by itself
+        row, column = np.unravel_index(np.argmin(views_in), views_in.shape)
         where = f"{_SIDES[0][row]} {_SIDES[1][column]}".replace("middle middle", "middle")
         return f"hold it in the {where} of the picture, so near that it fills a third of it"
 
-    def _outline(self, seen: Sighting) -> Floats | None:
+    def _outline(self, sighting: Sighting) -> Floats | None:
         """(4, 2) where the board's outer corners are, or would be; None: too few to tell."""
         places = self.board.places[:, :2]
-        homography = np.asarray(cv2.findHomography(places[seen.numbers], seen.corners)[0])
+        homography = np.asarray(cv2.findHomography(places[sighting.numbers], sighting.corners)[0])
         if homography.shape != (3, 3):
             return None
         (left, top), (right, bottom) = places.min(axis=0), places.max(axis=0)
@@ -98,12 +98,12 @@ class Views:
         return outline if np.abs(outline).max() < 10 * max(self.size) else None
 
 
-def _stands(seen: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
+def _stands(sighting: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
     """Whether the corners are where they were in the picture before."""
     if before is None or stamp_ns - before[0] > _MAX_INTERVAL_S * 1e9:
         return False
-    _, now, then = np.intersect1d(seen.numbers, before[1].numbers, return_indices=True)
-    moved = seen.corners[now] - before[1].corners[then]
+    _, now, then = np.intersect1d(sighting.numbers, before[1].numbers, return_indices=True)
+    moved = sighting.corners[now] - before[1].corners[then]
     return bool(len(moved)) and float(np.median(np.hypot(*moved.T))) < _MAX_MOTION_PX
 
 

@@ -275,8 +275,8 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         metavar="X,Y,X,Y,...",
         help="an outline, px of the picture, in place of what never moves; may be given several times",
     )
-    for kind, usual in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
-        text = f"how long to take ({usual}; of a recording: all)"
+    for kind, default_s in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
+        text = f"how long to take ({default_s}; of a recording: all)"
         kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
 

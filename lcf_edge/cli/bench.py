@@ -158,8 +158,8 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
     compiled = "uncompiled" if uncompiled() else "compiled"
     where = f"{computer.board}, {computer.machine}, {computer.cores} cores"
     short = " ".join(
-        f"{name} {usual:.2f}/{slow:.2f}/{paced_usual:.2f}/{paced_slow:.2f} ms"
-        for name, (usual, slow), (paced_usual, paced_slow) in zip(
+        f"{name} {middle:.2f}/{slow:.2f}/{paced_middle:.2f}/{paced_slow:.2f} ms"
+        for name, (middle, slow), (paced_middle, paced_slow) in zip(
             ("detect", "filter", "whole"), _figures(fast), _figures(paced), strict=True
         )
     )
@@ -167,8 +167,8 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
         f"computer   {where}; {computer.software}",
         f"filter     {uncompiled() or 'compiled'}",
         f"drive      {KIND}, 640x480, {fast.corners:.0f} corners a frame",
-        f"full speed {fast.frames_a_second:.0f} frames a second on one core; {_told(fast)}",
-        f"{CAMERA_HZ} a second {paced.share_of_a_core:.1%} of a core; {_told(paced)}",
+        f"full speed {fast.frames_a_second:.0f} frames a second on one core; {_stage_times(fast)}",
+        f"{CAMERA_HZ} a second {paced.share_of_a_core:.1%} of a core; {_stage_times(paced)}",
         "",
         f"lcf-edge {__version__} {compiled} | {where} | {computer.software} | {fast.corners:.0f} corners | "
         f"{fast.frames_a_second:.0f} frames/s | {short} | {paced.share_of_a_core:.1%} of a core at {CAMERA_HZ}/s",
@@ -177,13 +177,13 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
 
 def _figures(measured: Measured) -> list[tuple[float, float]]:
     """Median and 99th percentile of each stage."""
-    usual, slow = np.percentile(measured.stages_ms, (50, 99), axis=0)
-    return [*zip(usual.tolist(), slow.tolist(), strict=True)]
+    middle, slow = np.percentile(measured.stages_ms, (50, 99), axis=0)
+    return [*zip(middle.tolist(), slow.tolist(), strict=True)]
 
 
-def _told(measured: Measured) -> str:
+def _stage_times(measured: Measured) -> str:
     stages = ", ".join(
-        f"{name} {usual:.2f} / {slow:.2f}"
-        for name, (usual, slow) in zip(("detect", "filter", "whole"), _figures(measured), strict=True)
+        f"{name} {middle:.2f} / {slow:.2f}"
+        for name, (middle, slow) in zip(("detect", "filter", "whole"), _figures(measured), strict=True)
     )
     return f"{stages} ms (median / 99 %)"

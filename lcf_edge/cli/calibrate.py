@@ -16,7 +16,7 @@ from lcf_edge.calibrate.motions import calibrate_motions
 from lcf_edge.calibrate.report import check_report, save_report
 from lcf_edge.calibrate.rest import calibrate_rest
 from lcf_edge.calibrate.result import Result
-from lcf_edge.calibrate.sources import LiveSource, RecordedSource, Source
+from lcf_edge.calibrate.sources import LiveSource, RecordedSource, SensorSource
 from lcf_edge.calibrate.target import PRINT_SUFFIXES, Target
 from lcf_edge.calibrate.time_offset import calibrate_time
 from lcf_edge.config import DEFAULT_PATH, Config
@@ -88,7 +88,7 @@ def mask(task: Task, polygons: list[Polygon] | None) -> list[str]:
 
 
 def _calibrate(
-    task: Task, measure: Callable[[Source, Guide], Result], *, camera: bool = True, imu: bool = True
+    task: Task, measure: Callable[[SensorSource, Guide], Result], *, camera: bool = True, imu: bool = True
 ) -> list[str]:
     """Findings as comments, then the lines of the configuration: the whole is TOML."""
     file = task.file or DEFAULT_PATH
@@ -97,7 +97,7 @@ def _calibrate(
     if task.write:
         config_file.check_writable(file)
     guide = Guide()
-    source: Source
+    source: SensorSource
     if task.recording:
         source = RecordedSource(task.recording, task.config, guide, imu=imu)
     else:

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 from lcf_edge.cli.arguments import parser
 from lcf_edge.cli.namesake import namesake
 from lcf_edge.errors import LcfError, UsageError
-from lcf_edge.picture_limit import limit_opencv
+from lcf_edge.image_limit import limit_opencv
 from lcf_edge.printable import printable
 
 if other := namesake("drivers"):
@@ -27,7 +27,7 @@ from drivers.errors import DriverError
 if TYPE_CHECKING:
     from lcf_edge.cli.calibrate import Task
     from lcf_edge.config import Config
-    from lcf_edge.monitor.live.source import Source
+    from lcf_edge.monitor.live.daemon_address import DaemonAddress
     from lcf_edge.monitor.replay.replayed import Replayed
     from lcf_edge.recording.pace import Pace
 
@@ -91,10 +91,10 @@ def _record(arguments: argparse.Namespace) -> None:
     _tell(record(arguments.file, arguments.seconds, arguments.config, arguments.set))
 
 
-def _source(arguments: argparse.Namespace) -> "Source":
-    from lcf_edge.monitor.live.source import Source  # noqa: PLC0415
+def _daemon_address(arguments: argparse.Namespace) -> "DaemonAddress":
+    from lcf_edge.monitor.live.daemon_address import DaemonAddress  # noqa: PLC0415
 
-    return Source(arguments.connect, arguments.prefix, arguments.zenoh_config)
+    return DaemonAddress(arguments.connect, arguments.prefix, arguments.zenoh_config)
 
 
 def _pace(arguments: argparse.Namespace) -> "Pace":
@@ -103,7 +103,7 @@ def _pace(arguments: argparse.Namespace) -> "Pace":
     return Pace(arguments.start, arguments.duration, arguments.speed, arguments.loop, arguments.step)
 
 
-def _seen(arguments: argparse.Namespace) -> "Source | Replayed":
+def _shown(arguments: argparse.Namespace) -> "DaemonAddress | Replayed":
     """A recording, if one is named, else a daemon. Raises ``UsageError``: what is for one is given to the other."""
     from lcf_edge.recording.pace import Pace  # noqa: PLC0415
 
@@ -111,7 +111,7 @@ def _seen(arguments: argparse.Namespace) -> "Source | Replayed":
     if arguments.recording is None:
         if pace != Pace() or arguments.config or arguments.set:
             raise UsageError(f"{arguments.command}: options of a recording, and none is named; name RECORDING")
-        return _source(arguments)
+        return _daemon_address(arguments)
     from lcf_edge.monitor.replay.replayed import Replayed  # noqa: PLC0415
 
     return Replayed(arguments.recording, _load(arguments), pace)
@@ -123,9 +123,9 @@ def _watch(arguments: argparse.Namespace) -> None:
     if arguments.json:
         if arguments.recording is not None:
             raise UsageError("watch: --json is for a daemon; lcf-edge replay RECORDING -o - tells a line a picture")
-        watch_lines(_source(arguments), _tell)
+        watch_lines(_daemon_address(arguments), _tell)
     else:
-        watch_table(_seen(arguments), _tell)
+        watch_table(_shown(arguments), _tell)
 
 
 def _gate(arguments: argparse.Namespace) -> None:
@@ -137,13 +137,13 @@ def _gate(arguments: argparse.Namespace) -> None:
 def _view(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.view import view  # noqa: PLC0415
 
-    view(_seen(arguments), arguments.listen, arguments.port, _tell)
+    view(_shown(arguments), arguments.listen, arguments.port, _tell)
 
 
 def _foxglove(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.foxglove import foxglove  # noqa: PLC0415
 
-    foxglove(_source(arguments), arguments.port, _tell)
+    foxglove(_daemon_address(arguments), arguments.port, _tell)
 
 
 def _replay(arguments: argparse.Namespace) -> None:

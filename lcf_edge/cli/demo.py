@@ -45,7 +45,7 @@ from lcf_edge.sinks.video import VideoSink
 from lcf_edge.zenoh_link import ScenePublisher, close_session, open_session
 
 SEED = 1
-PICTURES = 4
+DRAWN_FRAMES = 4
 
 _SUBSCRIBER_STARTS_S = 20.0
 _SUBSCRIBER_ENDS_S = 20.0
@@ -96,13 +96,13 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         received = _finish(subscriber, publisher.sent)
         memory_mib = peak_resident_mib()
 
-    (usual,) = config.zenoh.listen
+    (default,) = config.zenoh.listen
     _write(folder / "config.toml", to_toml(config).encode())
     threats = findings(scenes.truths(drive), rebels)
-    wanted = [threat.found_seq for threat in threats if threat.found_seq is not None]
-    pictures = sorted({most_psi[1], *wanted[: PICTURES - 1]})
+    found_seqs = [threat.found_seq for threat in threats if threat.found_seq is not None]
+    drawn = sorted({most_psi[1], *found_seqs[: DRAWN_FRAMES - 1]})
     say(f"4/5 drawing what the filter saw: {folder}")
-    _draw(recording, config, folder, pictures, video)
+    _draw(recording, config, folder, drawn, video)
     if plot is not None:
         say(f"5/5 plotting the sizes of the tables: {plot.path}")
         plot.close()
@@ -110,15 +110,15 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         say(f"    warning: {warning}")
     say("")
     for line in (
-        *(_told(threat) for threat in threats),
+        *(_found_line(threat) for threat in threats),
         *summary.lines(recording.skipped),
         f"memory   {memory_mib:.0f} MiB at most, of the process that filters and publishes",
         f"received {received.scenes} of {publisher.sent} scenes in the second process, "
         f"{received.bytes / 1e3:.0f} kB, {received.circles} circles, {received.broken} broken",
         "",
         "To see it live, publish in one terminal and subscribe in another:",
-        *([] if endpoint == usual else [f"(after you have stopped what has {usual} now)"]),
-        *_live_lines(folder, usual),
+        *([] if endpoint == default else [f"(after you have stopped what has {default} now)"]),
+        *_live_lines(folder, default),
     ):
         say(line)
 
@@ -173,9 +173,9 @@ def _render(drive: scenes.Drive, folder: Path) -> None:
 
 def _open_link() -> tuple[zenoh.Session, str]:
     """A session that listens on the usual port, or on a free one when that is busy, and its endpoint."""
-    usual = Zenoh()
+    default = Zenoh()
     try:
-        return open_session(usual), usual.listen[0]
+        return open_session(default), default.listen[0]
     except PublishError:
         with socket.socket() as probe:
             probe.bind(("127.0.0.1", 0))
@@ -203,16 +203,16 @@ def _finish(subscriber: subprocess.Popen[str], sent: int) -> Received:
         raise PublishError("the demo's subscriber did not tell what it received; try again") from error
 
 
-def _draw(recording: Recording, config: Config, folder: Path, pictures: list[int], video: VideoSink | None) -> None:
+def _draw(recording: Recording, config: Config, folder: Path, drawn: list[int], video: VideoSink | None) -> None:
     """The same input gives the same output: a second run draws what the first one found."""
     with video or nullcontext():
         for frame, outcome in run(recording, config):
             panels = draw(frame.image, outcome.scene, outcome.view())
             if video is not None:
                 video.write(panels)
-            if frame.seq in pictures:
+            if frame.seq in drawn:
                 png = cv2.imencode(".png", panels)[1].tobytes()
-                _write(folder / f"picture-{pictures.index(frame.seq) + 1}.png", png)
+                _write(folder / f"picture-{drawn.index(frame.seq) + 1}.png", png)
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -222,7 +222,7 @@ def _write(path: Path, data: bytes) -> None:
         raise cannot_write(path, error) from error
 
 
-def _told(threat: FoundThreat) -> str:
+def _found_line(threat: FoundThreat) -> str:
     if threat.latency_s is None:
         return f"missed   {threat.name}, in sight for {(threat.last_ns - threat.since_ns) / 1e9:.1f} s"
     ((cause, _),) = threat.causes.most_common(1)

@@ -67,23 +67,23 @@ def _summary(now: Report, before: Report | None) -> list[str]:
 
 
 def _numbers(rows: list[RecordingRow], before: list[RecordingRow] | None) -> list[str]:
-    now, then = _told(report.total(rows)), _told(report.total(before)) if before else {}
+    now, then = _figures(report.total(rows)), _figures(report.total(before)) if before else {}
     return [
         f"{word:<9} {number} {rest}" + (f" (was {then[word][0]})" if word in then else "")
         for word, (number, rest) in now.items()
     ]
 
 
-def _told(total: Numbers) -> dict[str, tuple[str, str]]:
+def _figures(total: Numbers) -> dict[str, tuple[str, str]]:
     """Each number, and what it counts."""
-    told = {}
+    figures = {}
     if total.due:
-        told["found"] = f"{total.found} of {total.due}", "sightings of threats"
+        figures["found"] = f"{total.found} of {total.due}", "sightings of threats"
     if total.late_s is not None:
-        told["late"] = f"{total.late_s:.2f}", "s until a threat is found, median"
+        figures["late"] = f"{total.late_s:.2f}", "s until a threat is found, median"
     if total.false_a_picture is not None:
-        told["false"] = f"{total.false_a_picture:.2f}", "rebels on nothing a picture"
-        told["contact"] = f"{total.contacts} of {total.scored}", "pictures with one below 1 s that does not come"
+        figures["false"] = f"{total.false_a_picture:.2f}", "rebels on nothing a picture"
+        figures["contact"] = f"{total.contacts} of {total.scored}", "pictures with one below 1 s that does not come"
     if total.median_ms is not None:
-        told["time"] = f"{total.median_ms:.2f} / {total.slow_ms:.2f}", "ms a picture, median / 99 %"
-    return told
+        figures["time"] = f"{total.median_ms:.2f} / {total.slow_ms:.2f}", "ms a picture, median / 99 %"
+    return figures

@@ -7,12 +7,12 @@ from collections.abc import Callable
 from contextlib import closing
 
 from lcf_edge.errors import LcfError
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 
 HOST = "127.0.0.1"
 
 
-def foxglove(source: Source, port: int, tell: Callable[[str], None]) -> None:
+def foxglove(address: DaemonAddress, port: int, tell: Callable[[str], None]) -> None:
     """Serve until a signal ends it. Raises ``PublishError``, and ``LcfError`` without the extra ``foxglove``."""
     try:
         import foxglove as _  # noqa: F401
@@ -23,6 +23,6 @@ def foxglove(source: Source, port: int, tell: Callable[[str], None]) -> None:
     ended = threading.Event()
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
-    with closing(Relay(source, HOST, port)) as relay:
+    with closing(Relay(address, HOST, port)) as relay:
         tell(f"open a connection to ws://{HOST}:{relay.port} in Foxglove (Ctrl-C ends)")
         ended.wait()

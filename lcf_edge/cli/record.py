@@ -32,7 +32,7 @@ def record(file: Path, seconds: float | None, path: Path | None, settings: Seque
             _finish(file)
     (recorder,) = (sink for sink in sinks if isinstance(sink, Recorder))
     summary = f"{file}: {recorder.summary()}"
-    if not recorder.pictures:
+    if not recorder.frames:
         raise LcfError(f"{summary}; see above what the camera or the disk lacks")
     return summary
 

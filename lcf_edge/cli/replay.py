@@ -115,7 +115,7 @@ def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[F
             return
         begun: tuple[float, int] | None = None
         for frame, outcome in run(recording, config):
-            if pace.step and not _asked_for(frame):
+            if pace.step and not _next_asked_for(frame):
                 return
             if pace.speed is not None and not pace.step:
                 since_s, first_ns = begun = begun or (time.monotonic(), frame.stamp_ns)
@@ -124,7 +124,7 @@ def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[F
             yield frame, outcome
 
 
-def _asked_for(frame: Frame) -> bool:
+def _next_asked_for(frame: Frame) -> bool:
     """Wait for a line on standard input; False: it has ended."""
     sys.stderr.write(f"picture {frame.seq}: Enter lets it come, Ctrl-D ends\n")
     sys.stderr.flush()

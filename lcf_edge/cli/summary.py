@@ -10,14 +10,14 @@ from msgspec.structs import asdict
 from lcf_edge.config import Memory
 from lcf_edge.messages import Cause, Kind, ObjectClass, PipelineScene
 
-_USUAL = Memory()
+_DEFAULT_MEMORY = Memory()
 _NEARLY = 0.98  # of its capacity: a row may have gone by itself since the table was full
 
 
 class Summary:
     """Adds up scenes. ``memory``: the capacities of the tables."""
 
-    def __init__(self, memory: Memory = _USUAL) -> None:
+    def __init__(self, memory: Memory = _DEFAULT_MEMORY) -> None:
         self.frames = 0
         self.corners = 0
         self.omitted = 0
@@ -65,8 +65,8 @@ class Summary:
         seconds = (self._stamps_ns[-1] - self._stamps_ns[0]) / 1e9
         median, worst = np.percentile(np.array(self._times_us) / 1e3, (50, 99), axis=0)
         times = ", ".join(
-            f"{stage} {usual:.2f} / {slow:.2f}"
-            for stage, usual, slow in zip(("detect", "filter", "total"), median, worst, strict=True)
+            f"{stage} {median_ms:.2f} / {slow:.2f}"
+            for stage, median_ms, slow in zip(("detect", "filter", "total"), median, worst, strict=True)
         )
         lines = [
             f"frames   {self.frames}, {seconds:.1f} s of recording",

@@ -4,11 +4,11 @@
 from collections.abc import Callable
 
 from lcf_edge.errors import LcfError
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.replay.replayed import Replayed
 
 
-def view(seen: Source | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
+def view(shown: DaemonAddress | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
     """Serve the page until a signal ends it.
 
     Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``view``.
@@ -21,4 +21,4 @@ def view(seen: Source | Replayed, host: str, port: int, tell: Callable[[str], No
 
     from lcf_edge.monitor.web.server import serve
 
-    asyncio.run(serve(seen, host, port, tell))
+    asyncio.run(serve(shown, host, port, tell))

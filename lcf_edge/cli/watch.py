@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import msgspec
 
 from lcf_edge.errors import LcfError
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.lines import scene_fields
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.monitor.replay.replayed import Replayed
 from lcf_edge.zenoh_link.scene import scene_key
 from lcf_edge.zenoh_link.subscription import scenes
@@ -22,14 +22,14 @@ PLAIN_INTERVAL_S = 1.0
 PLAIN_LINES = 100
 
 
-def watch_lines(source: Source, tell: Callable[[str], None]) -> None:
+def watch_lines(address: DaemonAddress, tell: Callable[[str], None]) -> None:
     """One JSON object a scene, until interrupted. Raises ``PublishError``."""
-    with closing(scenes(source.endpoint, scene_key(source.prefix), config_file=source.config_file)) as arriving:
+    with closing(scenes(address.endpoint, scene_key(address.prefix), config_file=address.config_file)) as arriving:
         for scene in arriving:
             tell(msgspec.json.encode(scene_fields(scene)).decode())
 
 
-def watch_table(seen: Source | Replayed, tell: Callable[[str], None]) -> None:
+def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) -> None:
     """The table, until q is pressed or Ctrl-C; where standard output is no terminal, plain text for ``tell``.
 
     Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``watch`` or when the terminal goes
@@ -44,15 +44,15 @@ def watch_table(seen: Source | Replayed, tell: Callable[[str], None]) -> None:
     from lcf_edge.monitor.terminal.terminal import show
 
     console = Console(highlight=False, markup=False, emoji=False)
-    if isinstance(seen, Source):
-        watched: Monitor | Player = Monitor(seen)
-        place = seen.endpoint
+    if isinstance(shown, DaemonAddress):
+        watched: Monitor | Player = Monitor(shown)
+        place = shown.endpoint
         obey: Callable[[bytes], None] = _ignore
     else:
         from lcf_edge.monitor.terminal.player_keys import PlayerKeys
 
-        watched = player = seen.player()
-        place, obey = str(seen.path), PlayerKeys(player).obey
+        watched = player = shown.player()
+        place, obey = str(shown.path), PlayerKeys(player).obey
         player.start()
     with closing(watched), suppress(KeyboardInterrupt):
 

@@ -17,7 +17,7 @@ from lcf_edge.config import bounded_toml
 from lcf_edge.config.endpoint import fault
 from lcf_edge.config.refusal import why
 from lcf_edge.errors import ConfigError
-from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.image_limit import MAX_PIXELS
 from lcf_edge.printable import printable
 
 DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
@@ -25,7 +25,7 @@ MIN_HEIGHT_M = 0.001
 MAX_POLYGONS, MAX_POINTS = 64, 256  # of a mask
 
 _SHOWN = 60  # characters of a key that is not known
-_TOLD = 300  # of anything else that somebody wrote
+_MAX_QUOTED = 300  # of anything else that somebody wrote
 
 # Every number has bounds far beyond what is sensible, within which nothing overflows, divides by zero or takes memory
 # that was not reckoned with.
@@ -326,7 +326,7 @@ def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     try:
         return bounded_toml.parse(data.decode())
     except ValueError as error:
-        raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _TOLD)}") from error
+        raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _MAX_QUOTED)}") from error
 
 
 def _start_of(path: Path) -> bytes:
@@ -436,9 +436,9 @@ def _check_lens(camera: Camera, origin: str) -> None:
         raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
         raise ConfigError(f"{origin}: camera.intrinsics: focal lengths must be positive")
-    wanted = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
-    if len(camera.distortion) not in wanted:
-        counts = " or ".join(map(str, wanted))
+    numbers = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
+    if len(camera.distortion) not in numbers:
+        counts = " or ".join(map(str, numbers))
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
 
 
@@ -461,7 +461,7 @@ def _check_mask(camera: Camera, origin: str) -> None:
 def _check_endpoints(zenoh: Zenoh, origin: str) -> None:
     for key, endpoints in (("connect", zenoh.connect), ("listen", zenoh.listen)):
         for wrong in filter(None, map(fault, endpoints)):
-            raise ConfigError(f"{origin}: zenoh.{key}: {printable(wrong, _TOLD)}")
+            raise ConfigError(f"{origin}: zenoh.{key}: {printable(wrong, _MAX_QUOTED)}")
 
 
 def _numbers(value: Any) -> Iterator[float]:

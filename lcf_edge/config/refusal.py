@@ -32,7 +32,7 @@ def why(tree: dict[str, Any], key: str, table: type[msgspec.Struct]) -> str:
     if isinstance(kind, inspect.LiteralType):
         return _none_of(value, kind.values)
     secret = isinstance(kind, inspect.ListType) and isinstance(value, str)  # an endpoint, perhaps with keys
-    return f"{_wanted(kind)} is needed, not {'a text' if secret else _told(value)}"
+    return f"{_expected(kind)} is needed, not {'a text' if secret else _quoted(value)}"
 
 
 def _given(kind: inspect.Type) -> inspect.Type:
@@ -43,14 +43,14 @@ def _given(kind: inspect.Type) -> inspect.Type:
 
 
 def _none_of(value: Any, possible: Sequence[object]) -> str:
-    wanted = {str(each).lower(): str(each) for each in possible}
+    choices = {str(each).lower(): str(each) for each in possible}
     text = value[:_MAX_SHOWN].lower() if isinstance(value, str) else ""
-    close = [wanted[each] for each in get_close_matches(text, wanted, n=2, cutoff=_MIN_ALIKE)]
+    close = [choices[each] for each in get_close_matches(text, choices, n=2, cutoff=_MIN_ALIKE)]
     hint = f"did you mean {' or '.join(close)}? " if close else ""
-    return f"{_told(value)} is not possible; {hint}write one of {', '.join(wanted.values())}"
+    return f"{_quoted(value)} is not possible; {hint}write one of {', '.join(choices.values())}"
 
 
-def _wanted(kind: inspect.Type) -> str:
+def _expected(kind: inspect.Type) -> str:
     match kind:
         case inspect.IntType():
             return f"a whole number{_bounds(kind)}"
@@ -71,7 +71,7 @@ def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:
     return f" ({', '.join(said)})" if said else ""
 
 
-def _told(value: Any) -> str:
+def _quoted(value: Any) -> str:
     """Numbers and texts; of what is larger, and may hold an endpoint's keys, only what it is."""
     match value:
         case list():

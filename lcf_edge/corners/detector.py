@@ -30,12 +30,12 @@ class CornerDetector:
 
     With ``fast_adaptive`` about ``corners_target`` are found, by a threshold that follows the scene; no part of the
     picture has more than its share, and where there are next to none a lower threshold looks again. All of it depends
-    on the pictures so far and nothing else. ``seen``: where corners are wanted, (height, width), elsewhere 0; None:
+    on the pictures so far and nothing else. ``visible``: where corners are wanted, (height, width), elsewhere 0; None:
     everywhere.
     """
 
-    def __init__(self, settings: Filter, lens: Lens, capacity: int, seen: Grey | None = None) -> None:
-        self._seen = seen
+    def __init__(self, settings: Filter, lens: Lens, capacity: int, visible: Grey | None = None) -> None:
+        self._visible = visible
         self._settings = settings
         self._lens = lens
         self._capacity = capacity
@@ -47,7 +47,7 @@ class CornerDetector:
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
         self._most = max(round(MOST * settings.corners_target / SQUARES), FEW)
         self._rectangles = np.asarray(self._squares.rectangles)
-        self._among = memory_of(self._touched(seen))
+        self._among = memory_of(self._touched(visible))
         self._strong = FollowingThreshold(settings.fast_threshold, *THRESHOLDS)
         self._weak = FollowingThreshold(WEAKEST, WEAKEST, THRESHOLDS[1])
 
@@ -80,9 +80,9 @@ class CornerDetector:
         """Corners of parts of the picture, but for those along an edge."""
         within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
         pixel, strength = self._fast.corners(threshold.value, within)
-        if self._seen is not None:
-            seen = self._seen[pixel[:, 1], pixel[:, 0]] != 0
-            pixel, strength = pixel[seen], strength[seen]
+        if self._visible is not None:
+            visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
+            pixel, strength = pixel[visible], strength[visible]
         if least := self._settings.least_roundness:
             count = keep_round(image.reshape(-1).data, image.shape[1], pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]
@@ -107,27 +107,27 @@ class CornerDetector:
         self._strong.follow(max(len(pixel), 1) / self._settings.corners_target)
         return pixel, strength
 
-    def _touched(self, seen: Grey | None) -> npt.NDArray[np.uint8]:
+    def _touched(self, visible: Grey | None) -> npt.NDArray[np.uint8]:
         """Which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
         rows, columns, side = self._squares.rows, self._squares.columns, self._squares.side_px
-        if seen is None:
+        if visible is None:
             return np.ones((rows, columns), np.uint8)
-        across = np.maximum.reduceat(seen, np.arange(columns) * side, axis=1)
+        across = np.maximum.reduceat(visible, np.arange(columns) * side, axis=1)
         return np.maximum.reduceat(across, np.arange(rows) * side, axis=0)
 
 
 def strongest(squares: Squares, pixel: Pixels, strength: Strengths, share: int) -> Found:
     """The ``share`` strongest corners of each square, in the same order; the arrays are written."""
-    held, square = np.empty((2, len(pixel)), np.int32)
-    count = keep_strongest(squares, pixel.data, strength.data, held.data, square.data, share)
+    listed, square = np.empty((2, len(pixel)), np.int32)
+    count = keep_strongest(squares, pixel.data, strength.data, listed.data, square.data, share)
     return pixel[:count], strength[:count]
 
 
 def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capacity: int) -> npt.NDArray[np.int32]:
     """Rows, ascending, of the ``capacity`` corners to keep: the strongest of every square, then the second, and on."""
-    held, place = np.empty((2, len(pixel)), np.int32)
+    listed, place = np.empty((2, len(pixel)), np.int32)
     count = min(capacity, len(pixel))
-    keep_spread(squares, pixel.data, strength.data, held.data, place.data, count)
+    keep_spread(squares, pixel.data, strength.data, listed.data, place.data, count)
     return place[:count]
 
 

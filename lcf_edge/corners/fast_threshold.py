@@ -17,8 +17,8 @@ class FollowingThreshold:
         swung = self._too_many not in {None, ratio > 1}
         self._too_many = ratio > 1
         power = 0.2 if swung else 0.4
-        wanted = self.value * min(max(ratio**power, 0.6), 1.6)
+        target = self.value * min(max(ratio**power, 0.6), 1.6)
         least, most = self._range
-        value = min(max(round(wanted), least), most)
-        if abs(wanted - self.value) > 0.2 * power * self.value and value != self.value:
+        value = min(max(round(target), least), most)
+        if abs(target - self.value) > 0.2 * power * self.value and value != self.value:
             self.value = value

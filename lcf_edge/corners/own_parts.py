@@ -22,9 +22,9 @@ def in_sight(camera: Camera, width: int, height: int) -> npt.NDArray[np.uint8] |
     """Where the world is seen, 255, and where own parts are or are near, 0; (height, width). None: no own parts."""
     if not camera.mask:
         return None
-    seen = np.full((height, width), 255, np.uint8)
+    visible = np.full((height, width), 255, np.uint8)
     outlines = [np.rint(each).astype(np.int32) for each in polygons(camera, width, height)]
     for outline in outlines:
-        cv2.fillPoly(seen, [outline], (0,))  # one by one: where two overlap is hidden too
-    cv2.polylines(seen, outlines, True, (0,), 2 * MARGIN_PX + 1)
-    return seen
+        cv2.fillPoly(visible, [outline], (0,))  # one by one: where two overlap is hidden too
+    cv2.polylines(visible, outlines, True, (0,), 2 * MARGIN_PX + 1)
+    return visible

@@ -9,15 +9,15 @@ cdef class Squares:
     cdef readonly int[:, ::1] rectangles
 
 cdef void count(Squares squares, const int[:, ::1] pixel, int[::1] square) noexcept nogil
-cdef void gather(Squares squares, const int[::1] square, int[::1] held) noexcept nogil
-cdef int place_in_square(Squares squares, int s, int i, const float[::1] strength, const int[::1] held,
+cdef void gather(Squares squares, const int[::1] square, int[::1] listed) noexcept nogil
+cdef int place_in_square(Squares squares, int s, int i, const float[::1] strength, const int[::1] listed,
                          int enough) noexcept nogil
 @cython.locals(last=cython.int, fit=cython.int, room=cython.int, rivals=cython.int, stronger=cython.int, kept=cython.int,
                more=bint)
-cpdef void keep_spread(Squares squares, const int[:, ::1] pixel, const float[::1] strength, int[::1] held,
+cpdef void keep_spread(Squares squares, const int[:, ::1] pixel, const float[::1] strength, int[::1] listed,
                        int[::1] place, int capacity) noexcept nogil
 @cython.locals(leaves=bint)
-cpdef int keep_strongest(Squares squares, int[:, ::1] pixel, float[::1] strength, int[::1] held, int[::1] square,
+cpdef int keep_strongest(Squares squares, int[:, ::1] pixel, float[::1] strength, int[::1] listed, int[::1] square,
                          int share) noexcept nogil
 cpdef int find_poor(Squares squares, const int[:, ::1] pixel, int[::1] square, int few,
                     const unsigned char[:, ::1] among, int first_row) noexcept nogil

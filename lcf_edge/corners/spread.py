@@ -38,20 +38,20 @@ def count(squares: Squares, pixel: Grid, square: Column) -> None:
         squares.begin[square[i]] += 1
 
 
-def gather(squares: Squares, square: Column, held: Column) -> None:
-    """List the counted corners by squares: ``held``, int32 (n,), is written."""
+def gather(squares: Squares, square: Column, listed: Column) -> None:
+    """List the counted corners by squares: ``listed``, int32 (n,), is written."""
     for s in range(1, squares.begin.shape[0]):
         squares.begin[s] += squares.begin[s - 1]
     for i in range(square.shape[0] - 1, -1, -1):
         squares.begin[square[i]] -= 1
-        held[squares.begin[square[i]]] = i
+        listed[squares.begin[square[i]]] = i
 
 
-def place_in_square(squares: Squares, s: int, i: int, strength: Column, held: Column, enough: int) -> int:
+def place_in_square(squares: Squares, s: int, i: int, strength: Column, listed: Column, enough: int) -> int:
     """How many corners of a gathered square are stronger than one of them, or as strong and earlier; or ``enough``."""
     place = 0
     for k in range(squares.begin[s], squares.begin[s + 1]):
-        other = held[k]
+        other = listed[k]
         if strength[other] > strength[i] or (strength[other] == strength[i] and other < i):
             place += 1
             if place >= enough:
@@ -59,11 +59,11 @@ def place_in_square(squares: Squares, s: int, i: int, strength: Column, held: Co
     return place
 
 
-def keep_spread(squares: Squares, pixel: Grid, strength: Column, held: Column, place: Column, capacity: int) -> None:
+def keep_spread(squares: Squares, pixel: Grid, strength: Column, listed: Column, place: Column, capacity: int) -> None:
     """Write to ``place`` which ``capacity`` corners stay, ascending: the strongest of every square, then the second,
     and on; of the last ones the strongest of all.
 
-    ``held``, ``place``: int32 (n,), written; ``capacity``: n at most.
+    ``listed``, ``place``: int32 (n,), written; ``capacity``: n at most.
     """
     count(squares, pixel, place)
     last, fit = 0, 0  # places in a square for which there is room, and corners in them
@@ -72,25 +72,25 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, held: Column, p
         fit = 0
         for s in range(squares.rows * squares.columns):
             fit += min(squares.begin[s], last)
-    gather(squares, place, held)
+    gather(squares, place, listed)
     room = capacity
     for i in range(pixel.shape[0]):
-        place[i] = place_in_square(squares, place[i], i, strength, held, last)
+        place[i] = place_in_square(squares, place[i], i, strength, listed, last)
         room -= place[i] < last - 1
     rivals = 0
     for i in range(pixel.shape[0]):
         if place[i] == last - 1:
-            held[rivals] = i
+            listed[rivals] = i
             rivals += 1
     for k in range(rivals):
         stronger = 0
         for j in range(rivals):
-            more = strength[held[j]] > strength[held[k]]
-            stronger += more or (strength[held[j]] == strength[held[k]] and j < k)
+            more = strength[listed[j]] > strength[listed[k]]
+            stronger += more or (strength[listed[j]] == strength[listed[k]] and j < k)
             if stronger >= room:
                 break
         if stronger >= room:
-            place[held[k]] = last
+            place[listed[k]] = last
     kept = 0
     for i in range(pixel.shape[0]):
         if place[i] < last:
@@ -98,17 +98,17 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, held: Column, p
             kept += 1
 
 
-def keep_strongest(squares: Squares, pixel: Grid, strength: Column, held: Column, square: Column, share: int) -> int:
+def keep_strongest(squares: Squares, pixel: Grid, strength: Column, listed: Column, square: Column, share: int) -> int:
     """Move the ``share`` strongest corners of each square to the front, in the same order. Return how many.
 
-    ``held``, ``square``: int32 (n,), written.
+    ``listed``, ``square``: int32 (n,), written.
     """
     count(squares, pixel, square)
-    gather(squares, square, held)
+    gather(squares, square, listed)
     for i in range(pixel.shape[0]):
         s = square[i]
         if squares.begin[s + 1] - squares.begin[s] > share:  # where there are fewer, all stay
-            leaves = place_in_square(squares, s, i, strength, held, share) >= share
+            leaves = place_in_square(squares, s, i, strength, listed, share) >= share
             square[i] = LEAVES if leaves else s
     kept = 0
     for i in range(pixel.shape[0]):

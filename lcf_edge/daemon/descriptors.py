@@ -19,7 +19,7 @@ class Reserve:
         self.short = False
         self.shortages = 0
         self._lock = threading.Lock()
-        self._held: list[int] = []
+        self._open: list[int] = []
         self._borrowers = 0
         self._fill()
 
@@ -28,9 +28,9 @@ class Reserve:
         """A few descriptors are free within, whoever uses up the others. What is kept open is replaced when it can."""
         with self._lock:
             self._borrowers += 1
-            for number in self._held[:LENT]:
+            for number in self._open[:LENT]:
                 os.close(number)
-            del self._held[:LENT]
+            del self._open[:LENT]
         try:
             yield
         finally:
@@ -50,13 +50,13 @@ class Reserve:
     def close(self) -> None:
         """Give them back; the reserve is not used again."""
         with self._lock:
-            while self._held:
-                os.close(self._held.pop())
+            while self._open:
+                os.close(self._open.pop())
 
     def _fill(self) -> None:
         with suppress(OSError):  # others have them all; the next check tries again
-            while len(self._held) < RESERVED:
-                self._held.append(os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC))
+            while len(self._open) < RESERVED:
+                self._open.append(os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC))
 
 
 def _one_is_free() -> bool:

@@ -25,12 +25,12 @@ def readers(config: Config, mail: Mail, clock: StoppableClock, reserve: Reserve)
 
         return Reader(name, opened, put, clock)
 
-    wanted = [reader("camera", open_camera, lambda frames: mail.frames.put(frames[-1]))]
+    sources = [reader("camera", open_camera, lambda frames: mail.frames.put(frames[-1]))]
     if config.imu.driver != "none":
-        wanted.append(reader("imu", _imu, mail.imu.put))
+        sources.append(reader("imu", _imu, mail.imu.put))
     if config.camera.driver == "recording" and config.vehicle.speed_source in {"auto", "odometry"}:
-        wanted.append(reader("speed", _speed, mail.speeds.put))
-    return wanted
+        sources.append(reader("speed", _speed, mail.speeds.put))
+    return sources
 
 
 def _imu(config: Config, clock: Clock) -> Device[ImuSample]:

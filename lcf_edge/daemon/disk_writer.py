@@ -14,7 +14,7 @@ from lcf_edge.daemon.backlog import Backlog
 from lcf_edge.daemon.clock import SystemTime
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.recording.write.destination import MIB, Destination, Named, free_mib
-from lcf_edge.recording.write.messages import PICTURES, Message
+from lcf_edge.recording.write.messages import IMAGES, RecordedMessage
 from lcf_edge.recording.write.recording_file import CHUNK_BYTES, RecordingFile
 
 SYNC_S = 0.5
@@ -39,7 +39,7 @@ class DiskWriter(threading.Thread):
     def __init__(
         self,
         config: Config,
-        backlog: Backlog[Message | EndOfFile],
+        backlog: Backlog[RecordedMessage | EndOfFile],
         destination: Destination,
         system_time: SystemTime,
     ) -> None:
@@ -73,7 +73,7 @@ class DiskWriter(threading.Thread):
             self._sync()
         self._end_file()
 
-    def _write(self, message: Message) -> None:
+    def _write(self, message: RecordedMessage) -> None:
         file = self.file if self.file and not self.trouble else self._made_ready()
         if file is None:
             self.counts["lost"] += 1
@@ -88,7 +88,7 @@ class DiskWriter(threading.Thread):
             return
         self._unsynced += 1
         self.counts["messages"] += 1
-        self.counts["pictures"] += message.topic is PICTURES
+        self.counts["pictures"] += message.topic is IMAGES
 
     def _made_ready(self) -> RecordingFile | None:
         """The file to go on with, a new one if need be; None: the disk does not let us, and is asked again later."""

@@ -26,7 +26,7 @@ class Link(Protocol):
         """Publish how each part is."""
         ...
 
-    def preview_wanted(self) -> bool:
+    def has_preview_subscriber(self) -> bool:
         """Whether somebody looks, and the next picture is due."""
         ...
 

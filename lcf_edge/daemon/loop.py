@@ -46,10 +46,10 @@ def try_out(pipeline: Pipeline, width: int, height: int) -> None:
     """Let a pipeline take some pictures of clutter that moves, as the next ones might be."""
     across, down = -(-width // CLUTTER_PX) + TRIALS, -(-height // CLUTTER_PX)
     clutter = _scattered(down * across).reshape(down, across)
-    picture = clutter.repeat(CLUTTER_PX, axis=0).repeat(CLUTTER_PX, axis=1)
+    image = clutter.repeat(CLUTTER_PX, axis=0).repeat(CLUTTER_PX, axis=1)
     for seq in range(TRIALS):
         left = seq * CLUTTER_PX // 2
-        pipeline.process(Frame(seq * 50_000_000, seq, np.ascontiguousarray(picture[:height, left : left + width])))
+        pipeline.process(Frame(seq * 50_000_000, seq, np.ascontiguousarray(image[:height, left : left + width])))
         pipeline.view()
 
 

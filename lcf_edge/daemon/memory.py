@@ -20,7 +20,7 @@ GROWN_MIB = 1.0
 _STATM = Path("/proc/self/statm")
 _MIB = 2**20
 
-_PICTURES = 12  # bytes a pixel: buffers of the driver (2 bytes, 4 of them), one waiting, one in work, scratch
+_FRAME_BYTES_A_PIXEL = 12  # buffers of the driver (2 bytes, 4 of them), one waiting, one in work, scratch
 RECORDER_MIB = 6.0
 """The format's library, a chunk on its way to the disk and the index of a file, without ``record.buffer_mib``."""
 
@@ -46,7 +46,7 @@ def needs_mib(config: Config) -> dict[str, float]:
     table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
     needs = {
         "the program": PROGRAM_MIB,
-        "pictures": pixels * _PICTURES / _MIB,
+        "pictures": pixels * _FRAME_BYTES_A_PIXEL / _MIB,
         "tables": (table_bytes + config.memory.corners * _CORNER_BYTES) / _MIB,
     }
     if config.record.when != "never":

@@ -35,7 +35,7 @@ class Previewer(Sink):
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:
         """Have this drawn, if a preview is wanted now."""
-        if not (self._off or self._drawing) and self._link.preview_wanted():
+        if not (self._off or self._drawing) and self._link.has_preview_subscriber():
             self._drawing = True
             self._next.put((frame, scene, view()))
 
@@ -75,10 +75,10 @@ class Previewer(Sink):
             from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
         except OSError:  # no descriptor is left; the next one may find one
             return
-        picture = draw(frame.image, scene, view)
-        height, width = picture.shape[:2]
+        image = draw(frame.image, scene, view)
+        height, width = image.shape[:2]
         if width > WIDEST_PX:
             size = WIDEST_PX, round(height * WIDEST_PX / width)
-            picture = np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA), np.uint8)
-        _, jpeg = cv2.imencode(".jpg", picture, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
+            image = np.asarray(cv2.resize(image, size, interpolation=cv2.INTER_AREA), np.uint8)
+        _, jpeg = cv2.imencode(".jpg", image, (cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY))
         self._link.put_preview(jpeg.tobytes(), scene.stamp_ns)

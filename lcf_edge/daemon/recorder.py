@@ -19,7 +19,15 @@ from lcf_edge.daemon.disk_writer import DiskWriter, EndOfFile
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.messages import Kind, PipelineScene, View
 from lcf_edge.recording.write.destination import MIB, Destination
-from lcf_edge.recording.write.messages import PICTURES, Encoder, KnownLens, Message, Record, Seen, Statuses
+from lcf_edge.recording.write.messages import (
+    IMAGES,
+    Encoder,
+    FrameAndScene,
+    KnownLens,
+    Record,
+    RecordedMessage,
+    Statuses,
+)
 from lcf_edge.recording.write.ring import Ring, size_bytes
 from lcf_edge.sinks.sink import Sink
 
@@ -45,7 +53,7 @@ class Recorder(Sink):
         self._after_ns = round(config.record.after_s * 1e9)
         self._buffer_bytes = round(config.record.buffer_mib * MIB)
         self._inbox: Backlog[Record] = Backlog(INBOX_BYTES)
-        self._backlog: Backlog[Message | EndOfFile] = Backlog(self._buffer_bytes)
+        self._backlog: Backlog[RecordedMessage | EndOfFile] = Backlog(self._buffer_bytes)
         self._ring = Ring(config.record.before_s)
         self._saving_until_ns: int | None = None  # a threat is, or was just, there
         self._events = 0
@@ -58,7 +66,7 @@ class Recorder(Sink):
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:  # noqa: ARG002
         """Record a frame and its scene, with the stamp of the frame. Takes a few µs."""
         taken = frame.image.nbytes + scene.circles.nbytes + scene.psi.nbytes + scene.objects.nbytes
-        self._inbox.put(Seen(frame, scene), taken, round(INBOX_BYTES * _RESERVE))
+        self._inbox.put(FrameAndScene(frame, scene), taken, round(INBOX_BYTES * _RESERVE))
 
     def put_sample(self, sample: ImuSample | SpeedSample) -> None:
         """Record a sample."""
@@ -100,7 +108,7 @@ class Recorder(Sink):
         return self._inbox.dropped + self._backlog.dropped + self._disk.counts["lost"]
 
     @property
-    def pictures(self) -> int:
+    def frames(self) -> int:
         """That were written."""
         return self._disk.counts["pictures"]
 
@@ -152,34 +160,34 @@ class Recorder(Sink):
         """Save what the ring keeps when a threat appears; end the file when it is over."""
         if self._when != "threat":
             return
-        if isinstance(record, Seen) and _threatens(record.scene, self._ttc_s):
+        if isinstance(record, FrameAndScene) and _threatens(record.scene, self._ttc_s):
             if self._saving_until_ns is None:
                 self._events += 1
                 for message in self._ring.take():
                     self._pass_on(message)
             self._saving_until_ns = record.frame.stamp_ns + self._after_ns
         elif (
-            isinstance(record, Seen | Statuses)
+            isinstance(record, FrameAndScene | Statuses)
             and self._saving_until_ns is not None
             and _stamp_ns(record) > self._saving_until_ns
         ):
             self._saving_until_ns = None
             self._backlog.put(EndOfFile(), 0)
 
-    def _keep(self, message: Message) -> None:
+    def _keep(self, message: RecordedMessage) -> None:
         if self._when == "always" or self._saving_until_ns is not None:
             self._pass_on(message)
         else:
             limit_bytes = round(self._backlog.limit_bytes * (1 - _RESERVE))
             self._ring.add(message, limit_bytes - self._backlog.bytes)
 
-    def _pass_on(self, message: Message) -> None:
-        reserve_bytes = round(self._backlog.limit_bytes * _RESERVE) if message.topic is PICTURES else 0
+    def _pass_on(self, message: RecordedMessage) -> None:
+        reserve_bytes = round(self._backlog.limit_bytes * _RESERVE) if message.topic is IMAGES else 0
         self._backlog.put(message, size_bytes(message), reserve_bytes)
 
 
-def _stamp_ns(record: Seen | Statuses) -> int:
-    return record.frame.stamp_ns if isinstance(record, Seen) else record.stamp_ns
+def _stamp_ns(record: FrameAndScene | Statuses) -> int:
+    return record.frame.stamp_ns if isinstance(record, FrameAndScene) else record.stamp_ns
 
 
 def _threatens(scene: PipelineScene, ttc_s: float) -> bool:

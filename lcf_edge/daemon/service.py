@@ -146,7 +146,7 @@ class Service:
         """What a thread raises ends the daemon, in one line."""
 
         def notice(failed: threading.ExceptHookArgs) -> None:
-            self._to_do.put(partial(self._fail, _told(failed)))
+            self._to_do.put(partial(self._fail, _error_of(failed)))
 
         before, threading.excepthook = threading.excepthook, notice
         try:
@@ -229,10 +229,10 @@ class Service:
         if self._ready:
             self._notifier.ready()
 
-    def _take(self, wanted: Config) -> None:
-        """Go on with ``wanted``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
-        config = merged(self._config, wanted)
-        keys, refused = changed(self._config, config), wants_restart(changed(self._config, wanted))
+    def _take(self, requested: Config) -> None:
+        """Go on with ``requested``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
+        config = merged(self._config, requested)
+        keys, refused = changed(self._config, config), wants_restart(changed(self._config, requested))
         check_budget(config)
         if wants_pipeline(keys):
             self._loop.rebuild(config)
@@ -288,7 +288,7 @@ class Service:
         self._reserve.close()
 
 
-def _told(failed: threading.ExceptHookArgs) -> LcfError:
+def _error_of(failed: threading.ExceptHookArgs) -> LcfError:
     """A failure as one line."""
     if isinstance(failed.exc_value, LcfError):
         return failed.exc_value

@@ -23,14 +23,14 @@ def sinks(config: Config, link: Link, system_time: SystemTime, destination: "Des
 
     Memory is given up in this order too. ``destination``: of what is recorded; None: ``record.folder``.
     """
-    wanted: list[Sink] = [LinkedScenes(link), Previewer(link)]
+    outputs: list[Sink] = [LinkedScenes(link), Previewer(link)]
     if config.record.when != "never":
         from lcf_edge.daemon.recorder import Recorder  # noqa: PLC0415  # its formats take megabytes
         from lcf_edge.recording.write.destination import Folder  # noqa: PLC0415
 
-        wanted.append(Recorder(config, destination or Folder(config.record), system_time, known_lens))
+        outputs.append(Recorder(config, destination or Folder(config.record), system_time, known_lens))
     if config.metrics.textfile or config.metrics.port:
         from lcf_edge.metrics.sink import MetricsSink  # noqa: PLC0415  # a server takes megabytes
 
-        wanted.append(MetricsSink(config))
-    return wanted
+        outputs.append(MetricsSink(config))
+    return outputs

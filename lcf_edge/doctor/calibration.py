@@ -67,14 +67,14 @@ def _learnt_mounting(context: Context) -> Iterator[Finding]:
         if status is None or angle not in status.values or sigma not in status.values:
             continue
         try:
-            seen_rad, sigma_rad = float(status.values[angle]), float(status.values[sigma])
+            estimated_rad, sigma_rad = float(status.values[angle]), float(status.values[sigma])
         except ValueError:
             continue  # of another version
-        told_rad: float = getattr(context.config.camera, key)
-        off_rad = abs(seen_rad - told_rad)
-        text = f"camera.{key} is {told_rad:g}, driving shows {seen_rad:.3f} ± {sigma_rad:.3f}"
+        configured_rad: float = getattr(context.config.camera, key)
+        off_rad = abs(estimated_rad - configured_rad)
+        text = f"camera.{key} is {configured_rad:g}, driving shows {estimated_rad:.3f} ± {sigma_rad:.3f}"
         if off_rad > max(_MOUNTING_SIGMAS * sigma_rad, _MOUNTING_RAD):
-            yield warn("calibration", text, edit(context.path, f"[camera] {key} = {seen_rad:.3f}"))
+            yield warn("calibration", text, edit(context.path, f"[camera] {key} = {estimated_rad:.3f}"))
         else:
             yield ok("calibration", text)
 

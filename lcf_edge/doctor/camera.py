@@ -148,9 +148,9 @@ def _nearest(context: Context, path: Path) -> tuple[str, ...]:
         ]
         if offered:
             _, _, size, rate = min(offered, key=lambda one: one[:2])
-            wanted = {"width": size.width, "height": size.height, "fps": round(rate.fastest, 3)}
+            best = {"width": size.width, "height": size.height, "fps": round(rate.fastest, 3)}
             have = {"width": camera.width, "height": camera.height, "fps": camera.fps}
-            return tuple(f"camera.{key}={value:g}" for key, value in wanted.items() if value != have[key])
+            return tuple(f"camera.{key}={value:g}" for key, value in best.items() if value != have[key])
     return ()
 
 
@@ -187,8 +187,8 @@ def _rate(context: Context, measured: Measured[Frame], exposure_s: float | None)
 
 def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Config) -> Finding:
     height, width = image.shape
-    lens, seen = Lens.from_config(config.camera, width, height), own_parts.in_sight(config.camera, width, height)
-    detector = CornerDetector(config.filter, lens, config.memory.corners, seen)
+    lens, visible = Lens.from_config(config.camera, width, height), own_parts.in_sight(config.camera, width, height)
+    detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
     corners, _ = detector.detect(image)
     grey, count = float(image.mean()), len(corners.pixel)
     summary = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"

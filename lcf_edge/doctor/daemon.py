@@ -28,19 +28,21 @@ class Daemon:
     scene: str
 
 
-def ask(wanted: Config) -> Daemon | None:
+def ask(configured: Config) -> Daemon | None:
     """The daemon at ``zenoh.listen``; None: nobody listens there, or no daemon answers within ``ANSWER_S``."""
-    endpoints = [endpoint for endpoint in map(reachable_here, wanted.zenoh.listen) if is_open(endpoint)]
+    endpoints = [endpoint for endpoint in map(reachable_here, configured.zenoh.listen) if is_open(endpoint)]
     if not endpoints:
         return None
-    options = msgspec.structs.replace(wanted.zenoh, mode="peer", connect=endpoints, listen=[_ANY_PORT], gossip=False)
+    options = msgspec.structs.replace(
+        configured.zenoh, mode="peer", connect=endpoints, listen=[_ANY_PORT], gossip=False
+    )
     try:
-        return _asked(options, wanted.publish.prefix, ", ".join(endpoints))
+        return _ask_at(options, configured.publish.prefix, ", ".join(endpoints))
     except (LcfError, zenoh.ZError):  # not with these certificates, or not with this file
         return None
 
 
-def _asked(options: config.Zenoh, prefix: str, endpoint: str) -> Daemon | None:
+def _ask_at(options: config.Zenoh, prefix: str, endpoint: str) -> Daemon | None:
     heard: queue.SimpleQueue[zenoh.Sample] = queue.SimpleQueue()
     with opened_session(options) as session:
         session.declare_subscriber(DIAGNOSTICS.key(prefix), heard.put)

@@ -8,7 +8,7 @@ from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 from lcf_edge.doctor.processes import Process, daemon_with, processes
 
 _DEVICES = ("camera", "imu")  # reported by their own checks
-_TOLD = (
+_SHOWN = (
     "rate_hz",
     "jitter_ms",
     "latency_p50_ms",
@@ -61,7 +61,7 @@ def of_device(context: Context, name: str, daemon: Process) -> Finding:
 
 
 def _of_status(subject: str, whose: str, status: DeviceStatus) -> Finding:
-    values = [f"{name} {status.values[name]}" for name in _TOLD if name in status.values]
+    values = [f"{name} {status.values[name]}" for name in _SHOWN if name in status.values]
     text = f"{whose}: {status.message}" + (f" ({', '.join(values)})" if values else "")
     if status.level is Level.OK:
         return ok(subject, text)

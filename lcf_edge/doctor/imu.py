@@ -271,6 +271,6 @@ def _latency(context: Context) -> Iterator[Finding]:
     """FTDI's adapters hold bytes back."""
     name = Path(context.config.imu.port).resolve().name
     timer = context.sys / "bus/usb-serial/devices" / name / "latency_timer"
-    if timer.exists() and (held_ms := int(timer.read_text(encoding="ascii"))) > 1:
-        text = f"{name}: the adapter holds bytes back for {held_ms} ms"
+    if timer.exists() and (latency_ms := int(timer.read_text(encoding="ascii"))) > 1:
+        text = f"{name}: the adapter holds bytes back for {latency_ms} ms"
         yield warn("imu", text, f"echo 1 | sudo tee {timer}  # sudo make install brings a rule that lasts")

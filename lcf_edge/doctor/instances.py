@@ -68,7 +68,7 @@ def _imu(config: Config) -> list[tuple[str, str]]:
 
 def _is_used(context: Context, unit: str) -> bool:
     try:
-        told = properties_of(context, unit)
+        properties = properties_of(context, unit)
     except (FileNotFoundError, subprocess.TimeoutExpired):
         return False
-    return starts_at_boot(told) or told.get("ActiveState") in _RUNS
+    return starts_at_boot(properties) or properties.get("ActiveState") in _RUNS

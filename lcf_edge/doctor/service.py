@@ -9,7 +9,16 @@ from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 
 UNIT = "lcf-edge"
 ANSWER_S = 5.0
-_ASKED = ("LoadState", "UnitFileState", "ActiveState", "SubState", "Result", "NRestarts", "ExecMainStatus", "MemoryMax")
+_PROPERTIES = (
+    "LoadState",
+    "UnitFileState",
+    "ActiveState",
+    "SubState",
+    "Result",
+    "NRestarts",
+    "ExecMainStatus",
+    "MemoryMax",
+)
 _ENDS = {
     "watchdog": "the pipeline hung and the watchdog killed it",
     "oom-kill": "it took more memory than MemoryMax",
@@ -45,7 +54,7 @@ def check(context: Context) -> Iterator[Finding]:
 def properties_of(context: Context, unit: str) -> Mapping[str, str]:
     """What systemd says of a unit; empty: it does not run. Raises ``FileNotFoundError`` and ``TimeoutExpired``."""
     done = subprocess.run(
-        (*context.systemctl, "show", f"{unit}.service", f"--property={','.join(_ASKED)}"),
+        (*context.systemctl, "show", f"{unit}.service", f"--property={','.join(_PROPERTIES)}"),
         capture_output=True,
         text=True,
         timeout=ANSWER_S,

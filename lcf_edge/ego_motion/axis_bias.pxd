@@ -23,6 +23,6 @@ cdef class AxisBias:
     cpdef void set_flow(self, double sigma) noexcept
     @cython.locals(kept=cython.double, grown=cython.double)
     cpdef void advance(self, double dt_s, double noise_radps, bint measured) noexcept
-    cpdef bint compare(self, double bias, double flow, double noise, double seen, double sigma) noexcept
+    cpdef bint compare(self, double bias, double flow, double noise, double observed, double sigma) noexcept
     @cython.locals(bias=cython.double, flow=cython.double, noise=cython.double)
     cpdef void learn(self) noexcept

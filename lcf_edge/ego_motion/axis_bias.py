@@ -68,13 +68,13 @@ class AxisBias:
         grown = self.bias_bias + dt_s * (DRIFT_RADPS * DRIFT_RADPS)
         self.bias_bias = min(grown, max(self.bias_bias, PRIOR_VARIANCE))
 
-    def compare(self, bias: float, flow: float, noise: float, seen: float, sigma: float) -> bool:
+    def compare(self, bias: float, flow: float, noise: float, observed: float, sigma: float) -> bool:
         """Compare an observation of ``bias``·b + ``flow``·s + ``noise``·w. False: it is an outlier."""
         self.with_bias = self.bias_bias * bias + self.bias_flow * flow + self.bias_noise * noise
         self.with_flow = self.bias_flow * bias + self.flow_flow * flow + self.flow_noise * noise
         self.with_noise = self.bias_noise * bias + self.flow_noise * flow + self.noise_noise * noise
         self.variance = self.with_bias * bias + self.with_flow * flow + self.with_noise * noise + sigma * sigma
-        self.off = seen - (self.bias * bias + self.flow * flow + self.noise * noise)
+        self.off = observed - (self.bias * bias + self.flow * flow + self.noise * noise)
         return self.off * self.off <= OUTLIER * OUTLIER * self.variance
 
     def learn(self) -> None:

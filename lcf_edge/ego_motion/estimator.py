@@ -54,7 +54,7 @@ _GUESS_TIME_S = 0.5  # over which that is averaged
 _GUESS_MIN_RADPS, _GUESS_MAX_RADPS = 0.04, 2.0
 _STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value for so long and so often, is stuck
 _NOISY_SHARE = 0.5  # of the samples, at most, are repeated by one with noise
-_WANTED_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
+_MIN_BIAS_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
 _LAG_SHARE = 0.5  # of what the flow takes out, that may be left from before: tracks follow late
 _TURN_SHARE = 0.05  # of the rate, that scale and time of the gyro, and the shaken focus, put into the difference
 _ROLL_SHARE = 0.5  # roll moves the picture's edge by so much of what yaw moves it by
@@ -229,14 +229,14 @@ class EgoMotionEstimator:
         interval.rates, interval.mean_radps = self._guessed, (0.0, -yaw_radps, 0.0)
         self._guessed.hold(interval.span.dt_s, interval.mean_radps)
 
-    def wants_picture(self, sigma_rad: float) -> bool:
+    def needs_image_rotation(self, sigma_rad: float) -> bool:
         """Whether a picture that tells the rotation to ``sigma_rad`` would help in the present interval."""
         interval = self._interval
         if not interval.measured or interval.span.dt_s == 0:
             return True
-        return max(self.bias.error_sigmas()[:2]) * interval.span.dt_s > _WANTED_SHARE * sigma_rad
+        return max(self.bias.error_sigmas()[:2]) * interval.span.dt_s > _MIN_BIAS_SHARE * sigma_rad
 
-    def see_picture(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
+    def add_image_rotation(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
         """The motion of the present interval, knowing besides how the whole picture turned.
 
         A gyro that lives, and whose bias is known, is believed more than a picture that contradicts it; whatever else
@@ -249,9 +249,9 @@ class EgoMotionEstimator:
             return self._answer(self._rotation())
         error_radps, sigma_radps = self._less_rates(turn_rad), [sigma / dt_s for sigma in sigma_rad.tolist()]
         trusted = interval.measured and bias.known
-        if not (bias.see_picture(error_radps, sigma_radps) or trusted):
+        if not (bias.add_image_rotation(error_radps, sigma_radps) or trusted):
             bias.doubt()
-            bias.see_picture(error_radps, sigma_radps)
+            bias.add_image_rotation(error_radps, sigma_radps)
             interval.notes.append("rotation from pictures")
         return self._answer(self._rotation())
 
@@ -294,7 +294,7 @@ class EgoMotionEstimator:
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
             return
         again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
-        self._inertial.see_ground(ground.speed_mps - ground.told_mps, ground.sigma_mps * sqrt(again))
+        self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
 
     def _rotation(self) -> Floats:
         """Of directions, over the interval."""

@@ -98,7 +98,7 @@ class GyroBias:
         axes = zip(self._axes, rate_radps, strict=True)
         return self._learn([axis.compare(1.0, 0.0, 0.0, rate, sigma_radps) for axis, rate in axes])
 
-    def see_picture(self, error_radps: Three, sigma_radps: Three) -> bool:
+    def add_image_rotation(self, error_radps: Three, sigma_radps: Three) -> bool:
         """The gyro's rate less that of the whole picture, (3,), with its sigmas. False: an outlier, not used."""
         axes = zip(self._axes, error_radps, sigma_radps, strict=True)
         return self._learn([axis.compare(self._measured, 0.0, 1.0, error, sigma) for axis, error, sigma in axes])

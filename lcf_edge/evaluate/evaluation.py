@@ -142,10 +142,10 @@ def _keep(done: Done, folder: Path, number: int) -> RecordingRow:
     frames = f"frames/{number:04d}.jsonl"
     _write(folder / frames, done.frames)
     pictures = []
-    for picture, data in zip(row.pictures, done.pictures, strict=True):
-        file = f"pictures/{number:04d}-{picture.seq:06d}.jpg"
+    for image, data in zip(row.pictures, done.drawings, strict=True):
+        file = f"pictures/{number:04d}-{image.seq:06d}.jpg"
         _write(folder / file, data)
-        pictures.append(msgspec.structs.replace(picture, file=file))
+        pictures.append(msgspec.structs.replace(image, file=file))
     return msgspec.structs.replace(row, frames=frames, pictures=pictures)
 
 

@@ -14,11 +14,11 @@ from drivers.samples import Frame
 from lcf_edge.config import Config
 from lcf_edge.errors import LcfError, UsageError
 from lcf_edge.evaluate import report
-from lcf_edge.evaluate.pictures import Colours, beside, draw, encode
-from lcf_edge.evaluate.report import FrameLine, PictureRow, RecordingRow
+from lcf_edge.evaluate.drawings import Colours, beside, draw, encode
+from lcf_edge.evaluate.report import FrameLine, ImageRow, RecordingRow
 from lcf_edge.evaluate.score import Score, rebels
 from lcf_edge.evaluate.truth import Known, read_truth
-from lcf_edge.picture_limit import limit_opencv
+from lcf_edge.image_limit import limit_opencv
 from lcf_edge.pipeline import run
 from lcf_edge.recording.read import open_recording
 
@@ -26,7 +26,7 @@ EVENTS = 8  # pictures of a recording, at most, of what went wrong or differs
 VIEWS = 3  # and of what it is like
 APART = 10  # frames between two pictures of the same kind of event
 
-_GRAVE = {"contact that does not come": 3, "missed": 2, "on nothing": 1}
+_GRAVITY = {"contact that does not come": 3, "missed": 2, "on nothing": 1}
 _DIFFERENCES = {"contact": 3, "found": 2, "on nothing": 1}
 
 
@@ -55,11 +55,11 @@ class Task:
 
 @dataclass(frozen=True, slots=True)
 class Done:
-    """What comes back. ``frames``: a JSON line a frame. ``pictures``: JPEGs, as in ``row.pictures``."""
+    """What comes back. ``frames``: a JSON line a frame. ``drawings``: JPEGs, as in ``row.pictures``."""
 
     row: RecordingRow
     frames: bytes = b""
-    pictures: tuple[bytes, ...] = ()
+    drawings: tuple[bytes, ...] = ()
 
 
 def evaluate(task: Task, frames_before: bytes | None = None) -> Done:
@@ -80,12 +80,12 @@ def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: Recording
     views = set(np.linspace(0.1, 0.9, VIEWS).dot(recording.frame_count or 0).astype(int).tolist())
     differing = 0
     for number, (frame, outcome) in enumerate(run(recording, task.config)):
-        told = rebels(outcome.scene.circles)
+        reported = rebels(outcome.scene.circles)
         known = truth.of(frame.stamp_ns)
-        line = report.line_of(frame, told)
+        line = report.line_of(frame, reported)
         score.step_ms.append(outcome.scene.timing.total / 1000)
         if known is not None:
-            verdict = score.add(frame.stamp_ns, told, known)
+            verdict = score.add(frame.stamp_ns, reported, known)
             line = msgspec.structs.replace(
                 line,
                 scored=True,
@@ -104,7 +104,7 @@ def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: Recording
             kept.offer(line, *_event(line, known=truth.is_known), _single(frame, known or (), line))
         if number in views and not differs:
             kept.keep(line, "", _single(frame, known or (), line))
-    pictures = kept.pictures()
+    drawings = kept.drawings()
     return Done(
         msgspec.structs.replace(
             row,
@@ -114,10 +114,10 @@ def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: Recording
             events=report.events(lines),
             warnings=recording.warnings,
             differing=None if before is None else differing,
-            pictures=[picture for picture, _ in pictures],
+            pictures=[drawing for drawing, _ in drawings],
         ),
         _encoded(lines),
-        tuple(jpeg for _, jpeg in pictures),
+        tuple(jpeg for _, jpeg in drawings),
     )
 
 
@@ -125,7 +125,7 @@ def _event(line: FrameLine, *, known: bool) -> tuple[int, str]:
     """How grave what went wrong is, and its name."""
     what = "contact that does not come" if line.contact else "missed" if line.missed else "on nothing"
     text = f"missed: {', '.join(line.missed)}" if what == "missed" else what
-    return _GRAVE[what], text if known else "told"
+    return _GRAVITY[what], text if known else "reported"
 
 
 def _difference(before: FrameLine, now: FrameLine) -> tuple[int, str]:
@@ -154,27 +154,27 @@ class _Kept:
 
     def __init__(self) -> None:
         self._order = count()
-        self._events: list[tuple[int, int, PictureRow, bytes]] = []  # a heap, the least grave first
-        self._views: list[tuple[PictureRow, bytes]] = []
+        self._events: list[tuple[int, int, ImageRow, bytes]] = []  # a heap, the least grave first
+        self._views: list[tuple[ImageRow, bytes]] = []
         self._last: dict[int, int] = {}  # seq of the last picture of each gravity
 
-    def offer(self, line: FrameLine, gravity: int, why: str, picture: Callable[[], Colours]) -> None:
+    def offer(self, line: FrameLine, gravity: int, why: str, drawing: Callable[[], Colours]) -> None:
         """Keep a picture if it is graver than one of those kept, and not much like the one before it."""
         if line.seq - self._last.get(gravity, -APART) < APART:
             return
         if len(self._events) == EVENTS and gravity <= self._events[0][0]:
             return
         self._last[gravity] = line.seq
-        row = PictureRow(line.seq, line.stamp_ns, why)
-        heapq.heappush(self._events, (gravity, -next(self._order), row, encode(picture())))
+        row = ImageRow(line.seq, line.stamp_ns, why)
+        heapq.heappush(self._events, (gravity, -next(self._order), row, encode(drawing())))
         if len(self._events) > EVENTS:
             heapq.heappop(self._events)
 
-    def keep(self, line: FrameLine, why: str, picture: Callable[[], Colours]) -> None:
+    def keep(self, line: FrameLine, why: str, drawing: Callable[[], Colours]) -> None:
         """Keep a picture in any case."""
-        self._views.append((PictureRow(line.seq, line.stamp_ns, why), encode(picture())))
+        self._views.append((ImageRow(line.seq, line.stamp_ns, why), encode(drawing())))
 
-    def pictures(self) -> list[tuple[PictureRow, bytes]]:
+    def drawings(self) -> list[tuple[ImageRow, bytes]]:
         """All of them, events first, each kind in the order of time."""
         events = [(row, data) for _, _, row, data in self._events]
         shown = {row.seq for row, _ in events}
@@ -182,8 +182,8 @@ class _Kept:
         return sorted(events, key=_seq) + sorted(views, key=_seq)
 
 
-def _seq(picture: tuple[PictureRow, bytes]) -> int:
-    return picture[0].seq
+def _seq(drawing: tuple[ImageRow, bytes]) -> int:
+    return drawing[0].seq
 
 
 def _encoded(lines: Iterable[FrameLine]) -> bytes:

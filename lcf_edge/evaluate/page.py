@@ -6,7 +6,7 @@ from html import escape
 from importlib.resources import files
 
 from lcf_edge.evaluate import report
-from lcf_edge.evaluate.report import Numbers, PictureRow, RecordingRow, Report, count
+from lcf_edge.evaluate.report import ImageRow, Numbers, RecordingRow, Report, count
 
 Value = float | None
 
@@ -182,9 +182,9 @@ def _strip(row: RecordingRow) -> str:
     return f'<div class="strip">{lines}<span></span><span class="ends"><i>first frame</i><i>last</i></span></div>'
 
 
-def _figures(pictures: Sequence[PictureRow]) -> str:
+def _figures(pictures: Sequence[ImageRow]) -> str:
     return "".join(
-        f'<figure><img loading="lazy" src="{picture.file}" alt="frame {picture.seq}">'
-        f"<figcaption>{picture.seq}{': ' if picture.why else ''}{escape(picture.why)}</figcaption></figure>"
-        for picture in pictures
+        f'<figure><img loading="lazy" src="{image.file}" alt="frame {image.seq}">'
+        f"<figcaption>{image.seq}{': ' if image.why else ''}{escape(image.why)}</figcaption></figure>"
+        for image in pictures
     )

@@ -83,7 +83,7 @@ class Event(msgspec.Struct, frozen=True, array_like=True):
     last: int
 
 
-class PictureRow(msgspec.Struct, frozen=True):
+class ImageRow(msgspec.Struct, frozen=True):
     """A picture of the report, and why it is there. ``file``: below the report's folder."""
 
     seq: int
@@ -108,7 +108,7 @@ class RecordingRow(msgspec.Struct, frozen=True):
     events: list[Event] = []
     warnings: list[str] = []
     differing: int | None = None
-    pictures: list[PictureRow] = []
+    pictures: list[ImageRow] = []
     frames: str = ""  # file below the report's folder
 
 
@@ -129,7 +129,7 @@ class Report(msgspec.Struct, frozen=True):
         return [row for row in self.recordings if not row.error]
 
 
-def line_of(frame: Frame, told: Circles) -> FrameLine:
+def line_of(frame: Frame, reported: Circles) -> FrameLine:
     """A frame that is not scored yet, with its ``rebels``."""
     circles = [
         Rebel(
@@ -138,7 +138,7 @@ def line_of(frame: Frame, told: Circles) -> FrameLine:
             round(float(each["radius"]), 1),
             round(float(each["ttc"]), 2) if np.isfinite(each["ttc"]) else None,
         )
-        for each in told
+        for each in reported
     ]
     return FrameLine(frame.stamp_ns, frame.seq, circles)
 
@@ -200,8 +200,8 @@ def total(rows: list[RecordingRow]) -> Numbers:
     """The sum of recordings; times are the median recording's."""
 
     def middle(values: list[float | None]) -> float | None:
-        told = [value for value in values if value is not None]
-        return round(median(told), 3) if told else None
+        reported = [value for value in values if value is not None]
+        return round(median(reported), 3) if reported else None
 
     every = [row.numbers for row in rows]
     return Numbers(

@@ -19,8 +19,8 @@ Circles = np.ndarray[Any, np.dtype[np.void]]
 
 def rebels(circles: Circles) -> Circles:
     """The circles that count: rebel ones, with trust."""
-    told: Circles = circles[(circles["kind"] == Kind.REBEL) & (circles["trust"] >= MIN_TRUST)]
-    return told
+    reported: Circles = circles[(circles["kind"] == Kind.REBEL) & (circles["trust"] >= MIN_TRUST)]
+    return reported
 
 
 def is_close(circle: np.void) -> bool:
@@ -88,13 +88,13 @@ class Score:
         """Of a step."""
         return float(np.median(self.step_ms))
 
-    def add(self, stamp_ns: int, told: Circles, known: Sequence[Known]) -> Verdict:
+    def add(self, stamp_ns: int, reported: Circles, known: Sequence[Known]) -> Verdict:
         """Score the ``rebels`` of one picture."""
-        on = [[each for each in known if each.holds(circle["x"], circle["y"])] for circle in told]
+        on = [[each for each in known if each.holds(circle["x"], circle["y"])] for circle in reported]
         false = sum(not things for things in on)
         contact = any(
             is_close(circle) and not any(each.threat for each in things)
-            for circle, things in zip(told, on, strict=True)
+            for circle, things in zip(reported, on, strict=True)
         )
         found: list[str] = []
         missed: list[str] = []

@@ -39,17 +39,17 @@ class _Line(msgspec.Struct, frozen=True):
 class Truth:
     """What is known, picture by picture. Of a recording without truth: that nothing in it moves or is met."""
 
-    def __init__(self, pictures: Mapping[int, Sequence[Known]] | None) -> None:
-        self._pictures = pictures
+    def __init__(self, by_stamp: Mapping[int, Sequence[Known]] | None) -> None:
+        self._by_stamp = by_stamp
 
     @property
     def is_known(self) -> bool:
         """Whether somebody has said it."""
-        return self._pictures is not None
+        return self._by_stamp is not None
 
     def of(self, stamp_ns: int) -> Sequence[Known] | None:
         """What is in the picture of this stamp; None: it is not to be scored."""
-        return () if self._pictures is None else self._pictures.get(stamp_ns)
+        return () if self._by_stamp is None else self._by_stamp.get(stamp_ns)
 
 
 def read_truth(path: Path | None) -> Truth:

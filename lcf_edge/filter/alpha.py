@@ -59,7 +59,7 @@ def judge_all(
     verdicts.count = 0
     for i in range(edges.count):
         if edges.is_own_part(i):
-            edges.rebel[i] = edges.links[i] = 0  # it moves with the camera, and is nothing that could be met
+            edges.rebel[i] = edges.suspect_keys[i] = 0  # it moves with the camera, and is nothing that could be met
         elif edges.matched[i] and key_frames.has_history(edges, i, keys, MIN_BASELINE_S):
             j = verdicts.count
             verdicts.count += 1
@@ -98,17 +98,17 @@ def release_obedient(verdicts: Verdicts, edges: EdgeColumns, around: Situation, 
             edges.trust[i] -= OBEYING_COSTS
             if edges.trust[i] < settings.tr_cr:
                 send_home(edges, i, around, settings)
-        elif edges.links[i] > 0:
-            edges.links[i] = 0
+        elif edges.suspect_keys[i] > 0:
+            edges.suspect_keys[i] = 0
             edges.speed[i] = outward_speed(edges, i, around)
 
 
 def wait(edges: EdgeColumns, i: int, key: bool, around: Situation) -> None:
     """An edge that breaks the flow, and is too young to be judged, is a chain that waits for its third key frame."""
-    if edges.links[i] == 0:  # until now it followed its flow line
+    if edges.suspect_keys[i] == 0:  # until now it followed its flow line
         edges.beta[i] = math.atan2(edges.y[i] - around.focus_y, edges.x[i] - around.focus_x)
-    links = edges.links[i] + (1 if key else 0)
-    edges.links[i] = min(max(links, 1), PENDING)
+    suspect_keys = edges.suspect_keys[i] + (1 if key else 0)
+    edges.suspect_keys[i] = min(max(suspect_keys, 1), PENDING)
 
 
 def middle_key(verdicts: Verdicts, j: int, keys: KeyFrames, key: bool) -> int:
@@ -147,7 +147,7 @@ def decide(
             born[births] = j
             births += 1
             continue
-        edges.links[i] = 0
+        edges.suspect_keys[i] = 0
         if verdicts.mover[j]:  # not one landmark: its history is worth nothing
             edges.born_key[i] = keys.number
     return births

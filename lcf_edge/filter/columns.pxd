@@ -4,7 +4,7 @@ cdef class EdgeColumns:
     cdef public Py_ssize_t count, capacity
     cdef double[::1] x, y, beta, speed, bl, trust, deviation, origin_x, origin_y
     cdef double[:, ::1] key_x, key_y
-    cdef int[::1] born_key, circle, square, links
+    cdef int[::1] born_key, circle, square, suspect_keys
     cdef unsigned char[::1] rebel, held, matched
     cdef unsigned char[:, ::1] appearance
     cdef unsigned long long[:, ::1] words

@@ -18,7 +18,7 @@ class EdgeColumns:
         self.bl, self.trust, self.deviation = memory["bl"], memory["trust"], memory["deviation"]
         self.origin_x, self.origin_y = memory["origin_x"], memory["origin_y"]
         self.key_x, self.key_y, self.born_key = memory["key_x"], memory["key_y"], memory["born_key"]
-        self.circle, self.square, self.links = memory["circle"], memory["square"], memory["links"]
+        self.circle, self.square, self.suspect_keys = memory["circle"], memory["square"], memory["suspect_keys"]
         self.rebel, self.held, self.matched = memory["rebel"], memory["held"], memory["matched"]
         self.appearance, self.words = memory["appearance"], memory["words"]
         self.predicted_x, self.predicted_y = memory["predicted_x"], memory["predicted_y"]
@@ -28,7 +28,7 @@ class EdgeColumns:
 
     def own_way(self, i: int) -> bool:
         """Whether an edge follows no flow line: rebels and chains."""
-        return self.rebel[i] != 0 or self.links[i] > 0
+        return self.rebel[i] != 0 or self.suspect_keys[i] > 0
 
     def is_own_part(self, i: int) -> bool:
         """Whether an edge has stayed where it is in the picture: a part of the vehicle, or dirt on the lens."""

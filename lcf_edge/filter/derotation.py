@@ -124,14 +124,14 @@ def missing_rotation(off: OffLine, focal: float, prior_sigma_rad: float) -> None
     for _ in range(ROUNDS):
         scatter = weigh(off, prior)
         least_squares.solve(off.equations)
-        off.turn_x, off.turn_y = off.equations.answer[0], off.equations.answer[1]
-        off.turn_z = off.equations.answer[2]
+        off.turn_x, off.turn_y = off.equations.solution[0], off.equations.solution[1]
+        off.turn_z = off.equations.solution[2]
     weak = CORNER_SIGMA_PX / WEAK_RAD
     for i in range(3):
         off.equations.matrix[i, i] += weak * weak - prior
     least_squares.solve(off.equations)
     for i in range(3):
-        off.alone[i] = off.equations.answer[i]
+        off.alone[i] = off.equations.solution[i]
     least_squares.invert(off.equations)
     doubt = max(1.0, scatter / SCATTER)
     shared = MIN_SIGMA_PX / focal

@@ -89,8 +89,8 @@ def update_gate(
     bl: float, speed: float, predicted_speed: float, corr: float, dt_s: float, least_px: float, most_px: float
 ) -> float:
     """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
-    wanted = math.fabs(predicted_speed - speed) * dt_s / corr
-    return min(max(0.5 * (wanted + bl), least_px), most_px)
+    target = math.fabs(predicted_speed - speed) * dt_s / corr
+    return min(max(0.5 * (target + bl), least_px), most_px)
 
 
 def update_deviation(deviation: float, turn: float) -> float:

@@ -199,7 +199,7 @@ def stray(
     edges.deviation[row] = 0.0
     edges.trust[row] = settings.tr_new
     edges.bl[row] = STRAY_GATE_SHARE * settings.bl0_px
-    edges.links[row] = 1
+    edges.suspect_keys[row] = 1
     edges.circle[row] = -1
     take_corner(edges, row, corners, corner, dt_s)
 
@@ -274,7 +274,7 @@ def join_rebels(edges: EdgeColumns, start: int, circles: CircleColumns, around: 
         if c >= 0:
             vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
             vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)
-            edges.links[i] = 1
+            edges.suspect_keys[i] = 1
             edges.beta[i] = math.atan2(vy, vx)
             edges.speed[i] = flow.length(vx, vy)
             edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]

@@ -14,7 +14,7 @@ def copy_row(edges: EdgeColumns, source: int, target: int) -> None:
     edges.origin_x[target], edges.origin_y[target] = edges.origin_x[source], edges.origin_y[source]
     edges.born_key[target], edges.circle[target] = edges.born_key[source], edges.circle[source]
     edges.square[target] = edges.square[source]
-    edges.links[target], edges.rebel[target] = edges.links[source], edges.rebel[source]
+    edges.suspect_keys[target], edges.rebel[target] = edges.suspect_keys[source], edges.rebel[source]
     edges.held[target], edges.matched[target] = edges.held[source], edges.matched[source]
     edges.fixed_x[target], edges.fixed_y[target] = edges.fixed_x[source], edges.fixed_y[source]
     edges.fixed_s[target] = edges.fixed_s[source]
@@ -28,7 +28,7 @@ def empty_row(edges: EdgeColumns, i: int) -> None:
     edges.x[i] = edges.y[i] = edges.beta[i] = edges.speed[i] = 0.0
     edges.bl[i] = edges.trust[i] = edges.deviation[i] = 0.0
     edges.origin_x[i] = edges.origin_y[i] = 0.0
-    edges.born_key[i] = edges.links[i] = 0
+    edges.born_key[i] = edges.suspect_keys[i] = 0
     edges.circle[i] = edges.square[i] = -1
     edges.rebel[i] = edges.held[i] = edges.matched[i] = 0
     edges.fixed_x[i] = edges.fixed_y[i] = 0

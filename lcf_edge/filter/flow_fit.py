@@ -158,11 +158,11 @@ def quantile(fit: FlowFit, share: float, turned_px: float, turn_share: float) ->
             rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
             fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
             counted += 1
-    wanted = share * counted
+    rank = share * counted
     below = 0.0
     for b in range(BINS):
-        if below + fit.bins[b] >= wanted:
-            return BIN_PX * (b + (wanted - below) / max(fit.bins[b], 1))
+        if below + fit.bins[b] >= rank:
+            return BIN_PX * (b + (rank - below) / max(fit.bins[b], 1))
         below += fit.bins[b]
     return BIN_PX * BINS
 
@@ -185,7 +185,7 @@ def explained(fit: FlowFit) -> float:
     """Drift that the answer explains of the edge whose row was set, px."""
     drift = 0.0
     for i in range(fit.equations.unknowns):
-        drift += fit.equations.row[i] * fit.equations.answer[i]
+        drift += fit.equations.row[i] * fit.equations.solution[i]
     return drift
 
 
@@ -222,19 +222,19 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
 
 def turn_slot(fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float) -> None:
     """A rotation of key frame ``k``'s own, of what is left; the key frame keeps it."""
-    fit.equations.answer[0] = fit.equations.answer[1] = fit.equations.answer[2] = 0.0
+    fit.equations.solution[0] = fit.equations.solution[1] = fit.equations.solution[2] = 0.0
     for _ in range(SLOT_ROUNDS):
         least_squares.begin(fit.equations, 3)
         for i in range(3):
             least_squares.add_prior(fit.equations, i, NOISE_PX * NOISE_PX / (sigma_rad * sigma_rad))
-        turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
+        turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
         for j in range(fit.count):
             if fit.slot[j] == k:
                 fit.equations.row[0], fit.equations.row[1], fit.equations.row[2] = fit.pitch[j], fit.yaw[j], fit.roll[j]
                 left = fit.rest[j] - (turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j])
                 least_squares.add(fit.equations, weight_of(left, SLOT_WIDTH_PX), fit.rest[j])
         least_squares.solve(fit.equations)
-    turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
+    turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
     for j in range(fit.count):
         if fit.slot[j] == k:
             fit.rest[j] -= turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j]
@@ -256,8 +256,8 @@ def slot_edges(fit: FlowFit, k: int) -> int:
 
 def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
     """Correct the baselines by ω and ΔO, and note what stays uncertain."""
-    turn_x, turn_y, turn_z = fit.equations.answer[0], fit.equations.answer[1], fit.equations.answer[2]
-    fit.focus_x, fit.focus_y = fit.equations.answer[FOCUS_X], fit.equations.answer[FOCUS_Y]
+    turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
+    fit.focus_x, fit.focus_y = fit.equations.solution[FOCUS_X], fit.equations.solution[FOCUS_Y]
     least_squares.invert(fit.equations)
     fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
     variance = max(NOISE_PX, fit.scale_px) * max(NOISE_PX, fit.scale_px)
@@ -288,9 +288,9 @@ def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
     if turned < MIN_TURNED:
         return
     off_px = quantile(fit, SCALE_SHARE, MIN_TURN_PX, 0.0) / SCALE_SIGMAS
-    told2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
+    turn2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
     gain = 1 - math.exp(-dt_s / TURN_MEMORY_S)
-    fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (told2 - fit.turn_share * fit.turn_share))
+    fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (turn2 - fit.turn_share * fit.turn_share))
 
 
 def measure(

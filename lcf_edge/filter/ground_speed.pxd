@@ -19,10 +19,10 @@ cdef double MIN_SIGMA
 cdef double NAN
 
 cdef class GroundSpeed:
-    cdef public double speed_mps, sigma_mps, told_mps, elapsed_s
+    cdef public double speed_mps, sigma_mps, measured_mps, elapsed_s
     cdef int[::1] votes
     cdef int count
-    cdef double below, sum, told, elapsed
+    cdef double below, sum, measured, elapsed
 
 @cython.locals(outward=double)
 cdef double says_mps(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

@@ -28,17 +28,18 @@ NAN = float("nan")
 
 
 class GroundSpeed:
-    """``speed_mps``: V, over the time of the window, NaN: not told, with ``sigma_mps``; ``told_mps``: what was told.
+    """``speed_mps``: V as the ground shows it, mean of the window, NaN: unknown; ``sigma_mps``: 1 sigma of it.
 
-    ``elapsed_s``: the window. ``votes``: (BINS,).
+    ``measured_mps``: V over the same window by IMU, odometry or configuration. ``elapsed_s``: the window. ``votes``:
+    (BINS,).
     """
 
     def __init__(self) -> None:
-        self.speed_mps = self.sigma_mps = self.told_mps = NAN
+        self.speed_mps = self.sigma_mps = self.measured_mps = NAN
         self.elapsed_s = 0.0
         self.votes = integers(BINS)
         self.count = 0
-        self.below = self.sum = self.told = self.elapsed = 0.0
+        self.below = self.sum = self.measured = self.elapsed = 0.0
 
 
 def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> float:
@@ -47,7 +48,7 @@ def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baseline
     if below < MIN_BELOW * around.pinhole.focal:
         return 0.0
     slot = verdicts.slot[j]
-    outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # of one told to go back
+    outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # backwards
     if outward < OUTWARD_SIGMAS * (verdicts.sigma[j] + around.noise_px) or verdicts.r[j] <= 0:
         return 0.0
     range_m = around.camera_height_m * around.pinhole.focal / below
@@ -76,7 +77,7 @@ def measure(
     ground: GroundSpeed, edges: EdgeColumns, verdicts: Verdicts, baselines: Baselines, around: Situation
 ) -> None:
     """What the ground tells in this frame."""
-    ground.speed_mps = ground.sigma_mps = ground.told_mps = NAN
+    ground.speed_mps = ground.sigma_mps = ground.measured_mps = NAN
     if not around.camera_height_m > 0:
         return
     ground.count = 0
@@ -92,7 +93,7 @@ def measure(
         return
     middle = math.log(SLOWEST_MPS) + (best + 0.5) * BIN_RATIO
     n = 0
-    ground.below = ground.sum = ground.told = ground.elapsed = 0.0
+    ground.below = ground.sum = ground.measured = ground.elapsed = 0.0
     for j in range(verdicts.count):
         says = says_mps(verdicts, j, edges, baselines, around)
         if says > SLOWEST_MPS and math.fabs(math.log(says) - middle) < SPREAD:
@@ -100,11 +101,11 @@ def measure(
             n += 1
             ground.sum += math.log(says)
             ground.below += edges.y[verdicts.row[j]] - around.horizon_y
-            ground.told += baselines.depth_m[slot] / baselines.elapsed_s[slot]
+            ground.measured += baselines.depth_m[slot] / baselines.elapsed_s[slot]
             ground.elapsed += baselines.elapsed_s[slot]
     if n < MIN_EDGES:
         return
     ground.speed_mps = math.exp(ground.sum / n)
     tilt = SLOPE_SIGMA_RAD * around.pinhole.focal / (ground.below / n)
     ground.sigma_mps = ground.speed_mps * math.sqrt(MIN_SIGMA * MIN_SIGMA + tilt * tilt)
-    ground.told_mps, ground.elapsed_s = ground.told / n, ground.elapsed / n
+    ground.measured_mps, ground.elapsed_s = ground.measured / n, ground.elapsed / n

@@ -6,7 +6,7 @@ cdef double MIN_PIVOT
 
 cdef class NormalEquations:
     cdef readonly int unknowns
-    cdef readonly double[::1] row, right, answer
+    cdef readonly double[::1] row, right, solution
     cdef readonly double[:, ::1] matrix, factor, inverse
 
 cpdef void begin(NormalEquations equations, int unknowns) noexcept nogil

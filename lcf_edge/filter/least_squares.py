@@ -9,15 +9,15 @@ MIN_PIVOT = 1e-12  # of a matrix that priors keep positive definite
 
 
 class NormalEquations:
-    """(Σ w·aᵀa + prior)·answer = Σ w·a·b, for up to ``MAX_UNKNOWNS``.
+    """(Σ w·aᵀa + prior)·solution = Σ w·a·b, for up to ``MAX_UNKNOWNS``.
 
-    ``row``: a, to be filled before ``add``. ``answer``: after ``solve``. ``inverse``: of the matrix, after ``invert``;
-    times the variance of a measurement of weight 1 it is the covariance of the answer.
+    ``row``: a, to be filled before ``add``. ``solution``: after ``solve``. ``inverse``: of the matrix, after
+    ``invert``; times the variance of a measurement of weight 1 it is the covariance of the solution.
     """
 
     def __init__(self) -> None:
         self.unknowns = MAX_UNKNOWNS
-        self.row, self.right, self.answer = (doubles(MAX_UNKNOWNS) for _ in range(3))
+        self.row, self.right, self.solution = (doubles(MAX_UNKNOWNS) for _ in range(3))
         self.matrix, self.factor, self.inverse = (doubles(MAX_UNKNOWNS, MAX_UNKNOWNS) for _ in range(3))
 
 
@@ -36,7 +36,7 @@ def add_prior(equations: NormalEquations, i: int, weight: float) -> None:
 
 
 def add(equations: NormalEquations, weight: float, measured: float) -> None:
-    """``row``·answer = ``measured``, with this weight."""
+    """``row``·solution = ``measured``, with this weight."""
     for i in range(equations.unknowns):
         weighted = weight * equations.row[i]
         equations.right[i] += weighted * measured
@@ -58,32 +58,32 @@ def factorise(equations: NormalEquations) -> None:
 
 
 def substitute(equations: NormalEquations) -> None:
-    """``answer`` from ``right``, with the factors as they are."""
+    """``solution`` from ``right``, with the factors as they are."""
     last = equations.unknowns - 1
     for i in range(equations.unknowns):
         rest = equations.right[i]
         for k in range(i):
-            rest -= equations.factor[i, k] * equations.answer[k]
-        equations.answer[i] = rest / equations.factor[i, i]
+            rest -= equations.factor[i, k] * equations.solution[k]
+        equations.solution[i] = rest / equations.factor[i, i]
     for j in range(equations.unknowns):
         i = last - j
-        rest = equations.answer[i]
+        rest = equations.solution[i]
         for k in range(i + 1, equations.unknowns):
-            rest -= equations.factor[k, i] * equations.answer[k]
-        equations.answer[i] = rest / equations.factor[i, i]
+            rest -= equations.factor[k, i] * equations.solution[k]
+        equations.solution[i] = rest / equations.factor[i, i]
 
 
 def solve(equations: NormalEquations) -> None:
-    """Set ``answer``."""
+    """Set ``solution``."""
     factorise(equations)
     substitute(equations)
 
 
 def invert(equations: NormalEquations) -> None:
-    """Set ``inverse``, after ``solve``; ``right`` and ``answer`` are used up."""
+    """Set ``inverse``, after ``solve``; ``right`` and ``solution`` are used up."""
     for j in range(equations.unknowns):
         for i in range(equations.unknowns):
             equations.right[i] = 1.0 if i == j else 0.0
         substitute(equations)
         for i in range(equations.unknowns):
-            equations.inverse[i, j] = equations.answer[i]
+            equations.inverse[i, j] = equations.solution[i]

@@ -178,10 +178,10 @@ class LineCircleFilter:
         """Whether the picture says that the vehicle stands, although a speed is told."""
         return bool(self._rest.stands)
 
-    def step(self, corners: Corners, motion: Motion, picture: Grey | None = None) -> Step:
+    def step(self, corners: Corners, motion: Motion, image: Grey | None = None) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive.
 
-        ``picture``: uint8 (height, width), which the corners are of; without one no patches are followed.
+        ``image``: uint8 (height, width), which the corners are of; without one no patches are followed.
         """
         motion = self._rested(motion)
         self._take(corners)
@@ -193,7 +193,7 @@ class LineCircleFilter:
         sigma_rad, residual = self._refine(motion)
         self._update(sigma_rad)
         evicted += self._add()
-        pixels = None if picture is None else memory_of(np.ascontiguousarray(picture).reshape(-1))
+        pixels = None if image is None else memory_of(np.ascontiguousarray(image).reshape(-1))
         if pixels is not None:
             patches.follow(self.patches, pixels, self._plane)
         rebels, left = self._detect()
@@ -210,7 +210,7 @@ class LineCircleFilter:
 
     def _rested(self, motion: Motion) -> Motion:
         """The motion as the picture knows it: where it says that the vehicle stands, no told speed is believed."""
-        self._rest.told_mps = motion.speed_mps
+        self._rest.measured_mps = motion.speed_mps
         if not self._rest.stands:
             return motion
         key_frames.stop(self._keys)
@@ -363,8 +363,8 @@ class LineCircleFilter:
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)
-        wanted = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
-        births, evicted = self._make_room(wanted)
+        requested = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
+        births, evicted = self._make_room(requested)
         alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, around, settings)
         return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
 
@@ -387,18 +387,18 @@ class LineCircleFilter:
         around.delta_px = max(around.delta_px, DELTA_SIGMAS * self._scale_px)
         rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)
 
-    def _make_room(self, wanted: int) -> tuple[int, int]:
+    def _make_room(self, requested: int) -> tuple[int, int]:
         """Room for so many new rebels: weak ones go home. Return how many may be born, and how many found no place."""
         edges, settings = self.edges, self._settings
         room = edges.rebel_capacity - edges.rebels
-        excess = max(0, wanted - room)
+        excess = max(0, requested - room)
         if not excess:
-            return wanted, 0
+            return requested, 0
         n = edges.count
         weak = edges.least_trusted(edges.rebel[:n] & (edges.trust[:n] < settings.tr_new), excess)
         for row in weak.tolist():
             alpha.send_home(edges.columns, row, self._around, settings)
-        return min(wanted, max(0, room) + len(weak)), excess
+        return min(requested, max(0, room) + len(weak)), excess
 
     def _update_circles(self, rebels: int) -> int:
         """Circles, ψ; return evictions."""
@@ -445,7 +445,7 @@ class LineCircleFilter:
             omitted=omitted,
             edges_normal=n - rebels,
             edges_rebel=rebels,
-            chains=int(np.count_nonzero(self.edges.links[:n])),
+            chains=int(np.count_nonzero(self.edges.suspect_keys[:n])),
             circles_normal=self.normal.count,
             circles_rebel=self.rebel.count,
             groups=self.groups.count,

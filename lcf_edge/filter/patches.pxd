@@ -41,7 +41,7 @@ cdef class Patches:
     cdef readonly unsigned char[::1] active
     cdef readonly int[::1] misses, circle
     cdef readonly double[::1] x, y, first_x, first_y, half_px, scale, sigma, elapsed_s, depth_m, inverse, doubt
-    cdef readonly double[::1] contrast, unit, weight, seen
+    cdef readonly double[::1] contrast, unit, weight, sampled
     cdef readonly double[:, ::1] grey, across, down, growing, sums, inverted
     cdef double u, v, right_u, right_v, down_u, down_v, mean, square, shared, on_across, on_down, on_growing, tried
 
@@ -52,23 +52,23 @@ cpdef void derotate(Patches patches, Homography h) noexcept nogil
 cpdef void predict(Patches patches, Situation around) noexcept nogil
 cdef bint locate(Patches patches, ImagePlane plane, double x, double y, double half) noexcept nogil
 @cython.locals(row=int, column=int, left=int, top=int, at=Py_ssize_t, upper=double, lower=double)
-cdef void look(Patches patches, const unsigned char[::1] picture, Py_ssize_t width) noexcept nogil
+cdef void look(Patches patches, const unsigned char[::1] image, Py_ssize_t width) noexcept nogil
 @cython.locals(k=int)
 cdef void compare(Patches patches, Py_ssize_t p) noexcept nogil
 cdef double bounded(double value, double most) noexcept nogil
 cdef double step(Patches patches, Py_ssize_t p, double gain) noexcept nogil
 @cython.locals(change=double, likeness=double, rest=double)
-cdef bint find(Patches patches, Py_ssize_t p, const unsigned char[::1] picture, ImagePlane plane) noexcept nogil
-cpdef void follow(Patches patches, const unsigned char[::1] picture, ImagePlane plane) noexcept nogil
+cdef bint find(Patches patches, Py_ssize_t p, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
+cpdef void follow(Patches patches, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
 cdef double half_side(Situation around) noexcept nogil
 cdef int free_row(Patches patches) noexcept nogil
 cdef bint is_covered(Patches patches, double x, double y, double half) noexcept nogil
 @cython.locals(best=int, least=double, i=int)
 cdef int next_place(Patches patches, EdgeColumns edges, double half, Situation around) noexcept nogil
 @cython.locals(mean=double, k=int)
-cpdef bint give_birth(Patches patches, Py_ssize_t p, double x, double y, double half, const unsigned char[::1] picture, ImagePlane plane) noexcept nogil
+cpdef bint give_birth(Patches patches, Py_ssize_t p, double x, double y, double half, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
 cdef double slope(Patches patches, Py_ssize_t p, int k, int place, int stride) noexcept nogil
 @cython.locals(square=double, xx=double, xy=double, xs=double, yy=double, ys=double, ss=double, k=int, row=int, column=int)
 cdef bint set_template(Patches patches, Py_ssize_t p) noexcept nogil
 @cython.locals(i=int, p=int)
-cpdef void renew(Patches patches, EdgeColumns edges, const unsigned char[::1] picture, ImagePlane plane, Situation around) noexcept nogil
+cpdef void renew(Patches patches, EdgeColumns edges, const unsigned char[::1] image, ImagePlane plane, Situation around) noexcept nogil

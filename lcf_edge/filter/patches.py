@@ -73,7 +73,7 @@ class Patches:
         self.contrast, self.unit = (doubles(max(capacity, 1)) for _ in range(2))
         self.grey, self.across, self.down, self.growing = (doubles(max(capacity, 1), SAMPLES) for _ in range(4))
         self.sums, self.inverted = doubles(max(capacity, 1), 6), doubles(max(capacity, 1), 9)
-        self.weight, self.seen = doubles(SAMPLES), doubles(SAMPLES)
+        self.weight, self.sampled = doubles(SAMPLES), doubles(SAMPLES)
         self.u = self.v = self.right_u = self.right_v = self.down_u = self.down_v = 0.0
         self.mean = self.square = self.shared = self.on_across = self.on_down = self.on_growing = 0.0
         self.tried = 0.0
@@ -149,7 +149,7 @@ def locate(patches: Patches, plane: ImagePlane, x: float, y: float, half: float)
     )
 
 
-def look(patches: Patches, picture: Bytes, width: int) -> None:
+def look(patches: Patches, image: Bytes, width: int) -> None:
     """The samples where the patch was placed, between four pixels each."""
     for row in range(SIDE):
         y = offset(row)
@@ -160,9 +160,9 @@ def look(patches: Patches, picture: Bytes, width: int) -> None:
             left, top = rounding.whole(u), rounding.whole(v)
             at = top * width + left
             share, below = u - left, v - top
-            upper = picture[at] + share * (picture[at + 1] - picture[at])
-            lower = picture[at + width] + share * (picture[at + width + 1] - picture[at + width])
-            patches.seen[row * SIDE + column] = upper + below * (lower - upper)
+            upper = image[at] + share * (image[at + 1] - image[at])
+            lower = image[at + width] + share * (image[at + width + 1] - image[at + width])
+            patches.sampled[row * SIDE + column] = upper + below * (lower - upper)
 
 
 def compare(patches: Patches, p: int) -> None:
@@ -170,7 +170,7 @@ def compare(patches: Patches, p: int) -> None:
     patches.mean = patches.square = patches.shared = 0.0
     patches.on_across = patches.on_down = patches.on_growing = 0.0
     for k in range(SAMPLES):
-        grey = patches.seen[k]
+        grey = patches.sampled[k]
         weighed = patches.weight[k] * grey
         patches.mean += weighed
         patches.square += weighed * grey
@@ -204,7 +204,7 @@ def step(patches: Patches, p: int, gain: float) -> float:
     return max((math.fabs(x) + math.fabs(y)) / SMALL_PX, math.fabs(grown) / SMALL_SHARE)
 
 
-def find(patches: Patches, p: int, picture: Bytes, plane: ImagePlane) -> bool:
+def find(patches: Patches, p: int, image: Bytes, plane: ImagePlane) -> bool:
     """Whether a patch is seen near where it was predicted; its place, its scale and their doubt."""
     change, likeness, rest = 2.0, 0.0, 0.0
     for _ in range(ROUNDS):
@@ -212,7 +212,7 @@ def find(patches: Patches, p: int, picture: Bytes, plane: ImagePlane) -> bool:
             break
         if not locate(patches, plane, patches.x[p], patches.y[p], patches.half_px[p] * patches.scale[p]):
             return False
-        look(patches, picture, plane.width)
+        look(patches, image, plane.width)
         compare(patches, p)
         variance = patches.square - patches.mean * patches.mean
         if variance < 1:
@@ -226,13 +226,13 @@ def find(patches: Patches, p: int, picture: Bytes, plane: ImagePlane) -> bool:
     return likeness >= LIKENESS and MIN_SCALE < patches.scale[p] < MAX_SCALE
 
 
-def follow(patches: Patches, picture: Bytes, plane: ImagePlane) -> None:
+def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
     """Each patch in this picture, or as predicted where that does not show it; too often, and it ends."""
     for p in range(patches.capacity):
         if not patches.active[p]:
             continue
         x, y, scale = patches.x[p], patches.y[p], patches.scale[p]
-        if find(patches, p, picture, plane):
+        if find(patches, p, image, plane):
             patches.misses[p] = 0
         else:
             patches.x[p], patches.y[p], patches.scale[p] = x, y, scale
@@ -302,16 +302,16 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
     return best
 
 
-def give_birth(patches: Patches, p: int, x: float, y: float, half: float, picture: Bytes, plane: ImagePlane) -> bool:
+def give_birth(patches: Patches, p: int, x: float, y: float, half: float, image: Bytes, plane: ImagePlane) -> bool:
     """A new patch around a place; False: it has too little contrast, or would not show its scale."""
     if not locate(patches, plane, x, y, half):
         return False
-    look(patches, picture, plane.width)
+    look(patches, image, plane.width)
     mean = 0.0
     for k in range(SAMPLES):
-        mean += patches.weight[k] * patches.seen[k]
+        mean += patches.weight[k] * patches.sampled[k]
     for k in range(SAMPLES):
-        patches.grey[p, k] = patches.seen[k] - mean
+        patches.grey[p, k] = patches.sampled[k] - mean
     patches.half_px[p] = half
     if not set_template(patches, p):
         return False
@@ -372,7 +372,7 @@ def set_template(patches: Patches, p: int) -> bool:
     return patches.unit[p] < MAX_SCALE_SIGMA
 
 
-def renew(patches: Patches, edges: EdgeColumns, picture: Bytes, plane: ImagePlane, around: Situation) -> None:
+def renew(patches: Patches, edges: EdgeColumns, image: Bytes, plane: ImagePlane, around: Situation) -> None:
     """Newborn patches where there is room, around edges near the path."""
     if not around.speed_mps > MIN_SPEED_MPS:
         return
@@ -383,4 +383,4 @@ def renew(patches: Patches, edges: EdgeColumns, picture: Bytes, plane: ImagePlan
         i = next_place(patches, edges, half, around) if p >= 0 else -1
         if i < 0:
             return
-        give_birth(patches, p, edges.x[i], edges.y[i], half, picture, plane)
+        give_birth(patches, p, edges.x[i], edges.y[i], half, image, plane)

@@ -346,8 +346,8 @@ def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
             if g < 0:
                 continue
             r2 = verdicts.r[j] * verdicts.r[j]
-            usual = SPREAD_NOISE_PX / groups.elapsed_s[k] / verdicts.r[j] + STRAY_SHARE * math.fabs(groups.expansion[g])
-            off = (verdicts.expansion[j] - groups.expansion[g]) / (STRAY_SIGMAS * usual)
+            noise = SPREAD_NOISE_PX / groups.elapsed_s[k] / verdicts.r[j] + STRAY_SHARE * math.fabs(groups.expansion[g])
+            off = (verdicts.expansion[j] - groups.expansion[g]) / (STRAY_SIGMAS * noise)
             weight = r2 / ((1 + off * off) * (1 + off * off))
             groups.weight[g] += weight
             groups.weighed_rate[g] += weight * verdicts.expansion[j]

@@ -258,7 +258,7 @@ def give_birth(
     edges.beta[i] = beta
     edges.origin_x[i], edges.origin_y[i] = x1, y1
     edges.rebel[i] = 1
-    edges.links[i] = 0
+    edges.suspect_keys[i] = 0
     edges.circle[i] = -1
     edges.trust[i] = settings.tr_new
     edges.bl[i] = max(edges.bl[i], 2 * settings.bl_min_px)

@@ -20,7 +20,7 @@ cdef double STILL_SHARE
 cdef class RestTest:
     cdef readonly int edges, still, ground, still_ground
     cdef readonly bint stands
-    cdef public double told_mps
+    cdef public double measured_mps
     cdef readonly double still_s
 
 cdef int latest_key(KeyFrames keys) noexcept nogil

@@ -23,15 +23,15 @@ STILL_SHARE = 0.3  # nor than this share of what they must
 class RestTest:
     """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
 
-    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``told_mps``: the speed by IMU, odometry
-    or configuration; NaN: unknown.
+    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``measured_mps``: the speed by IMU,
+    odometry or configuration; NaN: unknown.
     """
 
     def __init__(self) -> None:
         self.edges = self.still = self.ground = self.still_ground = 0
         self.stands = False
         self.still_s = 0.0
-        self.told_mps = 0.0
+        self.measured_mps = 0.0
 
 
 def latest_key(keys: KeyFrames) -> int:
@@ -52,7 +52,7 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
     r = flow.length(x - baselines.focus_x[slot], y - baselines.focus_y[slot])
     focal = around.pinhole.focal
     below = max(edges.y[i] - around.horizon_y - focal * around.pitch_sigma_rad, 0.0)
-    driven_m = math.fabs(test.told_mps) * baselines.elapsed_s[slot]
+    driven_m = math.fabs(test.measured_mps) * baselines.elapsed_s[slot]
     expected = r * driven_m * below / (around.camera_height_m * focal)
     test.edges += 1
     if way < STILL_PX:
@@ -70,7 +70,7 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
     test.still_s = 0.0
     test.edges = test.still = test.ground = test.still_ground = 0
     number = latest_key(keys)
-    known = math.isfinite(test.told_mps) and test.told_mps != 0 and around.camera_height_m > 0
+    known = math.isfinite(test.measured_mps) and test.measured_mps != 0 and around.camera_height_m > 0
     if number < 0 or not known:
         return
     for i in range(edges.count):

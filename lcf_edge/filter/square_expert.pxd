@@ -46,7 +46,7 @@ cdef double SHRINKS_S
 cdef double FOOT_S
 cdef double FOOT_BELOW_S
 cdef double EDGE_PX
-cdef double FRAMES_UNTOLD
+cdef double FRAMES_UNREPORTED
 cdef double UNSURE
 cdef int SURE_EDGES
 cdef double COAST_S

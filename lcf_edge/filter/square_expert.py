@@ -54,7 +54,7 @@ SHRINKS_S = 0.3  # and edges that show it smaller,
 FOOT_S = 1.2  # and with which a foot is forgotten that is not seen,
 FOOT_BELOW_S = 3.0  # below the picture
 EDGE_PX = 1.0  # by which a corner lies inside of what it is a corner of
-FRAMES_UNTOLD = 2.0  # of a new object,
+FRAMES_UNREPORTED = 2.0  # of a new object,
 UNSURE = 0.25  # and three more with fewer edges than
 SURE_EDGES = 7
 COAST_S = 0.3  # an object goes on unseen for so long without losing trust,
@@ -325,7 +325,7 @@ def found(
     top, bottom = squares.parts.top[c], squares.parts.bottom[c]
     objects.x[o], objects.width[o] = 0.5 * (left + right), right - left
     objects.y[o], objects.height[o] = 0.5 * (top + bottom), bottom - top
-    objects.trust[o] = settings.tr_s - FRAMES_UNTOLD - 1
+    objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
     objects.class_id[o], objects.state[o], objects.support[o] = UNKNOWN, SEEN, 0
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN

@@ -86,7 +86,7 @@ EDGE_COLUMNS = (
         empty=NO_OBJECT,
     ),
     Column(
-        "links",
+        "suspect_keys",
         "ℓ: key frames for which it has broken the flow; above 0 it is in α",
         "1",
         ("edge_expert", "alpha", "rebel_detection"),
@@ -304,7 +304,7 @@ class EdgeTable(Table):
 
     def own_way(self) -> Mask:
         """Edges that follow no flow line: rebels and chains; bool (count,)."""
-        return np.asarray(self.rebel[: self.count] | (self.links[: self.count] > 0))
+        return np.asarray(self.rebel[: self.count] | (self.suspect_keys[: self.count] > 0))
 
     def append(self, number: int) -> slice:
         """Claim ``number`` empty rows behind the last one; the caller sees to it that they fit."""
@@ -325,10 +325,10 @@ class EdgeTable(Table):
     def trim(self) -> int:
         """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; return how many."""
         n = self.count
-        chains = (self.links[:n] > 0) & ~self.rebel[:n]
+        chains = (self.suspect_keys[:n] > 0) & ~self.rebel[:n]
         excess_chains = max(0, int(np.count_nonzero(chains)) - self.chain_capacity)
         if excess_chains:
-            self.links[self.least_trusted(chains, excess_chains)] = 0
+            self.suspect_keys[self.least_trusted(chains, excess_chains)] = 0
         excess = max(0, -self.normal_room())
         if excess:
             dead = np.zeros(n, np.bool_)

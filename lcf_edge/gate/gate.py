@@ -50,7 +50,7 @@ class Gate:
 
     def __init__(self, daemon: tuple[str, int], certificates: Certificates) -> None:
         self.counts: Counter[str] = Counter()
-        self._told: Counter[str] = Counter()
+        self._reported: Counter[str] = Counter()
         self._daemon = daemon
         self._certificates = certificates
         self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
@@ -86,8 +86,8 @@ class Gate:
 
     def tell_now(self) -> None:
         """What has happened since it was last told."""
-        news = self.counts - self._told
-        self._told = self.counts.copy()
+        news = self.counts - self._reported
+        self._reported = self.counts.copy()
         if news:
             LOGGER.info("gate: %s", ", ".join(f"{what} {number}" for what, number in sorted(news.items())))
 

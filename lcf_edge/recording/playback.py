@@ -27,7 +27,7 @@ MAX_WAIT_S = 0.25  # of one read
 _ON_TIME_NS = 2_000_000
 _STALL_S = 1.0
 _NAMES: dict[type, str] = {ImuSample: "inertial samples", SpeedSample: "speeds"}
-_HELD = {Frame: 4, ImuSample: 4096, SpeedSample: 4096}  # that wait for their reader; the oldest give way
+_MAX_WAITING = {Frame: 4, ImuSample: 4096, SpeedSample: 4096}  # that wait for their reader; the oldest give way
 
 
 @dataclass
@@ -53,7 +53,9 @@ class Playback:
         self._config = config
         self._users = 0
         self._lock, self._turn = threading.Lock(), threading.Lock()
-        self._waiting: dict[type, deque[tuple[int, Item]]] = {kind: deque(maxlen=held) for kind, held in _HELD.items()}
+        self._waiting: dict[type, deque[tuple[int, Item]]] = {
+            kind: deque(maxlen=longest) for kind, longest in _MAX_WAITING.items()
+        }
         self._items: Iterator[Item] = iter(())
         self._lap = -1
         self._start_ns = clock.monotonic_ns()  # of the lap
@@ -162,7 +164,7 @@ class _Recorded(Generic[Record]):
         wait_s = (due_ns - self._clock.monotonic_ns()) / 1e9
         self._clock.sleep_s(min(wait_s, MAX_WAIT_S))
         now_ns = self._clock.monotonic_ns()
-        records: deque[Record] = deque(maxlen=_HELD[self.kind])  # after a pause of the process many are due
+        records: deque[Record] = deque(maxlen=_MAX_WAITING[self.kind])  # after a pause of the process many are due
         while (due_ns := self._due_ns()) <= now_ns:
             assert self._next is not None
             if self._random.random() < self.faults.drop:

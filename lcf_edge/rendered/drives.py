@@ -175,7 +175,7 @@ class SensorNoise:
     speed_scale: float = 1.0
     speed_mps: float = 0.01
     yaw_rate_radps: float = 0.005
-    picture: float = 2.0  # grey levels
+    image: float = 2.0  # grey levels
 
 
 @dataclass(frozen=True)

@@ -113,7 +113,7 @@ def _dusk(plan: Plan) -> None:
     plan.cruise(1.2, 2.5)
     low, jump = plan.between(0.4, 0.55), plan.between(0.3, 0.7) * plan.end_s
     knots = ((0.0, low), (jump, low * 0.85), (jump + 0.05, low * 1.5), (plan.end_s, low * 1.3))
-    plan.change(gain=Profile(knots), noise=replace(plan.drive.noise, picture=4.0))
+    plan.change(gain=Profile(knots), noise=replace(plan.drive.noise, image=4.0))
     crossing_walker(plan) if plan.random.random() < 0.5 else obstacle_ahead(plan)
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.rendered.drives import Box, Drive, Floats, Lens
-from lcf_edge.rendered.textures import Picture
+from lcf_edge.rendered.textures import Image
 from lcf_edge.rendered.trajectory import Trajectory
 
 NEAR_M = 0.05
@@ -89,7 +89,7 @@ class Optics:
         shown, _ = cv2.projectPoints(rays, np.zeros(3), np.zeros(3), self.lens.matrix, coefficients)
         return np.asarray(shown, dtype=np.float64)[:, 0]
 
-    def finish(self, canvas: Picture) -> Picture:
+    def finish(self, canvas: Image) -> Image:
         """The picture behind the lens."""
         if self._map is None:
             return canvas

@@ -13,7 +13,7 @@ import numpy as np
 from lcf_edge.rendered import textures
 from lcf_edge.rendered.drives import Box, Floats, Paint
 from lcf_edge.rendered.projection import Stage, Surface, View
-from lcf_edge.rendered.textures import Picture
+from lcf_edge.rendered.textures import Image
 
 _POLYGON_BITS = 4  # of a pixel's fraction, for OpenCV's polygons
 _FACE_LIGHT = (0.85, 1.1, 0.95, 0.75, 1.25)  # back, right, front, left, top
@@ -37,10 +37,10 @@ _LAMP = np.full((8, 8), 250, dtype=np.uint8)
 class _Skin:
     """The texture of one face with its pyramid, halved across and along independently, made when needed."""
 
-    def __init__(self, base: Picture) -> None:
-        self._levels: dict[tuple[int, int], Picture] = {(0, 0): base}
+    def __init__(self, base: Image) -> None:
+        self._levels: dict[tuple[int, int], Image] = {(0, 0): base}
 
-    def level(self, across: int, along: int) -> Picture:
+    def level(self, across: int, along: int) -> Image:
         if (across, along) not in self._levels:
             height, width = self._levels[0, 0].shape
             size = (max(width >> across, 1), max(height >> along, 1))
@@ -48,7 +48,7 @@ class _Skin:
             self._levels[across, along] = np.asarray(smaller, dtype=np.uint8)
         return self._levels[across, along]
 
-    def fitting(self, surface: Surface) -> Picture:
+    def fitting(self, surface: Surface) -> Image:
         """The level with about one texel a pixel in the middle of the surface, across and along."""
         height, width = self._levels[0, 0].shape
         wide, tall = surface.extent_px
@@ -68,7 +68,7 @@ class Renderer:
         self._ground = _Skin(textures.ground(drive.ground, _GROUND_TEXELS, self._ground_px_per_m))
         self._haze = int(self._ground.level(11, 11)[0, 0])
         self._skyline = textures.skyline(drive.sky, _SKYLINE_TEXELS, _SKYLINE_ROWS)
-        self._ground_levels: dict[int, Picture] = {}
+        self._ground_levels: dict[int, Image] = {}
         x, y = np.meshgrid(np.linspace(-1, 1, drive.lens.width), np.linspace(-1, 1, drive.lens.height))
         self._vignette = (1 - drive.lens.vignetting * (x**2 + y**2) / 2).astype(np.float32)
         self._own = np.zeros((drive.lens.height, drive.lens.width), dtype=np.uint8)  # where own parts hide the world
@@ -78,10 +78,10 @@ class Renderer:
         self._own_look = textures.surface(look, 0, (drive.lens.width, drive.lens.height), 1.0, 1.0)
         self._random = np.random.default_rng([drive.seed, 3])
         shape = (drive.lens.height + 32, drive.lens.width + 32)
-        grain = self._random.normal(0, drive.noise.picture, (4, *shape))
+        grain = self._random.normal(0, drive.noise.image, (4, *shape))
         self._grain = np.rint(grain).astype(np.int16)
 
-    def picture(self, view: View) -> Picture:
+    def image(self, view: View) -> Image:
         """The next picture (height, width); exposure starts at the view's time."""
         drive = self._drive
         exposed = self._read_out(view) if drive.readout_s else self._optics.finish(self._canvas(view))
@@ -100,17 +100,17 @@ class Renderer:
         grain = self._grain[which, top : top + lit.shape[0], left : left + lit.shape[1]]
         return np.asarray(cv2.add(lit, grain, dtype=cv2.CV_8U), dtype=np.uint8)
 
-    def _read_out(self, view: View) -> Picture:
+    def _read_out(self, view: View) -> Image:
         """Bands of rows, each at its own time, the view's in the middle."""
         drive = self._drive
-        picture = np.empty((drive.lens.height, drive.lens.width), dtype=np.uint8)
+        image = np.empty((drive.lens.height, drive.lens.width), dtype=np.uint8)
         for band in range(_READOUT_BANDS):
             top, bottom = (drive.lens.height * edge // _READOUT_BANDS for edge in (band, band + 1))
             late = drive.readout_s * ((band + 0.5) / _READOUT_BANDS - 0.5)
-            picture[top:bottom] = self._optics.finish(self._canvas(self._stage.view(view.time_s + late)))[top:bottom]
-        return picture
+            image[top:bottom] = self._optics.finish(self._canvas(self._stage.view(view.time_s + late)))[top:bottom]
+        return image
 
-    def _canvas(self, view: View) -> Picture:
+    def _canvas(self, view: View) -> Image:
         """The scene through the pinhole, full daylight, no noise."""
         canvas = np.empty(self._optics.size[::-1], dtype=np.uint8)
         self._draw_ground(canvas, view.attitude, view.position)
@@ -131,11 +131,11 @@ class Renderer:
                 tall = box.length_m
             px_per_m = _FACE_TEXELS / max(wide, tall)
             size = (max(int(wide * px_per_m), 8), max(int(tall * px_per_m), 8))
-            picture = textures.surface(box.paint, face, size, px_per_m, _FACE_LIGHT[face])
-            self._skins[box.name, face] = _Skin(picture)
+            image = textures.surface(box.paint, face, size, px_per_m, _FACE_LIGHT[face])
+            self._skins[box.name, face] = _Skin(image)
         return self._skins[box.name, face]
 
-    def _ground_level(self, level: int) -> Picture:
+    def _ground_level(self, level: int) -> Image:
         """The patch continued around it: OpenCV is slow at continuing it."""
         if level not in self._ground_levels:
             margin = (_GROUND_MARGIN,) * 4
@@ -143,7 +143,7 @@ class Renderer:
             self._ground_levels[level] = np.asarray(wider, dtype=np.uint8)
         return self._ground_levels[level]
 
-    def _draw_skyline(self, canvas: Picture, attitude: Floats) -> None:
+    def _draw_skyline(self, canvas: Image, attitude: Floats) -> None:
         """A square of walls that travels with the camera, from its zenith down to the horizon."""
         half = _SKYLINE_M
         top = half * _SKYLINE_ROWS / (_SKYLINE_TEXELS / 2)
@@ -155,7 +155,7 @@ class Renderer:
             if surface is not None:
                 _paint(canvas, surface, self._skyline[side])
 
-    def _draw_lamps(self, canvas: Picture, view: View, y_m: float, share: float) -> None:
+    def _draw_lamps(self, canvas: Image, view: View, y_m: float, share: float) -> None:
         """The lamps in the ceiling; or, as far below the floor, as it mirrors a share of their light."""
         if not self._drive.lamps:
             return
@@ -168,7 +168,7 @@ class Renderer:
             if surface is not None:
                 _paint(canvas, surface, _LAMP, share)
 
-    def _draw_shadows(self, canvas: Picture, view: View) -> None:
+    def _draw_shadows(self, canvas: Image, view: View) -> None:
         """Shadows on the ground: where the vehicle is, and its heading, they go along."""
         if not self._drive.shadows:
             return
@@ -185,7 +185,7 @@ class Renderer:
                 if surface is not None:
                     _paint(canvas, surface, _DARK, shadow.share)
 
-    def _draw_ground(self, canvas: Picture, attitude: Floats, position: Floats) -> None:
+    def _draw_ground(self, canvas: Image, attitude: Floats, position: Floats) -> None:
         """Bands of rows, each with the level of the pyramid that fits its distance."""
         optics, height_m = self._optics, -position[1]
         width, height = optics.size
@@ -221,7 +221,7 @@ class Renderer:
             cv2.resize(band, (width, len(rows)), canvas[rows[0] : rows[-1] + 1], interpolation=cv2.INTER_AREA)
 
 
-def _paint(canvas: Picture, surface: Surface, texture: Picture, share: float = 1.0) -> None:
+def _paint(canvas: Image, surface: Surface, texture: Image, share: float = 1.0) -> None:
     """Blend a textured surface, or a share of its light, into the canvas, edges smoothed."""
     left, top, right, bottom = surface.bounds
     left, top = max(math.floor(left) - 1, 0), max(math.floor(top) - 1, 0)

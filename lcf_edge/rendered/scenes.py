@@ -51,7 +51,7 @@ def frames(drive: Drive) -> Iterator[tuple[Frame, Truth]]:
     renderer = Renderer(stage)
     for seq, view in enumerate(_views(stage)):
         known = truth(stage, view, seq)
-        yield Frame(known.stamp_ns, seq, renderer.picture(view)), known
+        yield Frame(known.stamp_ns, seq, renderer.image(view)), known
 
 
 def truths(drive: Drive) -> Iterator[Truth]:

@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from lcf_edge.rendered.drives import Paint
 
-Picture = npt.NDArray[np.uint8]
+Image = npt.NDArray[np.uint8]
 Random = np.random.Generator
 
 
@@ -55,11 +55,11 @@ def _tiles(random: Random, shape: tuple[int, int], tile_px: float) -> npt.NDArra
     return np.tile(tile, (height // side + 1, width // side + 1))[:height, :width]
 
 
-def _finish(canvas: npt.NDArray[np.float32], mean: float) -> Picture:
+def _finish(canvas: npt.NDArray[np.float32], mean: float) -> Image:
     return np.asarray(np.clip(canvas + mean, 4, 251), dtype=np.uint8)
 
 
-def surface(paint: Paint, face: int, size_px: tuple[int, int], px_per_m: float, light: float) -> Picture:
+def surface(paint: Paint, face: int, size_px: tuple[int, int], px_per_m: float, light: float) -> Image:
     """Texture of one face of a box, `size_px` = (width, height); `light` scales its mean."""
     random = np.random.default_rng([paint.seed, face])
     width, height = size_px
@@ -74,7 +74,7 @@ def surface(paint: Paint, face: int, size_px: tuple[int, int], px_per_m: float, 
 
 
 @cache
-def ground(paint: Paint, size_px: int, px_per_m: float) -> Picture:
+def ground(paint: Paint, size_px: int, px_per_m: float) -> Image:
     """Square patch of road, to be continued by reflection: stains, stones, cracks."""
     random = np.random.default_rng([paint.seed, 7])
     if paint.tile_m:
@@ -91,7 +91,7 @@ def ground(paint: Paint, size_px: int, px_per_m: float) -> Picture:
 
 
 @cache
-def skyline(paint: Paint, side_px: int, height_px: int) -> tuple[Picture, ...]:
+def skyline(paint: Paint, side_px: int, height_px: int) -> tuple[Image, ...]:
     """The four sides of the horizon, each (height_px, side_px): clouds above, houses far away."""
     random = np.random.default_rng([paint.seed, 20])
     width = 4 * side_px

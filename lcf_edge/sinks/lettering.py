@@ -39,9 +39,9 @@ def lettering(text: str) -> Mask:
 @cache
 def _cells() -> dict[str, Mask]:
     packed = np.frombuffer((files("lcf_edge.sinks") / "letters.png").read_bytes(), np.uint8)
-    picture = np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), np.uint8)
-    starts = np.flatnonzero(picture[0])
-    cells: dict[str, Mask] = dict(zip(LETTERS, np.split(picture[1:], starts[1:], axis=1), strict=True))
+    image = np.asarray(cv2.imdecode(packed, cv2.IMREAD_GRAYSCALE), np.uint8)
+    starts = np.flatnonzero(image[0])
+    cells: dict[str, Mask] = dict(zip(LETTERS, np.split(image[1:], starts[1:], axis=1), strict=True))
     height, width = cells["0"].shape
     narrow = np.asarray(cv2.resize(cells["O"], (width - 1, height), interpolation=cv2.INTER_AREA), np.uint8)
     cells["0"] = np.pad(narrow, ((0, 0), (0, 1)))

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from lcf_edge.messages import Cause, Kind, ObjectClass, ObjectState, PipelineScene, Shape, View
 from lcf_edge.sinks.lettering import Mask, lettering
 
-Picture = npt.NDArray[np.uint8]
+Image = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
 """Blue, green, red."""
 
@@ -42,7 +42,7 @@ _DASH_PX, _GAP_PX = 7, 5
 _PROBABLY = 0.5
 
 
-def draw(image: npt.NDArray[np.uint8], scene: PipelineScene, view: View) -> Picture:
+def draw(image: npt.NDArray[np.uint8], scene: PipelineScene, view: View) -> Image:
     """The two panels of one frame: (h, w) luminance in, (h, 2w, 3) blue, green, red out."""
     base = cv2.cvtColor(cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR)  # dimmed: the marks stand out
     width = image.shape[1]
@@ -56,7 +56,7 @@ def draw(image: npt.NDArray[np.uint8], scene: PipelineScene, view: View) -> Pict
     return panels
 
 
-def _line_expert(panel: Picture, scene: PipelineScene, view: View) -> None:
+def _line_expert(panel: Image, scene: PipelineScene, view: View) -> None:
     member = view.edge_group >= 0
     centres = view.groups[view.edge_group[member], :2]
     _outlines(panel, np.stack((view.edges[member], centres), axis=1), GREEN)
@@ -85,7 +85,7 @@ def _line_expert(panel: Picture, scene: PipelineScene, view: View) -> None:
     )
 
 
-def _found(panel: Picture, scene: PipelineScene, view: View) -> None:
+def _found(panel: Image, scene: PipelineScene, view: View) -> None:
     _outlines(panel, view.rebels[:, None] + _SQUARE, RED)
     _outlines(panel, view.focus + _CROSS, BLACK, 3)
     _outlines(panel, view.focus + _CROSS, WHITE)
@@ -128,7 +128,7 @@ def _colour(thing: np.void) -> Colour:
     return ORANGE if thing["probability"] >= _PROBABLY else LIGHT_BLUE
 
 
-def _box(panel: Picture, thing: np.void) -> None:
+def _box(panel: Image, thing: np.void) -> None:
     """Two px and whole for what is seen, else one px and dashed; dark beside the line, for a bright picture."""
     half = np.array((thing["width"], thing["height"]), np.float64) / 2
     middle = np.array((thing["x"], thing["y"]), np.float64)
@@ -165,7 +165,7 @@ def _object_label(thing: np.void) -> str:
     return f"{name} {thing['ttc']:.1f}{spread} s"
 
 
-def _hatch(panel: Picture, parts: tuple[npt.NDArray[np.float32], ...]) -> None:
+def _hatch(panel: Image, parts: tuple[npt.NDArray[np.float32], ...]) -> None:
     """Own parts: hatched, with an outline."""
     if not parts:
         return
@@ -192,16 +192,16 @@ def _fixed_point(points: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
     return fixed
 
 
-def _outlines(panel: Picture, shapes: npt.NDArray[np.floating], colour: Colour, thickness: int = 1) -> None:
+def _outlines(panel: Image, shapes: npt.NDArray[np.floating], colour: Colour, thickness: int = 1) -> None:
     """Draw (n, k, 2) closed outlines; k = 2 is a line, k = 1 a dot."""
     cv2.polylines(panel, list(_fixed_point(shapes)), True, colour, thickness, cv2.LINE_AA, _FRACTION_BITS)
 
 
-def _dots(panel: Picture, points: npt.NDArray[np.float32], colour: Colour) -> None:
+def _dots(panel: Image, points: npt.NDArray[np.float32], colour: Colour) -> None:
     _outlines(panel, points[:, None], colour, 3)
 
 
-def _circle(panel: Picture, place: tuple[float, float, float], colour: Colour, thickness: int) -> None:
+def _circle(panel: Image, place: tuple[float, float, float], colour: Colour, thickness: int) -> None:
     """``place``: x, y, radius in px."""
     for x, y, radius in _fixed_point(np.array([[place]], np.float32))[:, 0].tolist():
         cv2.circle(panel, (x, y), max(radius, 1), colour, thickness, cv2.LINE_AA, _FRACTION_BITS)
@@ -212,7 +212,7 @@ _Box = tuple[int, int, int, int]
 
 
 def _beside(
-    panel: Picture,
+    panel: Image,
     text: str,
     around: tuple[float, float, float, float],
     taken: list[_Box],
@@ -255,7 +255,7 @@ def _overlap(a: _Box, b: _Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _write(panel: Picture, letters: Mask, left_top: tuple[int, int], colour: Colour) -> None:
+def _write(panel: Image, letters: Mask, left_top: tuple[int, int], colour: Colour) -> None:
     """Text with a dark halo; what would lie outside the picture is cut."""
     letters = np.pad(letters, _HALO_PX)
     left, top = (max(at - _HALO_PX, 0) for at in left_top)
@@ -267,7 +267,7 @@ def _write(panel: Picture, letters: Mask, left_top: tuple[int, int], colour: Col
         place[...] = dark + (letters / np.float32(255)) * (np.array(colour, np.float32) - dark)
 
 
-def _caption(panel: Picture, parts: tuple[tuple[str, Colour], ...]) -> None:
+def _caption(panel: Image, parts: tuple[tuple[str, Colour], ...]) -> None:
     """A dark strip at the foot with ``parts`` in a row, shrunk until they fit."""
     strip = panel[-_STRIP_PX:]
     strip //= 3

@@ -14,7 +14,7 @@ from drivers.samples import Frame
 from lcf_edge.errors import UsageError
 from lcf_edge.messages import PipelineScene, View
 from lcf_edge.sinks import SinkError, check_output
-from lcf_edge.sinks.overlay import Picture, draw
+from lcf_edge.sinks.overlay import Image, draw
 from lcf_edge.sinks.sink import Sink
 
 if TYPE_CHECKING:
@@ -52,15 +52,15 @@ class VideoSink(Sink):
         """Append the overlay of one frame."""
         self.write(draw(frame.image, scene, view()))
 
-    def write(self, picture: Picture) -> None:
+    def write(self, image: Image) -> None:
         """Append one picture. Raises ``SinkError``."""
         from av import FFmpegError, VideoFrame  # noqa: PLC0415  # only a video pays for its memory
 
-        rows, columns = (side // 2 * 2 for side in picture.shape[:2])
+        rows, columns = (side // 2 * 2 for side in image.shape[:2])
         try:
             stream = self._stream or self._begin(columns, rows)
             assert self._container is not None
-            frame = VideoFrame.from_ndarray(picture[: stream.height, : stream.width], format="bgr24")
+            frame = VideoFrame.from_ndarray(image[: stream.height, : stream.width], format="bgr24")
             self._container.mux(stream.encode(frame))
         except FFmpegError as error:
             raise self._failure() from error

@@ -20,10 +20,10 @@ def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
     A daemon that connects to routers, is one, or speaks to ROS 2 routes for others as well, by keys that it cannot
     know: there are no rules then.
     """
-    wanted = {"transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES)}
+    chosen = {"transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES)}
     if options.mode == "peer" and not options.connect and not options.config_file and not publish.ros2:
-        wanted["access_control"] = json.dumps(access_control(publish.prefix))
-    return wanted
+        chosen["access_control"] = json.dumps(access_control(publish.prefix))
+    return chosen
 
 
 def access_control(prefix: str) -> dict[str, Any]:

@@ -9,9 +9,9 @@ from lcf_edge.cdr import encode_diagnostics
 from lcf_edge.diagnostics import DeviceStatus
 from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
-DIAGNOSTICS = Topic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray", zenoh.Priority.DATA_LOW)
+DIAGNOSTICS = ZenohTopic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray", zenoh.Priority.DATA_LOW)
 
 
 class DiagnosticsPublisher:

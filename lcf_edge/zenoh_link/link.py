@@ -121,10 +121,10 @@ class Link:
         if self._parts is not None:
             self._send("messages", lambda parts: parts.messages.put_transform(stamp_ns))
 
-    def preview_wanted(self) -> bool:
+    def has_preview_subscriber(self) -> bool:
         """Somebody looks at previews, and the next one is due by ``publish.preview_hz``. Takes 2 µs."""
         parts = self._parts
-        return parts is not None and parts.preview.wanted
+        return parts is not None and parts.preview.has_subscriber
 
     def put_preview(self, jpeg: bytes, stamp_ns: int) -> None:
         """Send one preview of the frame that was taken at ``stamp_ns`` of the system clock."""

@@ -9,9 +9,9 @@ from lcf_edge.cdr import encode_compressed_image
 from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
 from lcf_edge.zenoh_link.session import MAX_MESSAGE_BYTES
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
-PREVIEW = Topic(
+PREVIEW = ZenohTopic(
     "preview/compressed",
     "sensor_msgs/msg/CompressedImage",
     zenoh.Priority.BACKGROUND,
@@ -30,7 +30,7 @@ class PreviewPublisher:
         self.counts = self._publisher.counts
 
     @property
-    def wanted(self) -> bool:
+    def has_subscriber(self) -> bool:
         """Somebody subscribes, and the last preview was long enough ago."""
         if self._pause_ns is None:
             return False

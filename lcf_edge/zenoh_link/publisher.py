@@ -13,7 +13,7 @@ from lcf_edge import config
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link.ros2 import Endpoint, Ros2Node, gid_of
 from lcf_edge.zenoh_link.session import reason
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
 ATTACHMENT = struct.Struct("<qqB16s")
 """Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
@@ -30,7 +30,7 @@ class MessagePublisher:
     """
 
     def __init__(
-        self, session: zenoh.Session, publish: config.Publish, topic: Topic, ros2: Ros2Node | None = None
+        self, session: zenoh.Session, publish: config.Publish, topic: ZenohTopic, ros2: Ros2Node | None = None
     ) -> None:
         self.key = topic.key(publish.prefix)
         self.counts: Counter[str] = Counter(sent=0, failed=0)  # all keys at once: read while it counts

@@ -9,9 +9,9 @@ from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link.publisher import MessagePublisher
 from lcf_edge.zenoh_link.ros2 import Ros2Node
 from lcf_edge.zenoh_link.session import reason
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
-SCENE = Topic("scene", "lcf_msgs/msg/Scene", zenoh.Priority.REAL_TIME, express=True)
+SCENE = ZenohTopic("scene", "lcf_msgs/msg/Scene", zenoh.Priority.REAL_TIME, express=True)
 SCENE_ENCODING = SCENE.encoding
 
 

@@ -31,13 +31,13 @@ from lcf_edge.zenoh_link.topics import (
     POINTS,
     SPEED_LIMIT,
     TRANSFORM,
-    Topic,
+    ZenohTopic,
 )
 
 LensFor = Callable[[Config, int, int], Lens]
 """The lens of pictures of a width and height, px."""
 
-_OF_A_SCENE: tuple[tuple[Callable[[Publish], bool], Topic, Callable[[Scene, Setup], bytes]], ...] = (
+_OF_A_SCENE: tuple[tuple[Callable[[Publish], bool], ZenohTopic, Callable[[Scene, Setup], bytes]], ...] = (
     (lambda on: on.annotations, ANNOTATIONS, lambda scene, _: image_annotations.encode_image_annotations(scene)),
     (lambda on: on.points, POINTS, point_cloud.encode_point_cloud),
     (lambda on: on.markers, MARKERS, markers.encode_markers),

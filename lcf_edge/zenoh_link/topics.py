@@ -16,7 +16,7 @@ from lcf_edge.standard_messages import (
 
 
 @dataclass(frozen=True, slots=True)
-class Topic:
+class ZenohTopic:
     """What is published under a prefix, and how."""
 
     name: str  # "scene"
@@ -43,14 +43,14 @@ class Topic:
         return sample.payload.to_bytes()
 
 
-ANNOTATIONS = Topic("annotations", image_annotations.MESSAGE, zenoh.Priority.DATA)
-POINTS = Topic("points", point_cloud.MESSAGE, zenoh.Priority.DATA_HIGH)
-MARKERS = Topic("markers", markers.MESSAGE, zenoh.Priority.DATA)
-DETECTIONS_2D = Topic("detections", detections.MESSAGE_2D, zenoh.Priority.DATA_HIGH)
-DETECTIONS_3D = Topic("detections_3d", detections.MESSAGE_3D, zenoh.Priority.DATA_HIGH)
-SPEED_LIMIT = Topic("speed_limit", speed_limit.MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
-NAV2_SPEED_LIMIT = Topic("nav2_speed_limit", speed_limit.NAV2_MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
-TRANSFORM = Topic("tf_static", camera_transform.MESSAGE, zenoh.Priority.DATA_LOW, is_global=True, is_lasting=True)
+ANNOTATIONS = ZenohTopic("annotations", image_annotations.MESSAGE, zenoh.Priority.DATA)
+POINTS = ZenohTopic("points", point_cloud.MESSAGE, zenoh.Priority.DATA_HIGH)
+MARKERS = ZenohTopic("markers", markers.MESSAGE, zenoh.Priority.DATA)
+DETECTIONS_2D = ZenohTopic("detections", detections.MESSAGE_2D, zenoh.Priority.DATA_HIGH)
+DETECTIONS_3D = ZenohTopic("detections_3d", detections.MESSAGE_3D, zenoh.Priority.DATA_HIGH)
+SPEED_LIMIT = ZenohTopic("speed_limit", speed_limit.MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
+NAV2_SPEED_LIMIT = ZenohTopic("nav2_speed_limit", speed_limit.NAV2_MESSAGE, zenoh.Priority.DATA_HIGH, express=True)
+TRANSFORM = ZenohTopic("tf_static", camera_transform.MESSAGE, zenoh.Priority.DATA_LOW, is_global=True, is_lasting=True)
 
 STANDARD = (ANNOTATIONS, POINTS, MARKERS, DETECTIONS_2D, DETECTIONS_3D, SPEED_LIMIT, NAV2_SPEED_LIMIT, TRANSFORM)
 """Those of ``standard_messages``."""

@@ -36,8 +36,8 @@ def test_budgets_are_those_that_configuration_and_unit_enforce() -> None:
 
 def test_the_page_of_operation_tells_the_budgets() -> None:
     page = (ROOT / "docs/operation.md").read_text(encoding="utf-8")
-    told = re.findall(r"^\| `lcf-edge (\w+)` \| (\d+) % \| (\d+) MiB \|", page, re.M)
-    assert told == [
+    rows = re.findall(r"^\| `lcf-edge (\w+)` \| (\d+) % \| (\d+) MiB \|", page, re.M)
+    assert rows == [
         (process, f"{100 * budget.core_share:g}", f"{budget.memory_mib:g}") for process, budget in BUDGETS.items()
     ]
 

@@ -42,7 +42,7 @@ def rows(table: str, found: Calibration) -> dict[str, tuple[str, ...]]:
     return {row[0]: tuple(row[1:]) for row in chosen.rows}
 
 
-def told(*bodies: Exact, **changes: float) -> np.ndarray:
+def reported(*bodies: Exact, **changes: float) -> np.ndarray:
     """What the truth would say, changed."""
     objects = Memory().objects(0.0, bodies)
     for name, value in changes.items():
@@ -58,7 +58,7 @@ def seen(*frames: tuple[np.ndarray, list[Exact]], fps: float = 20.0) -> Calibrat
 
 
 def test_the_truth_itself_reaches_every_goal() -> None:
-    goals = rows("Goals", seen(*[(told(WALKER), [WALKER])] * 40))
+    goals = rows("Goals", seen(*[(reported(WALKER), [WALKER])] * 40))
     assert [goals[name][1] for name in goals if "contact below 4 s" in name] == ["100.0 %"] * 4
     assert goals["walkers: one object"][1] == "100.0 %"
     assert goals["walkers: one id as long as in sight"][1] == "100.0 %"
@@ -66,22 +66,22 @@ def test_the_truth_itself_reaches_every_goal() -> None:
 
 
 def test_a_contact_denied_is_an_error_and_a_range_unknown_is_no_range() -> None:
-    goals = rows("Goals", seen((told(WALKER, ttc=math.inf, range=math.nan), [WALKER])))
+    goals = rows("Goals", seen((reported(WALKER, ttc=math.inf, range=math.nan), [WALKER])))
     assert goals["contact below 4 s: contact within 15 %"][1] == "0.0 %"
     assert goals["contact below 4 s: range known"][1] == "0.0 %"
 
 
 def test_honest_sigmas_hold_68_and_95_percent_of_the_truths() -> None:
     random = np.random.default_rng(1)
-    frames = [(told(WALKER, lateral=0.3 + random.normal(0, 0.2), lateral_sigma=0.2), [WALKER]) for _ in range(4000)]
+    frames = [(reported(WALKER, lateral=0.3 + random.normal(0, 0.2), lateral_sigma=0.2), [WALKER]) for _ in range(4000)]
     one, two, *_ = rows("Truths inside", seen(*frames))["lateral"]
     assert float(one.split()[0]) == pytest.approx(68.3, abs=3)
     assert float(two.split()[0]) == pytest.approx(95.4, abs=1.5)
 
 
 def test_two_objects_on_one_walker_are_several_and_another_id_ends_a_life() -> None:
-    twice = np.concatenate([told(WALKER), told(WALKER, id=9)])
-    other = told(WALKER, id=9)
+    twice = np.concatenate([reported(WALKER), reported(WALKER, id=9)])
+    other = reported(WALKER, id=9)
     goals = rows("Goals", seen(*[(twice, [WALKER])] * 20, *[(other, [WALKER])] * 20))
     assert float(goals["walkers: several"][1].split()[0]) > 30
     assert goals["walkers: one id as long as in sight"][1] == "0.0 %"
@@ -89,29 +89,29 @@ def test_two_objects_on_one_walker_are_several_and_another_id_ends_a_life() -> N
 
 
 def test_who_leaves_and_is_said_to_stand_is_counted() -> None:
-    objects = told(LEAVER, class_id=ObjectClass.STANDING, ttc=1.0, lateral=0.1)
-    found = seen((objects, [LEAVER]), (told(LEAVER), [LEAVER]))
+    objects = reported(LEAVER, class_id=ObjectClass.STANDING, ttc=1.0, lateral=0.1)
+    found = seen((objects, [LEAVER]), (reported(LEAVER), [LEAVER]))
     assert (found.leaving, found.leaving_standing, found.leaving_imminent) == (2, 1, 1)
 
 
 def test_what_is_only_predicted_is_not_compared() -> None:
-    assert not seen((told(WALKER, state=ObjectState.COASTING), [WALKER])).pairs
+    assert not seen((reported(WALKER, state=ObjectState.COASTING), [WALKER])).pairs
 
 
 def test_a_probability_is_compared_with_how_often_it_comes_true() -> None:
-    said = [(told(WALKER, probability=0.5), [WALKER]), (told(LEAVER, probability=0.5), [LEAVER])]
+    said = [(reported(WALKER, probability=0.5), [WALKER]), (reported(LEAVER, probability=0.5), [LEAVER])]
     assert rows("Probability", seen(*said))["0.3 to 0.7"] == ("50.0 %", "50.0 %", "2")
 
 
 @given(st.floats(0, 640), st.floats(0, 480), st.floats(1, 300))
 def test_an_object_lies_on_a_body_only_if_its_middle_is_in_the_grown_box(x: float, y: float, size: float) -> None:
     inside = abs(x - 320) <= 20 + 10 + 8 and abs(y - 260) <= 60 + 30 + 8
-    assert match(told(WALKER, x=x, y=y, width=size, height=size), [WALKER]) == [WALKER if inside else None]
+    assert match(reported(WALKER, x=x, y=y, width=size, height=size), [WALKER]) == [WALKER if inside else None]
 
 
 def test_of_two_bodies_the_one_whose_box_it_shares_is_meant() -> None:
     behind = replace(WALKER, number=5, name="clutter_5", box=(250.0, 190.0, 300.0, 150.0))
-    assert match(told(WALKER), [behind, WALKER]) == [WALKER]
+    assert match(reported(WALKER), [behind, WALKER]) == [WALKER]
 
 
 def test_the_tables_of_nothing_are_empty() -> None:
@@ -169,5 +169,5 @@ def test_circles_without_trust_and_normal_ones_are_left_out() -> None:
 def test_every_driver_wants_a_speed(name: str) -> None:
     world = worlds.make(5).changed(course=Course(0.3), start_mps=1.0)
     log = drive(world, driver(world, name), pictures=name not in (TRUTH, "blind"))
-    assert log.wanted_mps
-    assert all(0 <= wanted <= world.cruise_mps for wanted in log.wanted_mps)
+    assert log.target_mps
+    assert all(0 <= target_mps <= world.cruise_mps for target_mps in log.target_mps)

@@ -40,9 +40,9 @@ def test_tables_and_video_are_written(short: Path, capsys: pytest.CaptureFixture
     assert written["results"][0]["outcomes"]["blind"]["threats"] == 1
     assert written["results"][0]["outcomes"]["truth"]["collisions"] == []
     [film] = (short / "out").iterdir()
-    shown, picture = cv2.VideoCapture(str(film)).read()
+    shown, image = cv2.VideoCapture(str(film)).read()
     assert shown
-    assert picture.shape == (240, 320, 3)
+    assert image.shape == (240, 320, 3)
 
 
 def test_the_same_worlds_give_the_same_outcomes(short: Path) -> None:

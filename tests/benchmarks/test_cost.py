@@ -21,7 +21,7 @@ def test_cachegrind_counts_instructions_and_the_misses_of_the_first_and_the_last
     assert read_cachegrind(CACHEGRIND) == Cost(2_430_454_096, 11_198_491 + 20_420_313, 601_183 + 4_190_550)
 
 
-def test_a_run_that_counted_nothing_is_told_in_its_own_words() -> None:
+def test_a_run_that_counted_nothing_is_reported_in_its_own_words() -> None:
     with pytest.raises(LcfError, match="No module named"):
         read_cachegrind("ModuleNotFoundError: No module named 'cv2'")
 

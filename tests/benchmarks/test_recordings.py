@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks import recordings, report, run
 from benchmarks.methods import NAMES
-from lcf_edge.evaluate.pictures import WIDTH_PX
+from lcf_edge.evaluate.drawings import WIDTH_PX
 from lcf_edge.rendered import scenes
 
 
@@ -35,7 +35,7 @@ def test_tables_and_a_sheet_of_pictures_are_written(folder: Path, capsys: pytest
     assert set(written) == set(NAMES)
     assert (written["filter"]["scored"], written["filter"]["due"]) == (1, 1)
     sheet = cv2.imread(str(folder / "bench-out" / "sheet.png"))
-    assert sheet.shape[1] == recordings.PICTURES * WIDTH_PX
+    assert sheet.shape[1] == recordings.FRAMES * WIDTH_PX
     assert sheet.max() > 100
 
 

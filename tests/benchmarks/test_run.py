@@ -89,6 +89,6 @@ def test_memory_is_that_of_a_process_of_its_own(tmp_path: Path) -> None:
     assert 10 < measured.peak_mib < 150
 
 
-def test_a_child_that_fails_is_told(tmp_path: Path) -> None:
+def test_a_child_that_fails_is_reported(tmp_path: Path) -> None:
     with pytest.raises(OSError, match="no such file"):
         memory.measure("nothing", tmp_path / "none", config_of(DRIVE))

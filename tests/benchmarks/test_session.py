@@ -7,7 +7,7 @@ from lcf_edge.rendered import scenes
 
 def test_a_session_counts_what_the_daemon_sends_to_another_process() -> None:
     found = session.measure(1.0, drive_s=2.0)
-    assert 0 < found.received <= found.pictures
+    assert 0 < found.received <= found.frame_count
     assert 0 < found.latency_p50_ms <= found.latency_p99_ms
     assert found.core_share > 0
     assert found.reading_share > 0

@@ -53,8 +53,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     pictures = [np.asarray(cv2.imread(str(file))) for file in files]
     height, width, _ = pictures[0].shape
     video = cv2.VideoWriter(str(place / "drive.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 5.0, (width, height))
-    for picture in pictures:
-        video.write(picture)
+    for image in pictures:
+        video.write(image)
     video.release()
     _write_bag(place / "drive.mcap", files)
     return place

@@ -12,7 +12,7 @@ PAGE = shape.PAGE.read_text(encoding="utf-8")
 
 
 def test_the_picture_is_up_to_date() -> None:
-    assert shape.PICTURE.read_text(encoding="utf-8") == shape.svg(), "run python docs/shape.py"
+    assert shape.DRAWING.read_text(encoding="utf-8") == shape.svg(), "run python docs/shape.py"
 
 
 def test_the_table_of_columns_is_up_to_date() -> None:

@@ -21,7 +21,7 @@ from lcf_edge.zenoh_link import ScenePublisher, open_session
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = ("README.md", *sorted(f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")))
 PYTHON = ".venv/bin/python "  # where the documents are typed
-USUAL_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 PATIENCE_S = 60.0
 
 Blocks = Callable[[str, str], list[str]]
@@ -90,7 +90,7 @@ def test_the_page_comes_through_ssh_in_one_way() -> None:
 
 def first_line(code: str, endpoint: str, publish: Callable[[ScenePublisher], object]) -> str:
     """What a subscriber prints first."""
-    command = (sys.executable, "-u", "-c", code.replace(USUAL_ENDPOINT, endpoint))
+    command = (sys.executable, "-u", "-c", code.replace(DEFAULT_ENDPOINT, endpoint))
     with (
         open_session(Zenoh(listen=[endpoint])) as session,
         subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as subscriber,
@@ -107,7 +107,7 @@ def first_line(code: str, endpoint: str, publish: Callable[[ScenePublisher], obj
 
 def test_the_subscriber_tells_what_the_demo_finds(blocks: Blocks, place: Path, endpoint: str) -> None:
     (code,) = blocks("README.md", "python")
-    assert USUAL_ENDPOINT in code
+    assert DEFAULT_ENDPOINT in code
     config = load(place / "demo-out/config.toml")
 
     def publish(publisher: ScenePublisher) -> None:

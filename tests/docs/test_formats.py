@@ -60,7 +60,7 @@ def test_fields_of_a_result_line(blocks: Blocks, rows: Rows) -> None:
 def test_notes_of_a_result_line(rows: Rows) -> None:
     sources = "".join(
         (ROOT / "lcf_edge" / name).read_text(encoding="utf-8")
-        for name in ("ego_motion/estimator.py", "corners/picture_quality.py", "pipeline.py")
+        for name in ("ego_motion/estimator.py", "corners/image_quality.py", "pipeline.py")
     )
     noted = set(re.findall(r'notes\.append\("([^"]+)"\)', sources))
     table = rows("docs/replay.md", "### Notes")

@@ -25,8 +25,8 @@ def test_a_row_tells_addresses_and_ranges_of_its_chip(chip_rows: dict[str, list[
     chip = CHIPS[driver]
     _, models, addresses, gyro, accel, *_ = chip_rows[driver]
     assert tuple(int(address, 16) for address in re.findall(r"0x[0-9a-f]+", addresses)) == chip.addresses
-    for told, ranges in ((gyro, chip.gyro_ranges), (accel, chip.accel_ranges)):
-        numbers = list(map(int, told.split(" to ")))
+    for written, ranges in ((gyro, chip.gyro_ranges), (accel, chip.accel_ranges)):
+        numbers = list(map(int, written.split(" to ")))
         assert {min(numbers), max(numbers)} <= set(ranges)
         assert driver == "bno055" or (min(numbers), max(numbers)) == (min(ranges), max(ranges))
     assert chip.chip in models

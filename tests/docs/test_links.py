@@ -10,7 +10,7 @@ from lcf_edge import __version__
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = (ROOT / "README.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md")))
-MAX_PICTURE_BYTES = 250_000
+MAX_IMAGE_BYTES = 250_000
 
 
 def anchors(document: Path) -> set[str]:
@@ -30,17 +30,17 @@ def test_links_resolve(document: Path) -> None:
         assert not anchor or anchor in anchors(there), target
 
 
-@pytest.mark.parametrize("picture", sorted((ROOT / "docs").rglob("*.png")), ids=lambda path: path.name)
-def test_pictures_are_small_and_shown(picture: Path) -> None:
-    assert picture.stat().st_size <= MAX_PICTURE_BYTES
-    assert cv2.imread(str(picture)) is not None
-    assert any(f"pictures/{picture.name})" in document.read_text(encoding="utf-8") for document in DOCUMENTS)
+@pytest.mark.parametrize("image_path", sorted((ROOT / "docs").rglob("*.png")), ids=lambda path: path.name)
+def test_pictures_are_small_and_shown(image_path: Path) -> None:
+    assert image_path.stat().st_size <= MAX_IMAGE_BYTES
+    assert cv2.imread(str(image_path)) is not None
+    assert any(f"pictures/{image_path.name})" in document.read_text(encoding="utf-8") for document in DOCUMENTS)
 
 
 def test_the_animation_of_the_readme_has_ten_seconds_in_two_megabytes() -> None:
-    picture = ROOT / "docs/pictures/overlay.webp"
-    assert picture.stat().st_size < 2_000_000
-    read, animation = cv2.imreadanimation(str(picture))
+    image_path = ROOT / "docs/pictures/overlay.webp"
+    assert image_path.stat().st_size < 2_000_000
+    read, animation = cv2.imreadanimation(str(image_path))
     assert read
     assert sum(animation.durations) == 10_000  # ms
     assert "(docs/pictures/overlay.webp)" in (ROOT / "README.md").read_text(encoding="utf-8")

@@ -6,7 +6,7 @@ from pathlib import Path
 from lcf_edge.daemon import memory, peers
 from lcf_edge.gate import gate
 from lcf_edge.monitor.web import doorkeeper, server
-from lcf_edge.recording.read.pictures import _BYTES_A_PIXEL, _DECODER_BYTES
+from lcf_edge.recording.read.images import _BYTES_A_PIXEL, _DECODER_BYTES
 from lcf_edge.zenoh_link.admission import MAX_MESSAGE_BYTES, access_control
 from lcf_edge.zenoh_link.queryables import Queryables
 from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, MAX_SESSIONS
@@ -42,7 +42,7 @@ def test_the_bound_of_videos() -> None:
     assert f"{_DECODER_BYTES // 2**20} MiB and {_BYTES_A_PIXEL} bytes for each pixel of the first picture" in DOCUMENT
 
 
-def test_every_loss_that_is_counted_is_told() -> None:
+def test_every_loss_that_is_counted_is_reported() -> None:
     counts = {"scene failed", "scene unfit", "bytes received", "sessions", "connections cut", "renewals"}
     queries = Queryables.COUNTED - {"answered"}
     assert [one for one in counts | {f"query {one}" for one in queries} if f"`{one}`" not in DOCUMENT] == []

@@ -49,7 +49,7 @@ def test_a_line_a_second_with_rate_jitter_errors_and_values(capsys: pytest.Captu
     assert device.closed
 
 
-def test_nothing_that_comes_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_nothing_that_comes_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     clock = VirtualClock()
     assert watch(lambda: Steady(clock, rate_hz=0), 1.5, describe, clock) == 0
     assert capsys.readouterr().out == "steady: nothing came  no errors\n"
@@ -63,7 +63,7 @@ def test_a_device_that_cannot_be_opened_is_one_line_and_status_1(capsys: pytest.
     assert capsys.readouterr() == ("", "imu: no such device; plug it in\n")
 
 
-def test_a_device_that_fails_is_closed_and_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_device_that_fails_is_closed_and_reported(capsys: pytest.CaptureFixture[str]) -> None:
     clock = VirtualClock()
     device = Steady(clock, DeviceLostError("imu: gone"))
     assert watch(lambda: device, 9, describe, clock) == 1
@@ -81,5 +81,5 @@ def test_an_interrupt_ends_it_well(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_values_of_a_sample_with_units_and_saturation() -> None:
     sample = ImuSample(0, (0.1, 0.2, -0.3), (0.0, 0.0, 9.8), saturated=True)
-    told = "gyro  +0.1000  +0.2000  -0.3000 rad/s  accel   +0.000   +0.000   +9.800 m/s²  saturated"
-    assert describe_imu(sample) == told
+    line = "gyro  +0.1000  +0.2000  -0.3000 rad/s  accel   +0.000   +0.000   +9.800 m/s²  saturated"
+    assert describe_imu(sample) == line

@@ -214,7 +214,7 @@ def test_with_ticks_of_the_device_samples_need_not_be_even(way: Way, seed: int) 
 
 @settings(max_examples=50, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 10**10), st.integers(0, 20), st.integers(0, 10**6)), max_size=60))
-def test_stamps_increase_whatever_is_told(calls: list[tuple[int, int, int]]) -> None:
+def test_stamps_increase_whatever_is_reported(calls: list[tuple[int, int, int]]) -> None:
     clock = SampleClock(200.0)
     arrival_ns, last_ns = 0, None
     for pause_ns, count, lost in calls:

@@ -98,9 +98,9 @@ def test_a_higher_speed_has_to_be_good_for_a_while_and_a_lower_one_counts_at_onc
 ) -> None:
     """For longer where the vehicle rests."""
     planner, nothing, wall = Planner(VEHICLE), np.zeros(0, OBJECT), thing(range=0.5)
-    wanted = [planner.wanted(nothing, speed_mps, CRUISE, 0.1) for _ in range(12)]
+    target_mps = [planner.target_mps(nothing, speed_mps, CRUISE, 0.1) for _ in range(12)]
     patient = round(patience_s / 0.1)
-    assert wanted[: patient - 1] == [0.0] * (patient - 1)
-    assert wanted[patient] == CRUISE
-    assert planner.wanted(wall, CRUISE, CRUISE, 0.1) == 0.0
-    assert planner.wanted(nothing, 1.0, CRUISE, 0.1) == 0.0
+    assert target_mps[: patient - 1] == [0.0] * (patient - 1)
+    assert target_mps[patient] == CRUISE
+    assert planner.target_mps(wall, CRUISE, CRUISE, 0.1) == 0.0
+    assert planner.target_mps(nothing, 1.0, CRUISE, 0.1) == 0.0

@@ -39,16 +39,16 @@ from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import Monitor
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.monitor.web.doorkeeper import Doorkeeper
 from lcf_edge.monitor.web.guard import Guard
 from lcf_edge.monitor.web.server import Server
 from lcf_edge.monitor.web.update import Audience
 from lcf_edge.pipeline import Pipeline, run
 from lcf_edge.recording.read import open_recording
-from lcf_edge.recording.read.decoding import PictureError, decode_picture
+from lcf_edge.recording.read.decoding import ImageDecodeError, image_from_bytes
 from lcf_edge.recording.read.sensor_yaml import SensorYaml
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.session import opened_session
@@ -88,7 +88,7 @@ def target(
     return enter
 
 
-def a_picture(width: int = WIDTH, height: int = HEIGHT) -> np.ndarray[Any, np.dtype[np.uint8]]:
+def undecoded(width: int = WIDTH, height: int = HEIGHT) -> np.ndarray[Any, np.dtype[np.uint8]]:
     """Clutter."""
     return np.random.default_rng(3).integers(0, 256, (height, width), np.uint8)
 
@@ -109,10 +109,10 @@ def an_image() -> bytes:
     """``sensor_msgs/msg/Image``."""
     header = struct.pack("<iII4s", STAMP_NS // 10**9, 0, 2, b"c\0")
     fields = struct.pack("<III6sBxII", HEIGHT, WIDTH, 6, b"mono8\0", 0, WIDTH, WIDTH * HEIGHT)
-    return cdr.LITTLE_ENDIAN + header + fields + a_picture().tobytes()
+    return cdr.LITTLE_ENDIAN + header + fields + undecoded().tobytes()
 
 
-def told(error: LcfError) -> str:
+def one_line(error: LcfError) -> str:
     """The text of an error, which is a line for a terminal."""
     text = str(error)
     assert text.isprintable(), text
@@ -175,8 +175,8 @@ def messages_of_ros(_: Path) -> Iterator[Take]:
 )
 def what_viewers_receive(_: Path) -> Iterator[Take]:
     """Scenes, diagnostics, previews and their attachments, up to the text for the page."""
-    monitor = Monitor(Source("tcp/127.0.0.1:9"), history=History())
-    monitor.want_preview(True)
+    monitor = Monitor(DaemonAddress("tcp/127.0.0.1:9"), history=History())
+    monitor.switch_preview(True)
 
     def take(data: bytes) -> str:
         payload, _, attachment = data.partition(MARK)
@@ -292,7 +292,7 @@ def configurations(folder: Path) -> Iterator[Take]:
 
                 report(config)
         except ConfigError as error:
-            return told(error).partition(": ")[2][:30]
+            return one_line(error).partition(": ")[2][:30]
         return "taken"
 
     yield take
@@ -313,7 +313,7 @@ T_BS:
 def sensor_yaml(folder: Path) -> Iterator[Take]:
     """A calibration of an ASL folder, up to a frame seen through that lens."""
     path = folder / "sensor.yaml"
-    picture = a_picture()
+    image = undecoded()
 
     def take(data: bytes) -> str:
         path.write_bytes(data)
@@ -322,7 +322,7 @@ def sensor_yaml(folder: Path) -> Iterator[Take]:
             yaml.rotation()
             lens = yaml.lens()
             if (lens.width, lens.height) == (WIDTH, HEIGHT):
-                Pipeline(Config(), lens).process(Frame(STAMP_NS, 0, picture))
+                Pipeline(Config(), lens).process(Frame(STAMP_NS, 0, image))
         except RecordingError as error:
             return str(error).partition("sensor.yaml")[2][:30]
         return lens.model
@@ -350,7 +350,7 @@ def asl_folder(folder: Path) -> Iterator[Take]:
         file.parent.mkdir(parents=True, exist_ok=True)
     (folder / "mav0/cam0/data").mkdir()
     for number in range(2):
-        cv2.imwrite(str(folder / f"mav0/cam0/data/{number}.png"), a_picture())
+        cv2.imwrite(str(folder / f"mav0/cam0/data/{number}.png"), undecoded())
 
     def take(data: bytes) -> str:
         for file, part in zip(files, (*data.split(MARK), *[b""] * 5), strict=False):
@@ -368,7 +368,7 @@ def replayed(path: Path, frames: int) -> str:
             if count >= frames:
                 break
     except (RecordingError, ConfigError) as error:
-        return told(error).rpartition("/")[2][:30]
+        return one_line(error).rpartition("/")[2][:30]
     assert all(warning.isprintable() for warning in recording.warnings)
     return f"{sorted(recording.skipped)} {len(recording.warnings)}"
 
@@ -391,7 +391,7 @@ def mcap_file(
 
 def mcap_files() -> Sequence[bytes]:
     """Of each compression, with every type."""
-    jpeg = cv2.imencode(".jpg", a_picture())[1].tobytes()
+    jpeg = cv2.imencode(".jpg", undecoded())[1].tobytes()
     topics = [
         ("/camera/image", "sensor_msgs/msg/Image", an_image()),
         (
@@ -431,7 +431,7 @@ def mcap(folder: Path) -> Iterator[Take]:
         try:
             load(path)
         except ConfigError as error:
-            return told(error)[-20:] + replayed(path, 6)
+            return one_line(error)[-20:] + replayed(path, 6)
         return replayed(path, 6)
 
     yield take
@@ -458,12 +458,12 @@ def camera_info(folder: Path) -> Iterator[Take]:
 
 def tiff() -> bytes:
     """Uncompressed and small, for its tags to be changed."""
-    return cv2.imencode(".tif", a_picture(16, 12), [cv2.IMWRITE_TIFF_COMPRESSION, 1])[1].tobytes()
+    return cv2.imencode(".tif", undecoded(16, 12), [cv2.IMWRITE_TIFF_COMPRESSION, 1])[1].tobytes()
 
 
 def pictures_in_all_formats() -> Sequence[bytes]:
     """Small ones."""
-    small = a_picture(16, 12)
+    small = undecoded(16, 12)
     colour = cv2.merge([small, small.T.reshape(12, 16), small])
     progressive = [cv2.IMWRITE_JPEG_PROGRESSIVE, 1]
     encoded = [cv2.imencode(suffix, small)[1].tobytes() for suffix in (".png", ".jpg", ".bmp", ".pgm")]
@@ -494,15 +494,15 @@ def pictures(_: Path) -> Iterator[Take]:
         became = ""
         for content in (data, with_checksums(data)) if data.startswith(b"\x89PNG") else (data,):
             try:
-                became += f"{decode_picture(content).ndim}"
-            except PictureError as error:
+                became += f"{image_from_bytes(content).ndim}"
+            except ImageDecodeError as error:
                 became += str(error)
         return became
 
     yield take
 
 
-@target(lambda: [cv2.imencode(".jpg", a_picture())[1].tobytes()], MARKERS)
+@target(lambda: [cv2.imencode(".jpg", undecoded())[1].tobytes()], MARKERS)
 def pictures_of_the_camera(_: Path) -> Iterator[Take]:
     """MJPG, whose size is known."""
 
@@ -567,7 +567,7 @@ class _Page:
     async def _serve(self) -> None:
         self._loop, self._end = asyncio.get_running_loop(), asyncio.Event()
         self._loop.set_exception_handler(lambda _, context: self.complaints.append(str(context)))
-        server, door = Server(Source("tcp/127.0.0.1:9")), Doorkeeper()
+        server, door = Server(DaemonAddress("tcp/127.0.0.1:9")), Doorkeeper()
         runner = web.AppRunner(server.application(Guard("127.0.0.1"), door), access_log=None, shutdown_timeout=0.1)
         await runner.setup()
         assert runner.server is not None

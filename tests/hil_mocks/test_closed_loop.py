@@ -32,12 +32,12 @@ QUIET = 1e-9
 class Watching:
     """Wants a speed, and keeps what it is shown."""
 
-    def __init__(self, *wanted: float) -> None:
-        self.wanted, self.moments = wanted, []
+    def __init__(self, *targets_mps: float) -> None:
+        self.targets_mps, self.moments = targets_mps, []
 
     def decide(self, moment: Moment) -> float:
         self.moments.append(moment)
-        return self.wanted[min(len(self.moments), len(self.wanted)) - 1]
+        return self.targets_mps[min(len(self.moments), len(self.targets_mps)) - 1]
 
 
 def body(x: float, z: float, *legs: Leg, name="walker_0", width=0.5, length=0.3) -> Body:
@@ -51,7 +51,7 @@ def world(*bodies: Body, **values) -> World:
 
 def ended(drawn: World, driver: Watching, seconds: float = math.inf) -> Log:
     course = Course(min(seconds * drawn.cruise_mps, drawn.course.length_m))
-    return drive(replace(drawn, course=course), driver, pictures=False)
+    return drive(replace(drawn, course=course), driver, with_images=False)
 
 
 def digest(drawn: World) -> str:
@@ -118,7 +118,7 @@ def test_a_place_on_the_course_is_found_again(at_m: float, right_m: float) -> No
     assert found == pytest.approx((at_m, right_m), abs=0.06)
 
 
-def test_what_is_run_into_is_told_once_with_the_speed_and_taken_away() -> None:
+def test_what_is_run_into_is_reported_once_with_the_speed_and_taken_away() -> None:
     driver = Watching(1.0)
     log = ended(world(body(0.0, 3.0)), driver, 5.0)
     assert [(contact.name, round(contact.speed_mps, 2)) for contact in log.contacts] == [("walker_0", 1.0)]
@@ -156,7 +156,7 @@ def test_a_leg_waits_for_the_vehicle() -> None:
 def test_the_gyro_shows_how_the_vehicle_turns_and_the_wheels_how_fast_it_is() -> None:
     turning = Course(10.0, ((0.0, 0.2), (10.0, 0.2)))
     driver = Watching(1.0)
-    drive(world(course=turning), driver, pictures=False)
+    drive(world(course=turning), driver, with_images=False)
     samples = [sample for moment in driver.moments[60:] for sample in moment.samples]
     yaw = [sample.gyro[1] for sample in samples if isinstance(sample, ImuSample)]
     wheels = [(sample.speed_mps, sample.yaw_rate_radps) for sample in samples if isinstance(sample, SpeedSample)]
@@ -229,8 +229,8 @@ def test_worlds_refuse_a_negative_seed() -> None:
 # What came of a drive.
 
 
-def log_of(*wanted: float, contacts: tuple[Contact, ...] = ()) -> Log:
-    return Log([1.0] * len(wanted), list(wanted), list(wanted), list(contacts), 10.0, 10.0)
+def log_of(*targets_mps: float, contacts: tuple[Contact, ...] = ()) -> Log:
+    return Log([1.0] * len(targets_mps), list(targets_mps), list(targets_mps), list(contacts), 10.0, 10.0)
 
 
 def test_a_braking_is_one_until_it_is_over() -> None:
@@ -274,7 +274,7 @@ def test_the_newest_speed_is_obeyed_and_what_is_none_is_left_alone() -> None:
     live = LiveDriver(fps=1000.0)
     for line in ("1.5\n", "stop\n", "nan\n", ""):
         live.obey(line)
-    assert live.wanted_mps == 1.5
+    assert live.target_mps == 1.5
 
 
 def test_in_real_time_it_starts_at_rest() -> None:

@@ -35,8 +35,8 @@ def feed(drive: Path, monkeypatch: pytest.MonkeyPatch) -> Feed:
 
 
 def status(name: str, message: str = "", **values: object) -> DeviceStatus:
-    told = {key.replace("_", " ") if key.startswith("overtaken") else key: str(value) for key, value in values.items()}
-    return DeviceStatus(name, Level.OK, message, told)
+    texts = {key.replace("_", " ") if key.startswith("overtaken") else key: str(value) for key, value in values.items()}
+    return DeviceStatus(name, Level.OK, message, texts)
 
 
 def parts(delivered: int, put: int, overtaken: int, mib: float, message: str = "") -> dict[str, DeviceStatus]:
@@ -96,8 +96,8 @@ def test_a_life_keeps_memory_and_complains() -> None:
     for second in range(10):
         life.note(parts(100 * second + 1, 100 * second, 0, 80 + second, "gave up the preview"))
     assert life.memory[-1] == (900, 89.0)
-    told = complaints([life], 1.0)
-    assert [what in line for what, line in zip(("1 pictures lost", "gave up", "2.5 s", "grows"), told, strict=True)]
+    texts = complaints([life], 1.0)
+    assert [what in line for what, line in zip(("1 pictures lost", "gave up", "2.5 s", "grows"), texts, strict=True)]
     assert any("901 delivered, 900 put, 0 overtaken, 1 lost" in line for line in lines([life]))
 
 

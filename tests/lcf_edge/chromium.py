@@ -102,7 +102,7 @@ class Chromium:
         )
         self.send("Emulation.setEmulatedMedia", features=[{"name": "prefers-color-scheme", "value": scheme}])
 
-    def picture(self, whole: bool = False) -> bytes:
+    def image(self, whole: bool = False) -> bytes:
         """A PNG of the page."""
         answer = self.send("Page.captureScreenshot", format="png", captureBeyondViewport=whole)
         return base64.b64decode(answer["data"])

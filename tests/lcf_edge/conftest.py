@@ -131,7 +131,7 @@ class Rover:
                 self.link.put_scene(Scene(stamp_ns, self.seq, 320, 240, 1.5, *tables, objects=self.objects))
             self.link.put_diagnostics(self.status, stamp_ns)
             self.unseen += 1
-            if self.link.preview_wanted():
+            if self.link.has_preview_subscriber():
                 self.link.put_preview(self._jpeg, stamp_ns)
                 self.previews += 1
                 self.unseen = 0

@@ -50,7 +50,7 @@ class Replayed:
         assert self.lines is not None
         return [line["seq"] for line in self.lines]
 
-    def told(self, *parts: str) -> bool:
+    def warned_of(self, *parts: str) -> bool:
         """Whether one warning has all the parts."""
         return any(all(part in warning for part in parts) for warning in self.warnings)
 
@@ -73,15 +73,15 @@ def replay(tmp_path: Path) -> Callable[..., Replayed]:
         errors = done.stderr.splitlines()
         assert "Traceback" not in done.stdout + done.stderr
         assert all(line.startswith("lcf-edge: ") for line in errors), done.stderr
-        told = [line for line in errors if not line.startswith("lcf-edge: warning: ")]
-        assert len(told) == (done.returncode != 0), done.stderr
+        warned_of = [line for line in errors if not line.startswith("lcf-edge: warning: ")]
+        assert len(warned_of) == (done.returncode != 0), done.stderr
         assert bool(done.stdout) == (done.returncode == 0)
         lines = [json.loads(line) for line in results.read_text().splitlines()] if results.exists() else None
         summary = dict(line.split(maxsplit=1) for line in done.stdout.splitlines())
         if done.returncode == 0:
             assert lines is not None
             assert summary["frames"].startswith(f"{len(lines)},")
-        return Replayed(done.returncode, summary, [e for e in errors if e not in told], "".join(told), lines)
+        return Replayed(done.returncode, summary, [e for e in errors if e not in warned_of], "".join(warned_of), lines)
 
     return run
 
@@ -93,7 +93,7 @@ class Drive:
     root: Path
     rows: dict[str, list[str]] = field(default_factory=dict)
 
-    def picture(self, seq: int) -> Path:
+    def image_path(self, seq: int) -> Path:
         return self.root / "mav0/cam0/data" / self.rows["cam0"][1 + seq].split(",")[1]
 
     def csv(self, sensor: str) -> Path:
@@ -117,15 +117,15 @@ def items(approach: Callable[..., Any]) -> list[Any]:
 @pytest.fixture(scope="module")
 def good_drive(items: list[Any], tmp_path_factory: pytest.TempPathFactory) -> Drive:
     drive = Drive(tmp_path_factory.mktemp("good"))
-    pictures = drive.root / "mav0/cam0/data"
-    pictures.mkdir(parents=True)
+    images_folder = drive.root / "mav0/cam0/data"
+    images_folder.mkdir(parents=True)
     rows = drive.rows
     rows["cam0"] = ["#timestamp [ns],filename"]
     rows["imu0"] = ["#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z"]
     rows["odom0"] = ["#timestamp [ns],v_x [m s^-1],w_z [rad s^-1]"]
     for item in items:
         if isinstance(item, Frame):
-            cv2.imwrite(str(pictures / f"{item.stamp_ns}.png"), item.image)
+            cv2.imwrite(str(images_folder / f"{item.stamp_ns}.png"), item.image)
             rows["cam0"].append(f"{item.stamp_ns},{item.stamp_ns}.png")
         elif isinstance(item, ImuSample):
             rows["imu0"].append(",".join(map(str, (item.stamp_ns, *item.gyro, *item.accel))))
@@ -167,7 +167,7 @@ def test_an_empty_folder(replay: Callable[..., Replayed], tmp_path: Path) -> Non
 
 def test_no_picture_that_can_be_read(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in range(FRAMES):
-        drive.picture(seq).write_bytes(b"")
+        drive.image_path(seq).write_bytes(b"")
     done = replay(drive.root)
     assert (done.status, done.lines) == (1, [])
     assert f"{drive.root}: not one picture could be read ({FRAMES} times: picture empty)" in done.error
@@ -175,19 +175,19 @@ def test_no_picture_that_can_be_read(replay: Callable[..., Replayed], drive: Dri
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "warned_of"),
     [
         ("vehicle.half_widht_m=0.6", "unknown key vehicle.half_widht_m; did you mean vehicle.half_width_m?"),
         ("camera.intrinsics=[500, 500, 300, 300]", "camera.intrinsics: made for 640x480, the pictures are "),
     ],
 )
 def test_a_configuration_that_does_not_fit(
-    replay: Callable[..., Replayed], drive: Drive, setting: str, told: str
+    replay: Callable[..., Replayed], drive: Drive, setting: str, warned_of: str
 ) -> None:
     size = ("--set", "camera.height=500") if "intrinsics" in setting else ()
     done = replay(drive.root, "--set", setting, *size)
     assert done.status == 2
-    assert told.replace("640x480", "640x500") in done.error
+    assert warned_of.replace("640x480", "640x500") in done.error
     assert not done.lines
 
 
@@ -195,27 +195,27 @@ def test_a_configuration_that_does_not_fit(
 
 
 def test_a_truncated_png(replay: Callable[..., Replayed], drive: Drive) -> None:
-    victim = drive.picture(4)
+    victim = drive.image_path(4)
     victim.write_bytes(victim.read_bytes()[:2000])
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(4))
-    assert done.told(str(victim), "picture damaged, skipped")
+    assert done.warned_of(str(victim), "picture damaged, skipped")
     assert done.skipped == {"picture damaged": 1}
 
 
 def test_pictures_that_change_size(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in (3, 7):
-        image = cv2.imread(str(drive.picture(seq)), cv2.IMREAD_GRAYSCALE)
+        image = cv2.imread(str(drive.image_path(seq)), cv2.IMREAD_GRAYSCALE)
         assert image is not None
-        cv2.imwrite(str(drive.picture(seq)), cv2.resize(image, (160, 120)))
+        cv2.imwrite(str(drive.image_path(seq)), cv2.resize(image, (160, 120)))
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(3, 7))
-    assert done.told(str(drive.picture(3)), "another size")
+    assert done.warned_of(str(drive.image_path(3)), "another size")
     assert done.skipped == {"picture of another size than the first": 2}
 
 
 def test_a_picture_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
-    cv2.imwrite(str(drive.picture(5)), np.full((240, 320), 128, np.uint8))
+    cv2.imwrite(str(drive.image_path(5)), np.full((240, 320), 128, np.uint8))
     done = replay(drive.root)
     assert (done.status, done.warnings, done.sequence) == (0, [], without())
     assert "no corners: 1" in done.summary["notes"]
@@ -251,8 +251,8 @@ def test_bad_rows_of_the_camera(replay: Callable[..., Replayed], drive: Drive) -
     assert len(done.sequence) == FRAMES - len(rows)
     assert done.skipped == {"picture row malformed": 4, "picture missing": 1}
     for line in (4, 6, 7, 8):
-        assert done.told(f"{drive.csv('cam0')}:{line}: picture row malformed, skipped")
-    assert done.told("missing.png: picture missing, skipped")
+        assert done.warned_of(f"{drive.csv('cam0')}:{line}: picture row malformed, skipped")
+    assert done.warned_of("missing.png: picture missing, skipped")
 
 
 def test_bad_samples_of_the_imu(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -266,8 +266,8 @@ def test_bad_samples_of_the_imu(replay: Callable[..., Replayed], drive: Drive) -
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without())
     assert done.skipped == {reason: len(rows) for reason, rows in bad.items()}
-    assert done.told(f"{drive.csv('imu0')}:11: imu row malformed, skipped")
-    assert done.told(f"{drive.csv('imu0')}:14: imu row with NaN or inf, skipped")
+    assert done.warned_of(f"{drive.csv('imu0')}:11: imu row malformed, skipped")
+    assert done.warned_of(f"{drive.csv('imu0')}:14: imu row with NaN or inf, skipped")
 
 
 def test_an_imu_of_nothing_but_nan(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -291,7 +291,7 @@ def test_times_that_go_back(replay: Callable[..., Replayed], drive: Drive) -> No
     stamps = [line["stamp_ns"] for line in done.lines]
     assert stamps == sorted(set(stamps))
     assert done.skipped == {f"{kind} time that does not increase": 1 for kind in ("picture", "imu", "speed")}
-    assert done.told(f"{drive.csv('cam0')}:8: ")
+    assert done.warned_of(f"{drive.csv('cam0')}:8: ")
 
 
 def test_a_gap_of_seconds(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -315,7 +315,7 @@ def test_missing_intrinsics(replay: Callable[..., Replayed], drive: Drive) -> No
     (drive.root / "mav0/cam0/sensor.yaml").unlink()
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without())
-    assert done.told(str(drive.root), "no intrinsics", "set camera.intrinsics")
+    assert done.warned_of(str(drive.root), "no intrinsics", "set camera.intrinsics")
 
 
 def test_broken_intrinsics(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -367,7 +367,7 @@ def test_a_truncated_mcap(replay: Callable[..., Replayed], items: list[Any], tmp
     cut = replay(bag)
     assert cut.status == 0
     assert cut.sequence[:6] == [0, 1, 2, 3, 4, 5]
-    assert cut.told(str(bag), "damaged at byte", "read up to there")
+    assert cut.warned_of(str(bag), "damaged at byte", "read up to there")
     bag.write_bytes(bag.read_bytes()[:20])
     nothing = replay(bag)
     assert (nothing.status, nothing.lines) == (1, cut.lines)  # what stood there is left alone
@@ -379,10 +379,10 @@ def test_a_truncated_mcap(replay: Callable[..., Replayed], items: list[Any], tmp
 
 def test_all_of_it_in_one_recording(replay: Callable[..., Replayed], drive: Drive, tmp_path: Path) -> None:
     (drive.root / "mav0/cam0/sensor.yaml").unlink()
-    drive.picture(1).write_bytes(drive.picture(1).read_bytes()[:-500])
-    cv2.imwrite(str(drive.picture(3)), np.zeros((10, 10), np.uint8))
-    cv2.imwrite(str(drive.picture(5)), np.zeros((240, 320), np.uint8))
-    drive.picture(8).unlink()
+    drive.image_path(1).write_bytes(drive.image_path(1).read_bytes()[:-500])
+    cv2.imwrite(str(drive.image_path(3)), np.zeros((10, 10), np.uint8))
+    cv2.imwrite(str(drive.image_path(5)), np.zeros((240, 320), np.uint8))
+    drive.image_path(8).unlink()
     drive.change("imu0", 5, "garbage")
     drive.change("odom0", 5, "1,nan,0")
     video = tmp_path / "overlay.webm"

@@ -291,8 +291,8 @@ def test_fields_and_constants_of_the_message_definitions_are_those_of_the_record
     text = (files("lcf_edge") / "msg" / f"{message}.msg").read_text(encoding="utf-8")
     said = [line.partition("#")[0].split() for line in text.splitlines() if line.partition("#")[0].strip()]
     assert tuple(words[1] for words in said if "=" not in words) == dtype.names
-    told = [(words[1], int(words[3])) for words in said if "=" in words]
-    assert told == [(constant.name, constant.value) for constant in constants]
+    values = [(words[1], int(words[3])) for words in said if "=" in words]
+    assert values == [(constant.name, constant.value) for constant in constants]
 
 
 @pytest.mark.parametrize(

@@ -78,7 +78,7 @@ from drivers.samples import ImuSample, SpeedSample
 from lcf_edge.config import Imu, Vehicle
 from lcf_edge.ego_motion.estimator import EgoMotionEstimator
 random, ego = np.random.default_rng(3), EgoMotionEstimator(Imu(), Vehicle())
-told = []
+outputs = []
 for frame in range(60):
     for ms in range(0, 50, 5):
         stamp_ns, gyro, force = 50_000_000 * frame + 1_000_000 * ms, random.normal(0.01, 0.1, 3), random.normal(0, 1, 3)
@@ -88,8 +88,8 @@ for frame in range(60):
             ego.add_speed(SpeedSample(stamp_ns, frame // 10 % 2, float(gyro[1])))
     motion = ego.advance(50_000_000 * frame, frame % 10 == 0)
     ego.correct(random.normal(0, 1e-3, 3), np.full(3, 1e-3), 0.5)
-    told += [motion.rotation.tobytes(), repr((motion.rotation_sigma_rad, motion.speed_mps, motion.notes)).encode()]
-print(zlib.crc32(b"".join(told)))
+    outputs += [motion.rotation.tobytes(), repr((motion.rotation_sigma_rad, motion.speed_mps, motion.notes)).encode()]
+print(zlib.crc32(b"".join(outputs)))
 """
 
 
@@ -104,9 +104,9 @@ def test_it_can_be_asked_to_run_uncompiled_and_says_so() -> None:
         "from lcf_edge import compilation; from lcf_edge.corners import appearance; "
         "print(appearance.__file__); print(compilation.uncompiled())"
     )
-    file, told = in_another_process(code, LCF_EDGE_PURE="1").splitlines()
+    file, output = in_another_process(code, LCF_EDGE_PURE="1").splitlines()
     assert file == str(PACKAGE / "corners/appearance.py")
-    assert told == (
+    assert output == (
         f"the filter runs uncompiled, about {compilation.SLOWER} times slower: "
         "LCF_EDGE_PURE is set; unset LCF_EDGE_PURE"
     )
@@ -142,9 +142,9 @@ def test_a_changed_source_runs_as_it_stands(tmp_path: Path) -> None:
     assert in_another_process(code) == f"{copy / Path(extension().path).name} 7 \n"
     changed = copy / "corners/appearance.py"
     changed.write_text(changed.read_text("utf-8").replace("BORDER_PX = 7", "BORDER_PX = 8"), encoding="utf-8")
-    told = in_another_process(code)
-    assert told.startswith(f"{changed} 8 the filter runs uncompiled")
-    assert "corners/appearance.py changed since it was compiled" in told
+    output = in_another_process(code)
+    assert output.startswith(f"{changed} 8 the filter runs uncompiled")
+    assert "corners/appearance.py changed since it was compiled" in output
 
 
 def test_the_sources_are_declarations_and_the_modules_beside_them() -> None:

@@ -11,7 +11,7 @@ from lcf_edge import __version__
 from lcf_edge.zenoh_link.schema import scene_schema
 
 ROOT = Path(__file__).parents[2]
-USUAL_ENDPOINT = "tcp/127.0.0.1:7447"
+DEFAULT_ENDPOINT = "tcp/127.0.0.1:7447"
 OURS, PACKAGE = ROOT / "lcf_edge" / "msg", ROOT / "ros2" / "lcf_msgs"
 MESSAGES = {path.name: path.read_bytes() for path in OURS.glob("*.msg")}
 
@@ -38,7 +38,7 @@ def test_the_package_names_what_it_depends_on() -> None:
     assert package.findtext("member_of_group") == "rosidl_interface_packages"
 
 
-def test_the_schema_that_is_told_is_made_of_the_same_messages() -> None:
+def test_the_published_schema_is_made_of_the_same_messages() -> None:
     schema = scene_schema()
     assert all(text.decode() in schema for text in MESSAGES.values())
 
@@ -47,8 +47,8 @@ def test_classes_can_be_made_of_what_a_daemon_tells_without_ros_and_without_this
     document = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
     (code,) = (code for code in re.findall(r"```python\n(.*?)```", document, re.DOTALL) if "rosbags" in code)
     assert "lcf_edge" not in code
-    assert USUAL_ENDPOINT in code
-    command = (sys.executable, "-u", "-c", code.replace(USUAL_ENDPOINT, rover.endpoint))
+    assert DEFAULT_ENDPOINT in code
+    command = (sys.executable, "-u", "-c", code.replace(DEFAULT_ENDPOINT, rover.endpoint))
     with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as subscriber:
         try:
             assert subscriber.stdout

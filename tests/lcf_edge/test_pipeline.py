@@ -21,7 +21,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.messages import Kind, Scene, Sizes, View
 from lcf_edge.pipeline import Pipeline, run
 from lcf_edge.recording.read import Recording
-from lcf_edge.recording.read.recording import Picture
+from lcf_edge.recording.read.recording import UndecodedFrame
 
 Grey = npt.NDArray[np.uint8]
 Item = Frame | ImuSample | SpeedSample
@@ -68,7 +68,7 @@ def processed(pipeline: Pipeline, items: Iterable[Item]) -> Iterator[Step]:
             pipeline.add(item)
 
 
-def told(scene: Scene) -> tuple[Any, ...]:
+def comparable(scene: Scene) -> tuple[Any, ...]:
     """All of a scene but how long it took, for comparing to the bit."""
     values = (getattr(scene, field.name) for field in fields(scene) if field.name != "timing")
     return tuple(value.tobytes() if isinstance(value, np.ndarray) else repr(value) for value in values)
@@ -124,7 +124,7 @@ def check(outcome: Step, config: Config, lens: Lens) -> None:
 
 def test_the_same_drive_gives_the_same_bytes(approach: Approach) -> None:
     once, again = (outcomes(approach()) for _ in range(2))
-    assert [told(each.scene) for each in once] == [told(each.scene) for each in again]
+    assert [comparable(each.scene) for each in once] == [comparable(each.scene) for each in again]
     assert any(len(each.scene.circles) for each in once)
     assert any(len(each.scene.psi) for each in once)
 
@@ -141,7 +141,7 @@ class Recorded(Recording):
         for item in self._recorded:
             if isinstance(item, Frame):
                 image = item.image
-                yield Picture(item.stamp_ns, str(item.seq), lambda image=image: image)
+                yield UndecodedFrame(item.stamp_ns, str(item.seq), lambda image=image: image)
             else:
                 yield item
 
@@ -158,7 +158,7 @@ def test_a_picture_can_be_looked_at_before_its_samples_have_come(approach: Appro
             scenes.append(pipeline.follow(look))
         else:
             samples.append(item)
-    assert [told(scene) for scene in scenes] == [told(each.scene) for each in outcomes(drive)]
+    assert [comparable(scene) for scene in scenes] == [comparable(each.scene) for each in outcomes(drive)]
 
 
 @pytest.mark.parametrize("lens", [PINHOLE, LENSES["barrel"]], ids=["pinhole", "barrel"])
@@ -166,7 +166,7 @@ def test_a_replay_is_the_same_as_feeding_the_pipeline_live(approach: Approach, l
     drive = list(approach(lens=lens))
     live = outcomes(drive, lens=lens)
     replayed = list(run(Recorded(drive, lens), DEFAULTS))
-    assert [told(outcome.scene) for _, outcome in replayed] == [told(each.scene) for each in live]
+    assert [comparable(outcome.scene) for _, outcome in replayed] == [comparable(each.scene) for each in live]
     assert [(frame.seq, frame.stamp_ns) for frame, _ in replayed] == [
         (each.scene.seq, each.scene.stamp_ns) for each in live
     ]
@@ -178,8 +178,8 @@ def test_the_lens_of_the_recording_fits_itself_to_the_pictures(approach: Approac
     double = lens.scaled(640, 480)
     (_, outcome), *_ = run(Recorded(drive, double), Config())
     assert (outcome.scene.image_width, outcome.scene.image_height) == (320, 240)
-    assert [told(o.scene) for _, o in run(Recorded(drive, double), Config())] == [
-        told(each.scene) for each in outcomes(drive, lens=double.scaled(320, 240))
+    assert [comparable(o.scene) for _, o in run(Recorded(drive, double), Config())] == [
+        comparable(each.scene) for each in outcomes(drive, lens=double.scaled(320, 240))
     ]
 
 
@@ -188,8 +188,8 @@ def test_intrinsics_of_the_configuration_come_before_those_of_the_recording(appr
     camera = Camera(width=320, height=240, intrinsics=[250.0, 250.0, 159.5, 119.5])
     wrong = LENSES["fisheye"]
     config = Config(camera=camera)
-    assert [told(outcome.scene) for _, outcome in run(Recorded(drive, wrong), config)] == [
-        told(each.scene) for each in outcomes(drive, config)
+    assert [comparable(outcome.scene) for _, outcome in run(Recorded(drive, wrong), config)] == [
+        comparable(each.scene) for each in outcomes(drive, config)
     ]
 
 
@@ -396,13 +396,13 @@ def test_repeated_and_earlier_stamps_do_no_harm(approach: Approach) -> None:
     assert len(seen) == 13
 
 
-PICTURES = st.sampled_from(("wall", "noise", "black", "half"))
+IMAGE_KINDS = st.sampled_from(("wall", "noise", "black", "half"))
 STEPS_NS = st.sampled_from((0, 1, 10**6, 33 * 10**6, 5 * 10**7, 10**9, 10**11, -(10**8)))
 
 
 @settings(max_examples=25, phases=(Phase.explicit, Phase.generate))  # to shrink a drive takes minutes
 @given(
-    plan=st.lists(st.tuples(PICTURES, STEPS_NS), min_size=2, max_size=12),
+    plan=st.lists(st.tuples(IMAGE_KINDS, STEPS_NS), min_size=2, max_size=12),
     lens=st.sampled_from(sorted(LENSES)),
     memory=st.sampled_from((Memory(), SMALL)),
     rates=st.lists(st.floats(-3, 3), min_size=3, max_size=3),
@@ -429,7 +429,7 @@ def test_whatever_comes_in_the_outcome_is_in_order(
     pipeline = Pipeline(config, LENSES[lens])
     stamp_ns = 10**12
     for seq, (kind, step_ns) in enumerate(plan):
-        image = drive.picture(seq) if kind != "noise" else noise(seq, 320, 240)
+        image = drive.image(seq) if kind != "noise" else noise(seq, 320, 240)
         if kind in ("black", "half"):
             image[:, : 320 if kind == "black" else 160] = 0
         stamp_ns += step_ns

@@ -58,7 +58,7 @@ def check(rows: np.ndarray[Any, Any], table: Table, kept: np.ndarray[Any, Any], 
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
-def test_circles_that_are_trusted_are_told(lens: Lens) -> None:
+def test_circles_that_are_trusted_are_reported(lens: Lens) -> None:
     rebels, normals, objects = filled(CircleTable(20)), filled(CircleTable(30)), filled(ObjectTable(8))
     rebels.square[:] = np.arange(20) % 9 - 1
     rebels.support[3] = 70_000
@@ -66,7 +66,7 @@ def test_circles_that_are_trusted_are_told(lens: Lens) -> None:
     scene_records.add_circles(records, rebels.columns, objects.columns, Kind.REBEL, plane, 3.0)
     number = records.count
     scene_records.add_circles(records, normals.columns, objects.columns, Kind.NORMAL, plane, 3.0)
-    rows, owners = records.told(), records.told_owners()
+    rows, owners = records.written(), records.written_owners()
     kept = (rebels.trust >= 3.0).nonzero()[0]
     assert 0 < number == len(kept) < 20
     check(rows[:number], rebels, kept, lens)
@@ -80,45 +80,45 @@ def test_circles_that_are_trusted_are_told(lens: Lens) -> None:
 
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES)
-def test_objects_that_are_trusted_are_told(lens: Lens) -> None:
+def test_objects_that_are_trusted_are_reported(lens: Lens) -> None:
     objects = filled(ObjectTable(16))
     objects.range[2] = np.nan
     records = Records(16, OBJECT)
     scene_records.add_objects(records, objects.columns, ImagePlane(lens), 3.0)
-    rows, kept = records.told(), (objects.trust >= 3.0).nonzero()[0]
+    rows, kept = records.written(), (objects.trust >= 3.0).nonzero()[0]
     assert len(rows) == len(kept)
     check(rows, objects, kept, lens)
     assert rows["bearing_sigma"] == pytest.approx(0.25 * objects.width[kept] / lens.fx, rel=1e-6)
     assert rows["elevation_sigma"] == pytest.approx(0.25 * objects.height[kept] / lens.fy, rel=1e-6)
 
 
-def test_psi_regions_are_told_and_what_lies_between_their_fields_is_zero() -> None:
+def test_psi_regions_are_reported_and_what_lies_between_their_fields_is_zero() -> None:
     psi = filled(PsiTable(16))
     psi.active[::2] = False
     lens = LENSES["pinhole"]
     records = Records(16, PSI_REGION)
     scene_records.add_psi(records, psi.columns, ImagePlane(lens))
-    rows = records.told()
+    rows = records.written()
     check(rows, psi, psi.active.nonzero()[0], lens)
     assert not rows.view(np.uint8).reshape(-1, PSI_REGION.itemsize)[:, 5:8].any()
 
 
-def test_what_the_lens_cannot_place_is_not_told() -> None:
+def test_what_the_lens_cannot_place_is_not_reported() -> None:
     lens = Lens(320, 240, 120.0, 120.0, 159.5, 119.5, "equidistant", (0.0, 0.0, 0.0, 0.0))
     objects = filled(ObjectTable(4))
     objects.trust[:] = 5.0
     objects.x[1] = 1e6
     records = Records(4, OBJECT)
     scene_records.add_objects(records, objects.columns, ImagePlane(lens), 3.0)
-    assert records.told()["id"].tolist() == objects.id[[0, 2, 3]].tolist()
+    assert records.written()["id"].tolist() == objects.id[[0, 2, 3]].tolist()
 
 
-def test_records_that_were_told_stay_as_they_are() -> None:
+def test_records_that_were_handed_out_stay_as_they_are() -> None:
     objects = filled(ObjectTable(4))
     objects.trust[:] = 5.0
     records, plane = Records(4, OBJECT), ImagePlane(LENSES["pinhole"])
     scene_records.add_objects(records, objects.columns, plane, 3.0)
-    rows = records.told()
+    rows = records.written()
     before = rows.tobytes()
     records.count = 0
     objects.width[:] = 1.0

@@ -40,7 +40,7 @@ SHAKES = (
 )
 DRIVE = replace(scenes.make("crossing", 1, seconds=1.0), shakes=SHAKES)
 LEARNING = 10  # pictures
-PICTURES = round(DRIVE.seconds * DRIVE.fps)
+FRAMES = round(DRIVE.seconds * DRIVE.fps)
 SAMPLES, SPEEDS = scenes.imu(DRIVE), scenes.odometry(DRIVE)
 LEAD_NS = START_NS - SAMPLES[0].stamp_ns  # the samples begin before the pictures
 WARM_UP_S = 1.5  # from power-on; the rates of devices are known after that
@@ -150,13 +150,13 @@ class Bench:
     def camera(self, driver: str) -> list[str]:
         if driver == "recording":
             return [f"camera.recording={self.recording}"]
-        pictures = [event.image for event in open_recording(self.recording, Config()) if isinstance(event, Frame)]
+        images = [event.image for event in open_recording(self.recording, Config()) if isinstance(event, Frame)]
         kernel = MockKernel(self.vehicle.clock)
         kernel.plug(
             "/dev/video0",
             MockCamera(
                 modes={"YUYV": {(640, 480): (DRIVE.fps,)}},
-                pictures=lambda seq, _width, _height: pictures[min(seq, PICTURES - 1)],
+                images=lambda seq, _width, _height: images[min(seq, FRAMES - 1)],
             ),
         )
         self.monkeypatch.setattr("drivers.camera.v4l2.V4l2Camera", partial(V4l2Camera, kernel=kernel))
@@ -227,7 +227,7 @@ def live(bench: Bench, config: Config, read: Read) -> Iterator[Frame | ImuSample
     bench.later(camera.close)
     begin_ns = bench.vehicle.begin_ns = clock.monotonic_ns() - LEAD_NS * (config.camera.driver == "v4l2")
     speeds = [replace(speed, stamp_ns=speed.stamp_ns - SAMPLES[0].stamp_ns + begin_ns) for speed in SPEEDS]
-    for number in range(PICTURES):
+    for number in range(FRAMES):
         due_ns = begin_ns + LEAD_NS + round((number + 0.5) * 1e9 / DRIVE.fps)
         yield from samples_until(due_ns)
         while speeds and speeds[0].stamp_ns < due_ns:
@@ -249,7 +249,7 @@ def largest_error_rad(seen: Seen, other: Seen) -> float:
 
 def test_the_replay_finds_the_walker(replayed: Seen) -> None:
     assert replayed.threats == {"walker": pytest.approx(0.15, abs=0.11)}
-    assert largest_error_rad(replayed, replace(replayed, rotations=np.array([np.eye(3)] * PICTURES))) > 0.01
+    assert largest_error_rad(replayed, replace(replayed, rotations=np.array([np.eye(3)] * FRAMES))) > 0.01
 
 
 @pytest.mark.parametrize("imu", [driver for driver in get_args(ImuDriver) if driver != "none"])

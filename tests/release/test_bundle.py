@@ -178,9 +178,9 @@ def test_a_folder_of_make_install_another_processor_and_another_python_are_refus
     (place / "machine").write_text("riscv64\n", encoding="ascii")
     assert setup(place, image, status=1).startswith("lcf-edge: this archive is for riscv64 and this computer is")
     (image / "opt/lcf-edge").mkdir(parents=True)
-    told = setup(place, image, status=1)
-    assert "comes from make install; first run sudo make uninstall" in told
-    assert told.count("\n") == 1
+    output = setup(place, image, status=1)
+    assert "comes from make install; first run sudo make uninstall" in output
+    assert output.count("\n") == 1
 
 
 def test_make_install_leaves_an_archives_installation_alone(tmp_path: Path) -> None:
@@ -211,7 +211,7 @@ def test_without_its_wheel_a_machine_has_no_archive(tmp_path: Path) -> None:
 
 
 def test_the_document_tells_the_pythons_and_the_commands() -> None:
-    told = (ROOT / "docs/install.md").read_text(encoding="utf-8")
-    assert f"Python {', '.join(bundle.PYTHONS[:-1])} and {bundle.PYTHONS[-1]}" in told
-    assert "/opt/lcf-edge/setup rollback" in told
-    assert "/opt/lcf-edge/setup remove" in told
+    output = (ROOT / "docs/install.md").read_text(encoding="utf-8")
+    assert f"Python {', '.join(bundle.PYTHONS[:-1])} and {bundle.PYTHONS[-1]}" in output
+    assert "/opt/lcf-edge/setup rollback" in output
+    assert "/opt/lcf-edge/setup remove" in output

@@ -41,7 +41,7 @@ def test_another_processors_is_that_of_the_debian_that_has_it(
     assert elsewhere.find(other, version).root == Path(other.debian, suite, "python3")
 
 
-def test_one_that_is_nowhere_is_told_and_the_others_go_on(here: Machine, tmp_path: Path) -> None:
+def test_one_that_is_nowhere_is_reported_and_the_others_go_on(here: Machine, tmp_path: Path) -> None:
     with pytest.raises(ReleaseError, match=r"no python3\.99 on this computer"):
         elsewhere.find(here, "3.99")
     assert elsewhere._tested(here, "3.99", tmp_path, ()).startswith("not tested: there is no python3.99")

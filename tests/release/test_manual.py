@@ -74,8 +74,8 @@ def zsh(*words: str) -> str:
         return shown
 
     try:
-        told = 'tell() { print -r -- "<<$BUFFER>>" }; zle -N tell; bindkey "^X" tell'
-        setup = f"fpath=({place} $fpath); autoload -Uz compinit; compinit -u -D; {told}; PS1=REA''DY"
+        widget = 'tell() { print -r -- "<<$BUFFER>>" }; zle -N tell; bindkey "^X" tell'
+        setup = f"fpath=({place} $fpath); autoload -Uz compinit; compinit -u -D; {widget}; PS1=REA''DY"
         os.write(leader, f"{setup}\n".encode())
         until("READY")
         os.write(leader, f"{' '.join(words)}\t\x18".encode())

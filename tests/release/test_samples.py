@@ -49,7 +49,7 @@ def test_every_picture_of_it_has_truth_and_the_filter_sees_what_threatens(sample
     assert numbers.contacts == 0
 
 
-def test_another_reader_finds_sensors_and_what_was_told(sample: Path) -> None:
+def test_another_reader_finds_sensors_and_what_was_reported(sample: Path) -> None:
     with sample.open("rb") as file:
         summary = make_reader(file).get_summary()
     assert summary is not None
@@ -57,10 +57,10 @@ def test_another_reader_finds_sensors_and_what_was_told(sample: Path) -> None:
     counts = {
         summary.channels[number].topic: count for number, count in summary.statistics.channel_message_counts.items()
     }
-    pictures = counts["/lcf/camera/image_raw/compressed"]
-    assert counts["/lcf/scene"] == counts["/lcf/annotations"] == pictures > 0
-    assert counts["/lcf/imu"] > 10 * pictures
-    assert counts["/lcf/speed"] > 3 * pictures
+    frames = counts["/lcf/camera/image_raw/compressed"]
+    assert counts["/lcf/scene"] == counts["/lcf/annotations"] == frames > 0
+    assert counts["/lcf/imu"] > 10 * frames
+    assert counts["/lcf/speed"] > 3 * frames
 
 
 def test_one_can_be_written_again(tmp_path: Path) -> None:

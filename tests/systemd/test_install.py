@@ -128,8 +128,8 @@ def test_the_shipped_configuration_is_that_of_a_system_without_one() -> None:
 
 
 def test_what_it_suggests_is_valid(tmp_path: Path) -> None:
-    told = (SHIPPED / "config.toml").read_text(encoding="utf-8")
-    lines = [line.removeprefix("# ") if line.startswith("# ") and " = " in line else line for line in told.splitlines()]
+    text = (SHIPPED / "config.toml").read_text(encoding="utf-8")
+    lines = [line.removeprefix("# ") if line.startswith("# ") and " = " in line else line for line in text.splitlines()]
     suggested = tmp_path / "config.toml"
     suggested.write_text("\n".join(lines), encoding="utf-8")
     config = load(suggested)
@@ -139,7 +139,7 @@ def test_what_it_suggests_is_valid(tmp_path: Path) -> None:
 
 
 def test_the_document_names_every_place_and_variable() -> None:
-    told = (ROOT / "docs/install.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs/install.md").read_text(encoding="utf-8")
     places = (*INSTALLED, "opt/lcf-edge", "usr/local/bin/lcf-edge")
-    assert [place for place in places if f"`/{place}`" not in told] == []
-    assert [name for name in ("PYTHON", "DESTDIR", "WHEEL", "FILES_ONLY", "PURGE") if f"{name}=" not in told] == []
+    assert [place for place in places if f"`/{place}`" not in text] == []
+    assert [name for name in ("PYTHON", "DESTDIR", "WHEEL", "FILES_ONLY", "PURGE") if f"{name}=" not in text] == []

@@ -43,10 +43,10 @@ needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reas
 
 def settings() -> dict[str, list[str]]:
     """Of [Service], the values of each key in their order."""
-    told: dict[str, list[str]] = defaultdict(list)
+    keys: dict[str, list[str]] = defaultdict(list)
     for name, value in re.findall(r"^(\w+)=(.*)$", UNIT.read_text(encoding="utf-8").split("[Service]")[1], re.M):
-        told[name].append(value)
-    return told
+        keys[name].append(value)
+    return keys
 
 
 def words(name: str) -> set[str]:
@@ -66,8 +66,8 @@ def test_systemd_finds_no_fault_but_the_program_that_is_not_here(tmp_path: Path,
         shipped.read_text(encoding="utf-8").replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8"
     )
     done = subprocess.run(("systemd-analyze", "verify", unit), check=False, capture_output=True, text=True)
-    told = [line for line in done.stderr.splitlines() if unit.name in line]
-    assert told == []
+    keys = [line for line in done.stderr.splitlines() if unit.name in line]
+    assert keys == []
 
 
 @needs_systemd
@@ -98,8 +98,8 @@ def test_little_is_exposed(tmp_path: Path, unit: Path) -> None:
 
 def test_an_instance_is_the_plain_unit_but_for_what_two_cannot_share() -> None:
     def lines(unit: Path) -> list[str]:
-        told = unit.read_text(encoding="utf-8").split("[Unit]")[1].splitlines()
-        return [line for line in told if line.partition("=")[0] not in OF_AN_INSTANCE]
+        keys = unit.read_text(encoding="utf-8").split("[Unit]")[1].splitlines()
+        return [line for line in keys if line.partition("=")[0] not in OF_AN_INSTANCE]
 
     assert lines(INSTANCES_UNIT) == lines(UNIT)
     own = dict(re.findall(r"^(\w+)=(.*)$", INSTANCES_UNIT.read_text(encoding="utf-8"), re.M))
@@ -124,14 +124,14 @@ def test_the_watchdog_waits_for_a_few_feedings_and_a_stop_for_the_program() -> N
 
 
 def test_the_document_tells_the_limits_of_the_unit() -> None:
-    told = (SHIPPED.parent / "docs/install.md").read_text(encoding="utf-8").split("\n## The unit\n")[1]
+    keys = (SHIPPED.parent / "docs/install.md").read_text(encoding="utf-8").split("\n## The unit\n")[1]
     unit = dict(re.findall(r"^(\w+)=(.*)$", UNIT.read_text(encoding="utf-8"), re.M))
     minutes, wait_s = int(unit["StartLimitIntervalSec"]) // 60, unit["RestartSec"]
-    assert f"after {unit['TimeoutStartSec']} s without either it has failed" in told
-    assert f"{unit['WatchdogSec']} s without a turn of the pipeline" in told
-    assert f"after {wait_s} s, at most {unit['StartLimitBurst']} times in {minutes} minutes" in told
-    assert f"killed after {unit['TimeoutStopSec']} s" in told
-    assert f"{unit['MemoryMax'].removesuffix('M')} MiB (`MemoryMax`)" in told
+    assert f"after {unit['TimeoutStartSec']} s without either it has failed" in keys
+    assert f"{unit['WatchdogSec']} s without a turn of the pipeline" in keys
+    assert f"after {wait_s} s, at most {unit['StartLimitBurst']} times in {minutes} minutes" in keys
+    assert f"killed after {unit['TimeoutStopSec']} s" in keys
+    assert f"{unit['MemoryMax'].removesuffix('M')} MiB (`MemoryMax`)" in keys
 
 
 def test_a_wrong_configuration_is_not_tried_again() -> None:

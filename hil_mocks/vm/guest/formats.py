@@ -28,9 +28,9 @@ def main(device: str, width: int, height: int) -> None:
     with closing(open_camera_node(device)) as node:
         offered = set(offers.formats(node))
     names = [name for name in PIXEL_FORMATS if name in offered]
-    pictures = {name: taken(device, name, width, height) for name in names}
-    grey = pictures["GREY"].astype(float)
-    for name, image in pictures.items():
+    images = {name: taken(device, name, width, height) for name in names}
+    grey = images["GREY"].astype(float)
+    for name, image in images.items():
         difference = min(np.percentile(np.abs(image - like), 99) for like in (grey, 16 + grey * (235 - 16) / 255))
         sys.stdout.write(f"{name} {difference:.1f}\n")
 

@@ -60,4 +60,4 @@ def test_a_planner_in_another_process_drives_by_what_the_daemon_tells(tmp_path: 
     log = msgspec.json.decode(done.stdout.splitlines()[-1], type=Log)
     assert log.distance_m > 0.9 * world.course.length_m
     assert log.contacts == []
-    assert min(log.wanted_mps[len(log.wanted_mps) // 4 :]) < world.cruise_mps  # it had something to brake for
+    assert min(log.target_mps[len(log.target_mps) // 4 :]) < world.cruise_mps  # it had something to brake for

@@ -109,10 +109,10 @@ def test_the_disk_fills_up_while_it_records(daemon: Daemon, subscriber: Subscrib
         daemon.machine.run(f"fallocate -l 18M {STATE}/filler")
         subscriber.wait_for_status("recorder", "cannot be written")
         subscriber.wait_for_scenes()
-        pictures = subscriber.count("recorder", "pictures")
+        frame_count = subscriber.count("recorder", "pictures")
         daemon.machine.run(f"rm {STATE}/filler")
         subscriber.wait_for_status("recorder", "records into")
-        subscriber.wait_for_count("recorder", "pictures", pictures + 1)
+        subscriber.wait_for_count("recorder", "pictures", frame_count + 1)
         assert daemon.restarts == 0
     finally:
         daemon.stop()

@@ -22,7 +22,7 @@ def test_all_formats_of_a_camera_show_the_same_picture(
     daemon.stop()
     device = node(machine, name)
     machine.run(f"v4l2-ctl --device {device} --set-ctrl osd_text_mode=2,test_pattern={PATTERN}")
-    told = dict(line.split() for line in machine.run(f"{FORMATS} {device} 320 180", 300.0).splitlines())
+    differences = dict(line.split() for line in machine.run(f"{FORMATS} {device} 320 180", 300.0).splitlines())
     machine.run(f"v4l2-ctl --device {device} --set-ctrl osd_text_mode=0,test_pattern=0")
-    assert least <= set(told)
-    assert {name: difference for name, difference in told.items() if float(difference) > 1.5} == {}
+    assert least <= set(differences)
+    assert {name: difference for name, difference in differences.items() if float(difference) > 1.5} == {}

@@ -47,7 +47,7 @@ when = "always"
 format = "png"
 free_mib = 16.0
 """
-MIN_PICTURES = 20
+MIN_FRAMES = 20
 SAME_PX = 0.5
 MIN_SHARE_OF_SAME = 0.9  # of the circles; processors round differently
 
@@ -93,16 +93,16 @@ def recorded(machine: Machine, daemon: Daemon, fed: list[Grey]) -> Iterator[Path
     machine.run("rm -f /run/drive.raw")
 
 
-def pictures(recording: Path) -> list[Frame]:
+def frames_of(recording: Path) -> list[Frame]:
     """Those that the pipeline took."""
     return [item for item in open_recording(recording, load(recording)) if isinstance(item, Frame)]
 
 
 def test_pictures_come_unchanged_and_in_order(recorded: Path, fed: list[Grey]) -> None:
     numbers = {image.tobytes(): number for number, image in enumerate(fed)}
-    found = [numbers.get(frame.image.tobytes()) for frame in pictures(recorded)]
+    found = [numbers.get(frame.image.tobytes()) for frame in frames_of(recorded)]
     known = [number for number in found if number is not None]
-    assert len(set(known)) >= MIN_PICTURES
+    assert len(set(known)) >= MIN_FRAMES
     assert known == sorted(known)
     first, last = found.index(known[0]), len(found) - found[::-1].index(known[-1])
     assert None not in found[first:last]
@@ -112,11 +112,11 @@ def test_the_daemon_finds_what_a_plain_replay_finds(recorded: Path) -> None:
     config = load(recorded)
     replayed = {frame.stamp_ns: outcome.scene for frame, outcome in run(open_recording(recorded, config), config)}
     with recorded.open("rb") as file:
-        told = [decode_scene(message.data) for _, _, message in make_reader(file).iter_messages(["/lcf/scene"])]
-    assert len(told) >= MIN_PICTURES
-    assert {scene.stamp_ns for scene in told} <= replayed.keys()
-    same, circles = map(sum, zip(*(found_again(scene, replayed[scene.stamp_ns]) for scene in told), strict=True))
-    assert circles > len(told)
+        published = [decode_scene(message.data) for _, _, message in make_reader(file).iter_messages(["/lcf/scene"])]
+    assert len(published) >= MIN_FRAMES
+    assert {scene.stamp_ns for scene in published} <= replayed.keys()
+    same, circles = map(sum, zip(*(found_again(scene, replayed[scene.stamp_ns]) for scene in published), strict=True))
+    assert circles > len(published)
     assert same / circles >= MIN_SHARE_OF_SAME
 
 

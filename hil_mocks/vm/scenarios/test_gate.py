@@ -90,5 +90,5 @@ def test_the_gate_is_a_user_of_its_own_and_little_exposed(machine: Machine, gate
     pid = int(machine.run(f"systemctl show {UNIT} --property=MainPID --value"))
     uid = int(machine.run(f"stat -c %u /proc/{pid}"))
     assert 61184 <= uid <= 65519  # systemd's dynamic users
-    told = machine.run(f"systemd-analyze security {UNIT} --no-pager | tail -1")
-    assert float(told.split(": ")[1].split()[0]) <= MAX_EXPOSURE
+    output = machine.run(f"systemd-analyze security {UNIT} --no-pager | tail -1")
+    assert float(output.split(": ")[1].split()[0]) <= MAX_EXPOSURE

@@ -116,12 +116,12 @@ def test_a_camera_that_the_daemon_has_is_busy(running: Daemon) -> None:
 
 def test_the_doctor_knows_it(running: Daemon) -> None:
     """First while the daemon has it, then on its own."""
-    told = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
-    assert "camera" in told
-    assert "the daemon has it: delivers" in told
+    output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
+    assert "camera" in output
+    assert "the daemon has it: delivers" in output
     running.stop()
-    told = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
-    assert "/dev/video0: through libcamera" in told
+    output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
+    assert "/dev/video0: through libcamera" in output
 
 
 @pytest.fixture
@@ -133,12 +133,12 @@ def free(daemon: Daemon) -> Machine:
 
 def test_it_has_a_name_and_an_id(free: Machine) -> None:
     assert free.run(f"{BY_HAND}.libcamera --list") == "Sensor B: platform/vimc.0 Sensor B"
-    told = free.run(f"{BY_HAND}.libcamera vimc.0 --width 160 --height 120 --fps 1 --seconds 8")
-    assert "160x120" in told
+    output = free.run(f"{BY_HAND}.libcamera vimc.0 --width 160 --height 120 --fps 1 --seconds 8")
+    assert "160x120" in output
 
 
 @pytest.mark.parametrize(
-    ("command", "told"),
+    ("command", "output"),
     [
         (f"{BY_HAND}.v4l2 /dev/video0", "gives pictures only through libcamera, as ribbon-cable cameras do; set cam"),
         (f"{BY_HAND}.libcamera imx219", "imx219: no camera of libcamera's; found: Sensor B (platform/vimc.0 Sensor B)"),
@@ -156,7 +156,7 @@ def test_it_has_a_name_and_an_id(free: Machine) -> None:
     ],
     ids=["the other driver", "no such camera", "size", "lock", "no permission", "no binding", "no camera at all"],
 )
-def test_what_is_wrong_is_one_line(free: Machine, command: str, told: str) -> None:
+def test_what_is_wrong_is_one_line(free: Machine, command: str, output: str) -> None:
     outcome = free.tried(f"cd /tmp; {command}")
-    assert told in outcome.output
+    assert output in outcome.output
     assert outcome.output.count("\n") == 1

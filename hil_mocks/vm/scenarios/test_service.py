@@ -40,8 +40,8 @@ def test_it_is_a_user_of_its_own_without_rights(started: Daemon) -> None:
 
 
 def test_it_is_little_exposed(machine: Machine) -> None:
-    told = machine.run(f"systemd-analyze security {UNIT} --no-pager | tail -1")
-    assert float(told.split(": ")[1].split()[0]) <= MAX_EXPOSURE
+    output = machine.run(f"systemd-analyze security {UNIT} --no-pager | tail -1")
+    assert float(output.split(": ")[1].split()[0]) <= MAX_EXPOSURE
 
 
 def test_it_sees_a_file_system_that_cannot_be_written_but_for_its_own_folder(started: Daemon) -> None:

@@ -16,14 +16,14 @@ from foxglove.websocket import ChannelView, Client, ServerListener
 
 from lcf_edge.cdr import CdrError, decode_scene
 from lcf_edge.errors import LcfError, PublishError
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.recording.write.schemas import ENCODING, schema
 from lcf_edge.standard_messages.image_annotations import encode_image_annotations
 from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
 from lcf_edge.zenoh_link.preview import PREVIEW
 from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
-from lcf_edge.zenoh_link.topics import ANNOTATIONS, STANDARD, Topic
+from lcf_edge.zenoh_link.topics import ANNOTATIONS, STANDARD, ZenohTopic
 
 BACKLOG = 64  # messages that wait for a client which takes nothing: 3 s of scenes; of more, the oldest are dropped
 
@@ -34,19 +34,19 @@ class Relay(ServerListener):
     """Serves at ``host``:``port`` (0: any) until it is closed.
 
     ``broken`` counts payloads that were not what their key promises; they are not passed on. Raises ``PublishError``
-    for a source that is none, ``LcfError`` when the port cannot be listened to.
+    for an address that is none, ``LcfError`` when the port cannot be listened to.
     """
 
-    def __init__(self, source: Source, host: str, port: int) -> None:
+    def __init__(self, address: DaemonAddress, host: str, port: int) -> None:
         self.broken = 0
-        self._prefix = source.prefix
+        self._prefix = address.prefix
         self._lock = threading.Lock()
         self._clients: Counter[str] = Counter()  # of each topic
         self._subscribers: dict[str, Any] = {}
         foxglove.set_log_level(logging.CRITICAL)  # it has a line for whatever a client sends that is nonsense
         self._context = context = foxglove.Context()  # there while it is kept
-        self._channels = {f"/{_key(topic, source)}": (topic, _channel(topic, source, context)) for topic in RELAYED}
-        self._session = open_session(source.zenoh())
+        self._channels = {f"/{_key(topic, address)}": (topic, _channel(topic, address, context)) for topic in RELAYED}
+        self._session = open_session(address.zenoh())
         try:
             self._server = foxglove.start_server(
                 name="lcf-edge",
@@ -82,7 +82,7 @@ class Relay(ServerListener):
         self._server.stop()
         close_session(self._session)
 
-    def _subscribed(self, topic: Topic, channel: foxglove.Channel) -> Any:
+    def _subscribed(self, topic: ZenohTopic, channel: foxglove.Channel) -> Any:
         makes = topic is ANNOTATIONS
         source = SCENE if makes else topic
 
@@ -100,14 +100,14 @@ class Relay(ServerListener):
         return self._session.declare_subscriber(source.key(self._prefix), handler)
 
 
-def _key(topic: Topic, source: Source) -> str:
+def _key(topic: ZenohTopic, address: DaemonAddress) -> str:
     """Raises ``PublishError`` for a prefix that is none."""
     try:
-        return str(zenoh.KeyExpr(topic.key(source.prefix)))
+        return str(zenoh.KeyExpr(topic.key(address.prefix)))
     except zenoh.ZError as error:
-        raise PublishError(f"{source.prefix}: {reason(error)}; name another prefix") from error
+        raise PublishError(f"{address.prefix}: {reason(error)}; name another prefix") from error
 
 
-def _channel(topic: Topic, source: Source, context: foxglove.Context) -> foxglove.Channel:
+def _channel(topic: ZenohTopic, address: DaemonAddress, context: foxglove.Context) -> foxglove.Channel:
     definition = foxglove.Schema(name=topic.message, encoding=ENCODING, data=schema(topic.message))
-    return foxglove.Channel(f"/{_key(topic, source)}", schema=definition, message_encoding="cdr", context=context)
+    return foxglove.Channel(f"/{_key(topic, address)}", schema=definition, message_encoding="cdr", context=context)

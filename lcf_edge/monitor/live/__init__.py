@@ -1,5 +1,5 @@
 """What people's tools know of a running daemon: subscribed over Zenoh, in memory of a fixed size.
 
-``source`` tells which daemon; ``monitor`` holds the newest of everything and whether the daemon is there; ``history``
-the last seconds as they were sent, ``traces`` the figures of the last minutes; ``lines`` a scene as JSON.
+``daemon_address`` says which daemon; ``monitor`` holds the newest of everything and whether the daemon is there;
+``history`` the last seconds as they were sent, ``traces`` the figures of the last minutes; ``lines`` a scene as JSON.
 """

@@ -11,7 +11,7 @@ MAX_BYTES = {"scene": 4 * 2**20, "diagnostics": 2**20, "preview/compressed": 16 
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class ReceivedMessage:
     """One payload of a topic."""
 
     topic: str  # "scene"; behind the prefix of the keys
@@ -25,11 +25,11 @@ class History:
     def __init__(self, length_s: float = LENGTH_S, largest_bytes: Mapping[str, int] = MAX_BYTES) -> None:
         self._length_ns = round(length_s * 1e9)
         self._largest = largest_bytes
-        self._kept: dict[str, deque[Message]] = {topic: deque() for topic in largest_bytes}
+        self._kept: dict[str, deque[ReceivedMessage]] = {topic: deque() for topic in largest_bytes}
         self._bytes = dict.fromkeys(largest_bytes, 0)
         self._lock = threading.Lock()
 
-    def add(self, message: Message) -> None:
+    def add(self, message: ReceivedMessage) -> None:
         """Keep a message; the oldest of its topic make room."""
         topic = message.topic
         with self._lock:
@@ -39,7 +39,7 @@ class History:
                 self._forget(topic)
             self._expire(message.received_ns)
 
-    def messages(self, now_ns: int) -> list[Message]:
+    def messages(self, now_ns: int) -> list[ReceivedMessage]:
         """What is not older than the length, in the order in which it came."""
         with self._lock:
             self._expire(now_ns)

@@ -24,15 +24,15 @@ from lcf_edge.cdr import (
 from lcf_edge.errors import PublishError
 from lcf_edge.messages import Scene
 from lcf_edge.meters import IntervalMeter
-from lcf_edge.monitor.live.history import History, Message
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
+from lcf_edge.monitor.live.history import History, ReceivedMessage
 from lcf_edge.monitor.live.traces import Point, Traces
 from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
 from lcf_edge.zenoh_link.preview import PREVIEW
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
-from lcf_edge.zenoh_link.topics import Topic
+from lcf_edge.zenoh_link.topics import ZenohTopic
 
 MAX_ROBOTS = 32  # of one prefix that are told by name; where no rule forbids it, anybody can claim to be some
 MAX_NAME = 64  # characters of one
@@ -53,7 +53,7 @@ class Presence(Enum):
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class Preview:
     """A preview, and the scene of the same frame if that came too."""
 
     image: CompressedImage
@@ -96,7 +96,7 @@ class Snapshot:
     latency_s: float  # from the frame's stamp to its being sent; NaN: unknown
     diagnostics: DiagnosticArray | None
     diagnostics_received_ns: int
-    picture: Picture | None
+    preview: Preview | None
     broken: int  # payloads that were not what their key promises
     replay: Replay | None = None  # None: a daemon
     ahead: Ahead | None = None  # None: not known
@@ -107,22 +107,22 @@ class Snapshot:
 
 
 class Monitor:
-    """Subscribes to the daemon of ``source`` in Zenoh's threads, now or as soon as it is there, and again.
+    """Subscribes to the daemon of ``address`` in Zenoh's threads, now or as soon as it is there, and again.
 
-    Previews come only while they are wanted (``want_preview``): nobody draws them else. ``changed`` is called in
+    Previews come only while they are wanted (``switch_preview``): nobody draws them else. ``changed`` is called in
     those threads whenever something came; it must be quick. ``history`` keeps what came. Raises ``PublishError`` for
-    a source that is none.
+    an address that is none.
     """
 
     def __init__(
         self,
-        source: Source,
+        address: DaemonAddress,
         *,
         history: History | None = None,
         changed: Callable[[], None] = lambda: None,
     ) -> None:
         self.traces = Traces()
-        self._prefix = source.prefix
+        self._prefix = address.prefix
         self._history = history
         self._changed = changed
         self._lock = threading.RLock()
@@ -131,20 +131,20 @@ class Monitor:
         self._scene: Scene | None = None
         self._scenes: deque[Scene] = deque(maxlen=_JOINED)
         self._diagnostics: DiagnosticArray | None = None
-        self._picture: Picture | None = None
+        self._preview: Preview | None = None
         self._scene_ns = self._diagnostics_ns = 0
         self._intervals = IntervalMeter()
         self._latency_s = math.nan
         self._version = self._broken = 0
         self._ahead: Ahead | None = None
-        self._preview: Any = None
+        self._preview_subscriber: Any = None
         self._wanting = threading.Lock()
-        self._session = open_session(source.zenoh())
+        self._session = open_session(address.zenoh())
         try:
             self._declare()
         except zenoh.ZError as error:
             self.close()
-            raise PublishError(f"{source.prefix}: {reason(error)}; name another prefix") from error
+            raise PublishError(f"{address.prefix}: {reason(error)}; name another prefix") from error
 
     def snapshot(self) -> Snapshot:
         """The newest of everything."""
@@ -160,22 +160,22 @@ class Monitor:
                 self._latency_s,
                 self._diagnostics,
                 self._diagnostics_ns,
-                self._picture,
+                self._preview,
                 self._broken,
                 ahead=self._ahead,
             )
 
-    def want_preview(self, wanted: bool) -> None:
+    def switch_preview(self, on: bool) -> None:
         """Subscribe to previews, or no longer."""
         with self._wanting:
-            if wanted and self._preview is None:
-                self._preview = self._subscribe(PREVIEW, self._take_picture)
-            elif not wanted and self._preview is not None:
+            if on and self._preview_subscriber is None:
+                self._preview_subscriber = self._subscribe(PREVIEW, self._take_preview)
+            elif not on and self._preview_subscriber is not None:
                 with suppress(zenoh.ZError):  # the session is closed
-                    self._preview.undeclare()
-                self._preview = None
+                    self._preview_subscriber.undeclare()
+                self._preview_subscriber = None
                 with self._lock:
-                    self._picture = None
+                    self._preview = None
 
     def close(self) -> None:
         """Close the session; may be called twice."""
@@ -191,13 +191,13 @@ class Monitor:
             ),
         ]
 
-    def _subscribe(self, topic: Topic, take: Callable[[bytes, zenoh.Sample], None]) -> Any:
+    def _subscribe(self, topic: ZenohTopic, take: Callable[[bytes, zenoh.Sample], None]) -> Any:
         def receive(sample: zenoh.Sample) -> None:
             with self._unless_broken():
                 payload = topic.payload(sample)
                 take(payload, sample)
                 if self._history is not None:
-                    self._history.add(Message(topic.name, time.time_ns(), payload))
+                    self._history.add(ReceivedMessage(topic.name, time.time_ns(), payload))
 
         handler: Any = zenoh.handlers.Callback(receive, indirect=False)  # no queue in between
         return self._session.declare_subscriber(topic.key(self._prefix), handler)
@@ -229,10 +229,10 @@ class Monitor:
         rate_hz = self._rate_hz(self._diagnostics_ns)
         self.traces.add(Point.of(self._diagnostics_ns, self._scene if rate_hz else None, rate_hz, self._diagnostics))
 
-    def _take_picture(self, payload: bytes, _: zenoh.Sample) -> None:
+    def _take_preview(self, payload: bytes, _: zenoh.Sample) -> None:
         image = decode_compressed_image(payload)
         scene = next((scene for scene in self._scenes if scene.stamp_ns == image.header.stamp_ns), None)
-        self._picture = Picture(image, time.time_ns(), scene)
+        self._preview = Preview(image, time.time_ns(), scene)
 
     def _take_token(self, sample: zenoh.Sample) -> None:
         robot = str(sample.key_expr).rpartition("/")[2][:MAX_NAME]

@@ -53,13 +53,13 @@ class Alarms:
         return min((found_s for found_s in self.found_s if found_s > at_s), default=None)
 
     def _search(self) -> None:
-        last_s, told = -math.inf, set[int]()
+        last_s, announced = -math.inf, set[int]()
         try:
             for frame, outcome in run(self._recording, self._config):
                 assert self._recording.first_ns is not None
                 at_s = (frame.stamp_ns - self._recording.first_ns) / 1e9
-                new = met(outcome.scene) - told
-                told |= new
+                new = met(outcome.scene) - announced
+                announced |= new
                 if new and at_s - last_s >= _APART_S:
                     self.found_s += (at_s,)
                     last_s = at_s

@@ -18,7 +18,7 @@ from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import LcfError
 from lcf_edge.messages import PipelineScene, View
 from lcf_edge.meters import IntervalMeter
-from lcf_edge.monitor.live.monitor import Ahead, Picture, Presence, Replay, Snapshot
+from lcf_edge.monitor.live.monitor import Ahead, Presence, Preview, Replay, Snapshot
 from lcf_edge.monitor.live.traces import TABLES, Point, Traces
 from lcf_edge.monitor.replay.alarms import Alarms
 from lcf_edge.pipeline import Outcome, run
@@ -36,7 +36,7 @@ _QUALITY = 80
 
 
 class Player:
-    """A recording in place of a daemon: ``snapshot``, ``traces`` and ``want_preview`` are those of a ``Monitor``.
+    """A recording in place of a daemon: ``snapshot``, ``traces`` and ``switch_preview`` are those of a ``Monitor``.
 
     Positions are seconds after the first picture. ``changed`` is called in the player's thread whenever another
     picture is shown. Raises ``RecordingError`` for a recording without a usable picture in the part that is played,
@@ -58,9 +58,9 @@ class Player:
         self._due = 0  # pictures that are shown whether it plays or not
         self._playing, self._speed, self._loop = not pace.step, pace.speed or 1.0, pace.loop
         self._anchor: tuple[float, float] | None = None  # monotonic time and position from which it has played
-        self._wanted = self._closing = False
+        self._preview_on = self._closing = False
         self._shown: tuple[Frame, PipelineScene, View] | None = None
-        self._picture: Picture | None = None
+        self._preview: Preview | None = None
         self._diagnostics: DiagnosticArray | None = None
         self._diagnostics_ns = self._version = 0
         self._drawn_s = -math.inf
@@ -85,7 +85,7 @@ class Player:
         """Go on, at the end from the beginning; or stand still."""
         with self._changing():
             if not playing:
-                self._picture = None  # the last drawn may be an earlier one
+                self._preview = None  # the last drawn may be an earlier one
             if playing and self._ended():
                 self._sought_s = self._pace.start_s
             self._playing, self._anchor = playing, None
@@ -139,16 +139,16 @@ class Player:
                 math.nan,
                 self._diagnostics,
                 self._diagnostics_ns,
-                self._picture,
+                self._preview,
                 0,
                 replay,
                 self._ahead,
             )
 
-    def want_preview(self, wanted: bool) -> None:
+    def switch_preview(self, on: bool) -> None:
         """Draw what is shown, or no longer."""
         with self._condition:
-            self._wanted = wanted
+            self._preview_on = on
             self._condition.notify()
 
     @contextmanager
@@ -210,13 +210,13 @@ class Player:
             if self._loop and self._playing and self._sought_s is None:
                 self._sought_s = self._pace.start_s
             elif self._sought_s is None:
-                self._playing, self._picture = False, None  # the last drawn may be an earlier one
+                self._playing, self._preview = False, None  # the last drawn may be an earlier one
 
     def _stand(self) -> None:
         """At the end, until a place is sought."""
         with self._condition:
             self._due = 0
-            if not self._wants_picture():
+            if not self._needs_preview():
                 if self._sought_s is None and not self._closing:
                     self._condition.wait()
                 return
@@ -235,7 +235,7 @@ class Player:
                 wait_s = self._wait_s(position_s) if self._playing else None
                 if wait_s is not None and wait_s <= 0:
                     return True
-                if wait_s is not None or not self._wants_picture():
+                if wait_s is not None or not self._needs_preview():
                     self._condition.wait(wait_s)
                     continue
             with self._changing():
@@ -249,18 +249,18 @@ class Player:
         self._anchor = None if wait_s < -_LATE_S else (since_s, from_s)
         return wait_s
 
-    def _wants_picture(self) -> bool:
-        return self._wanted and self._picture is None and self._shown is not None
+    def _needs_preview(self) -> bool:
+        return self._preview_on and self._preview is None and self._shown is not None
 
     def _show(self, frame: Frame, outcome: Outcome, position_s: float) -> None:
         with self._changing():
             went_on = 0 <= position_s - self._position_s < _POINT_S
             self._position_s = position_s
             self._shown = frame, outcome.scene, outcome.view()
-            self._picture = self._picture if self._playing else None
+            self._preview = self._preview if self._playing else None
             if not went_on or frame.stamp_ns - self._diagnostics_stamp_ns() >= _POINT_S * 1e9:
                 self._tell(outcome.scene)
-            if self._wanted and (not self._playing or time.monotonic() - self._drawn_s >= _PREVIEW_S):
+            if self._preview_on and (not self._playing or time.monotonic() - self._drawn_s >= _PREVIEW_S):
                 self._draw()
 
     def _diagnostics_stamp_ns(self) -> int:
@@ -281,9 +281,9 @@ class Player:
         self.traces.add(Point.of(scene.stamp_ns, scene, self._intervals.rate_hz, self._diagnostics))
 
     def _draw(self) -> None:
-        if self._shown is None or not self._wanted:
+        if self._shown is None or not self._preview_on:
             return
         frame, scene, view = self._shown
         _, jpeg = cv2.imencode(".jpg", draw(frame.image, scene, view), (cv2.IMWRITE_JPEG_QUALITY, _QUALITY))
         image = CompressedImage(Header(scene.stamp_ns, ""), "jpeg", memoryview(np.ascontiguousarray(jpeg).tobytes()))
-        self._picture, self._drawn_s = Picture(image, time.time_ns(), scene), time.monotonic()
+        self._preview, self._drawn_s = Preview(image, time.time_ns(), scene), time.monotonic()

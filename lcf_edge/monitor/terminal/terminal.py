@@ -19,17 +19,17 @@ _END_KEYS = frozenset(b"qQ\x03")
 
 
 def show(
-    console: Console, picture: Callable[[], RenderableType], obey: Callable[[bytes], None] = lambda _: None
+    console: Console, screen: Callable[[], RenderableType], obey: Callable[[bytes], None] = lambda _: None
 ) -> None:
-    """Draw ``picture()`` at 5 Hz over the whole terminal until q is pressed or a signal ends it.
+    """Draw ``screen()`` at 5 Hz over the whole terminal until q is pressed or a signal ends it.
 
     ``obey`` hears the other keys. Ctrl-Z gives the terminal back meanwhile. Raises ``KeyboardInterrupt``,
     ``SystemExit`` for SIGTERM and SIGHUP.
     """
     with _signals() as stopped:
         while True:
-            with Live(picture(), console=console, screen=True, auto_refresh=False) as live, _keys() as pressed:
-                ended = _draw(live, picture, pressed, obey, stopped)
+            with Live(screen(), console=console, screen=True, auto_refresh=False) as live, _keys() as pressed:
+                ended = _draw(live, screen, pressed, obey, stopped)
             if ended:
                 return
             os.kill(os.getpid(), signal.SIGSTOP)  # until the shell lets it go on
@@ -38,7 +38,7 @@ def show(
 
 def _draw(
     live: Live,
-    picture: Callable[[], RenderableType],
+    screen: Callable[[], RenderableType],
     pressed: Callable[[float], bytes],
     obey: Callable[[bytes], None],
     stopped: set[int],
@@ -46,7 +46,7 @@ def _draw(
     """True: q was pressed, or the terminal is gone; False: Ctrl-Z was."""
     due_s = time.monotonic()
     while not stopped:
-        live.update(picture(), refresh=True)
+        live.update(screen(), refresh=True)
         if not live.console.is_terminal:  # any more
             return True
         due_s = max(due_s + INTERVAL_S, time.monotonic())  # what was missed is not made up for

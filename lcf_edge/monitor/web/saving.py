@@ -6,7 +6,7 @@ from mcap.writer import CompressionType, Writer
 
 from lcf_edge import __version__
 from lcf_edge.cdr import decode_scene
-from lcf_edge.monitor.live.history import Message
+from lcf_edge.monitor.live.history import ReceivedMessage
 from lcf_edge.recording.write.schemas import ENCODING, schema
 from lcf_edge.standard_messages.image_annotations import encode_image_annotations
 from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
@@ -38,7 +38,7 @@ class _Outflow:
         return data
 
 
-def mcap_parts(messages: Sequence[Message], prefix: str) -> Iterator[bytes]:
+def mcap_parts(messages: Sequence[ReceivedMessage], prefix: str) -> Iterator[bytes]:
     """The file of ``messages``, which are in the order of their arrival, in parts of about ``CHUNK_BYTES``."""
     outflow = _Outflow()
     writer = Writer(outflow, CHUNK_BYTES, CompressionType.LZ4)  # type: ignore[arg-type]
@@ -58,7 +58,7 @@ def mcap_parts(messages: Sequence[Message], prefix: str) -> Iterator[bytes]:
     yield outflow.take()
 
 
-def _with_annotations(message: Message) -> Iterator[tuple[str, bytes]]:
+def _with_annotations(message: ReceivedMessage) -> Iterator[tuple[str, bytes]]:
     """Topic and payload of a message, and of what is drawn of it over the picture."""
     yield message.topic, message.payload
     if message.topic == SCENE.name:

@@ -24,9 +24,9 @@ from aiohttp.http_exceptions import HttpProcessingError
 from lcf_edge.daemon.log import NoFlood
 from lcf_edge.dates import utc
 from lcf_edge.errors import LcfError
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import Monitor
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.monitor.replay.replayed import Command, Replayed
 from lcf_edge.monitor.web.doorkeeper import BACKLOG, FAREWELL_S, LOGGER, REQUEST_WITHIN_S, Doorkeeper
 from lcf_edge.monitor.web.guard import TOKEN, Guard
@@ -58,7 +58,7 @@ PAGE = {
 }
 
 
-async def serve(seen: Source | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
+async def serve(shown: DaemonAddress | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM; ``tell`` hears the address. Raises ``PublishError``, ``LcfError``."""
     handler = _OneLine()
     handler.addFilter(NoFlood())
@@ -70,7 +70,7 @@ async def serve(seen: Source | Replayed, host: str, port: int, tell: Callable[[s
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
     guard = Guard(host)
-    server = Server(seen)
+    server = Server(shown)
     door = Doorkeeper()
     runner = web.AppRunner(
         server.application(guard, door),
@@ -106,7 +106,7 @@ async def _listen(runner: web.AppRunner, door: Doorkeeper, host: str, port: int)
 class Server:
     """What is served, of one daemon, or of a recording in place of it."""
 
-    def __init__(self, seen: Source | Replayed) -> None:
+    def __init__(self, shown: DaemonAddress | Replayed) -> None:
         self._history = History()
         self._loop = asyncio.get_running_loop()
         self._came = asyncio.Event()
@@ -114,12 +114,12 @@ class Server:
         self._saving = 0
         self._wanting = asyncio.Lock()
         self._player: Player | None = None
-        if isinstance(seen, Source):
-            self._place, self._prefix = seen.endpoint, seen.prefix
-            self._monitor: Monitor | Player = Monitor(seen, history=self._history, changed=self._changed)
+        if isinstance(shown, DaemonAddress):
+            self._place, self._prefix = shown.endpoint, shown.prefix
+            self._monitor: Monitor | Player = Monitor(shown, history=self._history, changed=self._changed)
         else:
-            self._place, self._prefix = str(seen.path), ""
-            self._monitor = self._player = seen.player(self._changed)
+            self._place, self._prefix = str(shown.path), ""
+            self._monitor = self._player = shown.player(self._changed)
             self._player.start()
 
     def application(self, guard: Guard, door: Doorkeeper) -> web.Application:
@@ -153,13 +153,13 @@ class Server:
         await browser.prepare(request)
         self._sockets[browser] = request
         try:
-            await self._want_preview()
+            await self._switch_preview()
             await self._tell(browser)
         except (TimeoutError, ConnectionError):  # it neither asks nor takes any more; it is gone
             _abort(request)
         finally:
             self._sockets.pop(browser)
-            await self._want_preview()
+            await self._switch_preview()
             await browser.close()
         return browser
 
@@ -167,7 +167,7 @@ class Server:
         audience, last_s = Audience(), -INTERVAL_S
         while (await browser.receive(SILENCE_S)).type is WSMsgType.TEXT:
             await asyncio.sleep(last_s + INTERVAL_S - time.monotonic())
-            if self._monitor.snapshot().version == audience.told_version:
+            if self._monitor.snapshot().version == audience.sent_version:
                 self._came.clear()
                 with suppress(TimeoutError):
                     await asyncio.wait_for(self._came.wait(), PULSE_S)
@@ -188,9 +188,9 @@ class Server:
         command.give(self._player)
         return web.Response(status=204)
 
-    async def _want_preview(self) -> None:
+    async def _switch_preview(self) -> None:
         async with self._wanting:
-            await asyncio.to_thread(self._monitor.want_preview, bool(self._sockets))
+            await asyncio.to_thread(self._monitor.switch_preview, bool(self._sockets))
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         if self._saving >= MAX_SAVES_AT_ONCE:

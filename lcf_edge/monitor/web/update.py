@@ -20,15 +20,15 @@ if TYPE_CHECKING:
 class Audience:
     """What one browser knows already."""
 
-    told_version: int = -1
+    sent_version: int = -1
     diagnostics_ns: int = -1
-    picture_ns: int = -1
+    preview_ns: int = -1
     point_ns: int = -1
 
     def update(self, monitor: "Monitor | Player", endpoint: str) -> list[str | bytes]:
         """What it does not know: a text, and perhaps the JPEG that belongs to it."""
         snapshot, now_ns = monitor.snapshot(), time.time_ns()
-        self.told_version = snapshot.version
+        self.sent_version = snapshot.version
         update: dict[str, Any] = {
             "connection": {
                 "presence": snapshot.presence.value,
@@ -58,12 +58,12 @@ class Audience:
         if points := monitor.traces.since(self.point_ns):
             self.point_ns = points[-1].at_ns
             update["points"] = points
-        picture = snapshot.picture
-        if picture is None or picture.received_ns == self.picture_ns:
+        preview = snapshot.preview
+        if preview is None or preview.received_ns == self.preview_ns:
             return [_text(update)]
-        self.picture_ns = picture.received_ns
-        update["picture"] = {"stamp_ns": picture.image.header.stamp_ns, "scene": _fields(picture.scene)}
-        return [_text(update), bytes(picture.image.data)]
+        self.preview_ns = preview.received_ns
+        update["picture"] = {"stamp_ns": preview.image.header.stamp_ns, "scene": _fields(preview.scene)}
+        return [_text(update), bytes(preview.image.data)]
 
 
 def _scene(snapshot: Snapshot, now_ns: int) -> dict[str, Any] | None:

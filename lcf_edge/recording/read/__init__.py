@@ -10,7 +10,7 @@ from pathlib import Path
 from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
 from lcf_edge.recording.read.asl import AslRecording, is_asl_folder
-from lcf_edge.recording.read.pictures import VIDEO_SUFFIXES, PictureFolder, VideoFile, is_picture
+from lcf_edge.recording.read.images import VIDEO_SUFFIXES, ImageFolder, VideoFile, is_image
 from lcf_edge.recording.read.recording import Recording
 from lcf_edge.recording.read.rosbag import RosBag, bag_files
 
@@ -24,7 +24,7 @@ def is_recording(path: Path) -> bool:
     """
     if path.is_dir():
         is_bag = (path / "metadata.yaml").is_file() and bool(bag_files(path))
-        return is_bag or is_asl_folder(path) or any(map(is_picture, path.iterdir()))
+        return is_bag or is_asl_folder(path) or any(map(is_image, path.iterdir()))
     return path.suffix.lower() in {".mcap", *VIDEO_SUFFIXES} and path.is_file()
 
 
@@ -41,7 +41,7 @@ def _open(path: Path, config: Config) -> Recording:
     if path.is_dir():
         if is_asl_folder(path):
             return AslRecording(path, config)
-        return RosBag(path, config) if bag_files(path) else PictureFolder(path, config)
+        return RosBag(path, config) if bag_files(path) else ImageFolder(path, config)
     if not path.is_file():
         raise RecordingError(f"{path}: no such file or folder; name a recording")
     suffix = path.suffix.lower()

@@ -11,13 +11,13 @@ import numpy as np
 from drivers.samples import ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
-from lcf_edge.recording.read.decoding import read_picture
-from lcf_edge.recording.read.recording import MAX_STAMP_NS, Picture, Recording, Sample, interleave
+from lcf_edge.recording.read.decoding import read_image
+from lcf_edge.recording.read.recording import MAX_STAMP_NS, Recording, Sample, UndecodedFrame, interleave
 from lcf_edge.recording.read.sensor_yaml import Rotation, SensorYaml
 
 MAX_ROW_CHARACTERS = 4096  # characters; longer is no row
 
-T = TypeVar("T", Picture, ImuSample, SpeedSample)
+T = TypeVar("T", UndecodedFrame, ImuSample, SpeedSample)
 
 
 class _RowError(ValueError):
@@ -62,9 +62,9 @@ class AslRecording(Recording):
                 axes = cam.rotation().T @ SensorYaml(imu_yaml).rotation()
                 self._axes = None if np.array_equal(axes, np.eye(3)) else axes
 
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         return interleave(
-            self._rows(self._cam, "picture", self._picture),
+            self._rows(self._cam, "picture", self._image),
             self._rows(self._imu, "imu", self._imu_sample) if self.has_imu else (),
             self._rows(self._odom, "speed", _speed_sample) if self.has_speed else (),
         )
@@ -98,11 +98,11 @@ class AslRecording(Recording):
         except OSError as error:
             self._warn(f"{csv}: cannot be read ({error.strerror}), going on without the rest")
 
-    def _picture(self, fields: list[str]) -> Picture:
+    def _image(self, fields: list[str]) -> UndecodedFrame:
         if len(fields) < 2 or not fields[1].isprintable() or Path(fields[1] or "/").name != fields[1]:
             raise _RowError("malformed")  # a name that leaves the folder, or that no file can have
         path = self._cam.with_name("data") / fields[1]
-        return Picture(_stamp_ns(fields[0]), str(path), partial(read_picture, path))
+        return UndecodedFrame(_stamp_ns(fields[0]), str(path), partial(read_image, path))
 
     def _imu_sample(self, fields: list[str]) -> ImuSample:
         stamp_ns = _stamp_ns(fields[0])
@@ -119,31 +119,31 @@ def increasing(rows: Iterable[tuple[int, T]], stray: Callable[[int], None]) -> I
     Where time steps back, the row that does so may be the stray, or the one before it that lies far ahead:
     the row after them tells. So one wrong stamp costs one row.
     """
-    held: tuple[int, T] | None = None
+    waiting: tuple[int, T] | None = None
     doubted: tuple[int, T] | None = None  # earlier than the held one, later than what was delivered
     delivered_ns = -1
     for line, item in rows:
-        if held and doubted:
-            if item.stamp_ns > held[1].stamp_ns:
+        if waiting and doubted:
+            if item.stamp_ns > waiting[1].stamp_ns:
                 stray(doubted[0])
             else:
-                stray(held[0])
-                held = doubted
+                stray(waiting[0])
+                waiting = doubted
             doubted = None
-        if held is None:
-            held = line, item
-        elif item.stamp_ns > held[1].stamp_ns:
-            yield held[1]
-            delivered_ns = held[1].stamp_ns
-            held = line, item
-        elif delivered_ns < item.stamp_ns < held[1].stamp_ns:
+        if waiting is None:
+            waiting = line, item
+        elif item.stamp_ns > waiting[1].stamp_ns:
+            yield waiting[1]
+            delivered_ns = waiting[1].stamp_ns
+            waiting = line, item
+        elif delivered_ns < item.stamp_ns < waiting[1].stamp_ns:
             doubted = line, item
         else:
             stray(line)
     if doubted:
         stray(doubted[0])
-    if held:
-        yield held[1]
+    if waiting:
+        yield waiting[1]
 
 
 def _speed_sample(fields: list[str]) -> SpeedSample:

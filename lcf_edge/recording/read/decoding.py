@@ -14,7 +14,7 @@ import numpy.typing as npt
 from drivers.camera.jpeg import jpeg_header
 from lcf_edge.cdr import Image
 from lcf_edge.errors import LcfError
-from lcf_edge.picture_limit import MAX_PIXELS
+from lcf_edge.image_limit import MAX_PIXELS
 
 Grey = npt.NDArray[np.uint8]
 """(height, width) luminance."""
@@ -46,54 +46,54 @@ _set_log_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLe
 _set_log_level(0)
 
 
-class PictureError(LcfError):
+class ImageDecodeError(LcfError):
     """A picture that cannot be used; the text says why in two or three words, for counting."""
 
 
-def read_picture(path: Path) -> Grey:
-    """Luminance of a picture file (png, jpeg, bmp, pgm/ppm, tiff). Raises ``PictureError``."""
+def read_image(path: Path) -> Grey:
+    """Luminance of a picture file (png, jpeg, bmp, pgm/ppm, tiff). Raises ``ImageDecodeError``."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
-            raise PictureError("too large")
-        return decode_picture(path.read_bytes())
+            raise ImageDecodeError("too large")
+        return image_from_bytes(path.read_bytes())
     except FileNotFoundError as error:
-        raise PictureError("missing") from error
+        raise ImageDecodeError("missing") from error
     except OSError as error:
-        raise PictureError("unreadable") from error
+        raise ImageDecodeError("unreadable") from error
 
 
-def decode_picture(data: bytes | memoryview) -> Grey:
+def image_from_bytes(data: bytes | memoryview) -> Grey:
     """Luminance of an encoded picture (png, jpeg, bmp, pgm/ppm, tiff).
 
     The size comes from the header first, and from what the decoder will take for the header: a small file can decode
-    to gigabytes. Raises ``PictureError``.
+    to gigabytes. Raises ``ImageDecodeError``.
     """
     if not len(data):
-        raise PictureError("empty")
+        raise ImageDecodeError("empty")
     content = bytes(data)
     try:
         (width, height), content = _checked(content)
     except (struct.error, IndexError) as error:
-        raise PictureError("damaged") from error
+        raise ImageDecodeError("damaged") from error
     check_size(width, height)
     try:
         image = cv2.imdecode(np.frombuffer(content, np.uint8), cv2.IMREAD_GRAYSCALE)
     except cv2.error as error:
-        raise PictureError("damaged") from error
+        raise ImageDecodeError("damaged") from error
     if image is None or sorted(image.shape) != sorted((width, height)):
-        raise PictureError("damaged")
+        raise ImageDecodeError("damaged")
     return np.asarray(image, np.uint8)
 
 
-def raw_picture(image: Image) -> Grey:
-    """Luminance of a ``sensor_msgs/msg/Image``, copied out of its payload. Raises ``PictureError``."""
+def image_from_message(image: Image) -> Grey:
+    """Luminance of a ``sensor_msgs/msg/Image``, copied out of its payload. Raises ``ImageDecodeError``."""
     encoding = image.encoding.lower()
     if encoding not in RAW_ENCODINGS:
-        raise PictureError("of unsupported encoding")
+        raise ImageDecodeError("of unsupported encoding")
     check_size(image.width, image.height)
     row = image.width * RAW_ENCODINGS[encoding]
     if image.step < row or len(image.data) < image.step * image.height:
-        raise PictureError("shorter than its size")
+        raise ImageDecodeError("shorter than its size")
     rows = np.frombuffer(image.data, np.uint8, image.step * image.height).reshape(image.height, image.step)
     pixels = rows[:, :row]
     if encoding in _COLOUR:
@@ -105,11 +105,11 @@ def raw_picture(image: Image) -> Grey:
 
 
 def check_size(width: int, height: int) -> None:
-    """Refuse an empty or absurd picture size with ``PictureError``."""
+    """Refuse an empty or absurd picture size with ``ImageDecodeError``."""
     if min(width, height) < 1:
-        raise PictureError("empty")
+        raise ImageDecodeError("empty")
     if width * height > MAX_PIXELS:
-        raise PictureError("too large")
+        raise ImageDecodeError("too large")
 
 
 def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
@@ -121,13 +121,13 @@ def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
     if data.startswith(b"BM"):
         header, width, height = struct.unpack_from("<Iii", data, 14)
         if header < _BMP_HEADER:  # in an older one, sizes stand elsewhere
-            raise PictureError("of unknown format")
+            raise ImageDecodeError("of unknown format")
         return (abs(width), abs(height)), data
     if data.startswith((b"II*\0", b"MM\0*")):
         return _tiff_size(data), data
     if netpbm := _NETPBM.match(data[:4096]):
         return (int(netpbm[1]), int(netpbm[2])), data
-    raise PictureError("of unknown format")
+    raise ImageDecodeError("of unknown format")
 
 
 def _png(data: bytes) -> tuple[tuple[int, int], bytes]:
@@ -137,14 +137,14 @@ def _png(data: bytes) -> tuple[tuple[int, int], bytes]:
     other sizes.
     """
     if data[12:16] != b"IHDR":
-        raise PictureError("damaged")
+        raise ImageDecodeError("damaged")
     parts = [data[:8]]
     at, kind = 8, b""
     while kind != b"IEND":
         length, kind = struct.unpack_from(">I4s", data, at)
         (crc,) = struct.unpack_from(">I", data, at + 8 + length)
         if zlib.crc32(data[at + 4 : at + 8 + length]) != crc or (kind == b"IHDR") != (at == 8):
-            raise PictureError("damaged")
+            raise ImageDecodeError("damaged")
         if kind in _PNG_CHUNKS:
             parts.append(data[at : at + 12 + length])
         at += 12 + length
@@ -153,12 +153,12 @@ def _png(data: bytes) -> tuple[tuple[int, int], bytes]:
 
 def _jpeg_size(data: bytes) -> tuple[int, int]:
     if b"\xff\xd9" not in data[-1024:]:
-        raise PictureError("damaged")  # cut off before its end marker
+        raise ImageDecodeError("damaged")  # cut off before its end marker
     header = jpeg_header(data)
     if header is None or data.count(b"\xff\xda", header.data_at) > _MAX_SCANS:
-        raise PictureError("damaged")
+        raise ImageDecodeError("damaged")
     if header.samples > MAX_PIXELS and not header.one_pass:
-        raise PictureError("too large")
+        raise ImageDecodeError("too large")
     return header.width, header.height
 
 
@@ -168,14 +168,14 @@ def _tiff_size(data: bytes) -> tuple[int, int]:
     tags: dict[int, int] = {}
     for tag, value in _tiff_tags(data, order):
         if tag in tags:  # which one counts is the reader's choice
-            raise PictureError("damaged")
+            raise ImageDecodeError("damaged")
         tags[tag] = value
     width, height = tags.get(_TIFF_WIDTH, 0), tags.get(_TIFF_HEIGHT, 0)
     rows = tags.get(_TIFF_ROWS_PER_STRIP, _TIFF_ALL_ROWS)
     across = tags.get(_TIFF_TILE_WIDTH, width)
     down = tags.get(_TIFF_TILE_HEIGHT, height if rows in {0, _TIFF_ALL_ROWS} else rows)
     if across * down * tags.get(_TIFF_SAMPLES, 1) * 8 > _MAX_TIFF_STRIP:
-        raise PictureError("too large")
+        raise ImageDecodeError("too large")
     return width, height
 
 
@@ -188,6 +188,6 @@ def _tiff_tags(data: bytes, order: str) -> Iterator[tuple[int, int]]:
         if tag not in _TIFF_SIZES:
             continue
         if kind not in _TIFF_NUMBERS or values != 1:
-            raise PictureError("damaged")
+            raise ImageDecodeError("damaged")
         (value,) = struct.unpack_from(order + _TIFF_NUMBERS[kind], data, at + 8)
         yield tag, value

@@ -32,10 +32,10 @@ def distortion(name: str, coefficients: tuple[float, ...]) -> tuple[Model, tuple
         raise ValueError(f"{printable(name, 60)} is none of {', '.join(filter(None, MODELS))}")
     if model == "none" or not any(coefficients):
         return "none", ()
-    wanted = (4,) if model == "equidistant" else (4, 5)
-    used = coefficients[: wanted[-1]]
-    if any(coefficients[wanted[-1] :]):
+    counts = (4,) if model == "equidistant" else (4, 5)
+    used = coefficients[: counts[-1]]
+    if any(coefficients[counts[-1] :]):
         raise ValueError(f"{name} with {len(coefficients)} coefficients is not supported")
-    if len(used) not in wanted:
-        raise ValueError(f"{name} takes {' or '.join(map(str, wanted))} coefficients")
+    if len(used) not in counts:
+        raise ValueError(f"{name} takes {' or '.join(map(str, counts))} coefficients")
     return model, used

@@ -36,7 +36,7 @@ _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time
 _FOOTER = struct.Struct("<BQQQI8s")
 
 
-class Topic(NamedTuple):
+class McapTopic(NamedTuple):
     """A stream of messages of one type."""
 
     name: str
@@ -45,10 +45,10 @@ class Topic(NamedTuple):
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class McapMessage:
     """One message as it was recorded."""
 
-    topic: Topic
+    topic: McapTopic
     log_time_ns: int
     data: bytes
 
@@ -73,13 +73,13 @@ class McapFile:
     def __init__(self, path: Path) -> None:
         self._path = path
         self._channels = _Channels()
-        self.counts: Counter[Topic] | None = None
+        self.counts: Counter[McapTopic] | None = None
         with path.open("rb") as file:
             if file.read(len(MAGIC)) != MAGIC:
                 raise RecordingError(f"{path}: not an MCAP file; name another recording")
             self._read_summary(file)
 
-    def messages(self, warn: Callable[[str], None], skip: Callable[[str, str], None]) -> Iterator[Message]:
+    def messages(self, warn: Callable[[str], None], skip: Callable[[str, str], None]) -> Iterator[McapMessage]:
         """The messages in the order of the file.
 
         ``warn`` is told where the file is damaged, ``skip`` why a chunk is passed over, and where it lies.
@@ -92,7 +92,7 @@ class McapFile:
 
     def _messages(
         self, file: BinaryIO, warn: Callable[[str], None], skip: Callable[[str, str], None]
-    ) -> Iterator[Message]:
+    ) -> Iterator[McapMessage]:
         file.seek(len(MAGIC))
         try:
             for record in _records(file):
@@ -107,7 +107,7 @@ class McapFile:
             damage = str(error)
         warn(f"{self._path}: damaged at {damage}, read up to there")
 
-    def _chunk(self, record: _Record, skip: Callable[[str, str], None]) -> Iterator[Message]:
+    def _chunk(self, record: _Record, skip: Callable[[str, str], None]) -> Iterator[McapMessage]:
         try:
             data = _unpacked(record)
             for inner in _records(io.BytesIO(data), memoryview(data)):
@@ -144,9 +144,9 @@ class _Channels:
     """What the schema and channel records so far tell about messages to come."""
 
     schemas: dict[int, str] = field(default_factory=dict)
-    topics: dict[int, Topic] = field(default_factory=dict)
+    topics: dict[int, McapTopic] = field(default_factory=dict)
 
-    def take(self, record: _Record) -> Message | None:
+    def take(self, record: _Record) -> McapMessage | None:
         """Learn from a record. Return the message, if it is one."""
         if record.opcode == Opcode.SCHEMA:
             schema = _parse(mcap.records.Schema.read, record)
@@ -157,18 +157,18 @@ class _Channels:
             if len(self.topics) >= MAX_TOPICS and channel.id not in self.topics:
                 raise _DamageError(f"byte {record.offset}: more than {MAX_TOPICS} topics")
             schema_name = self.schemas.get(channel.schema_id, "")
-            self.topics[channel.id] = Topic(channel.topic, schema_name, channel.message_encoding)
+            self.topics[channel.id] = McapTopic(channel.topic, schema_name, channel.message_encoding)
         elif record.opcode == Opcode.MESSAGE:
             if len(record.body) < _MESSAGE.size:
                 raise _DamageError(f"byte {record.offset}: a record is nonsense")
             number, _, log_time_ns, _ = _MESSAGE.unpack_from(record.body)
             if topic := self.topics.get(number):
-                return Message(topic, log_time_ns, bytes(record.body[_MESSAGE.size :]))
+                return McapMessage(topic, log_time_ns, bytes(record.body[_MESSAGE.size :]))
         return None
 
-    def named(self, counts: dict[int, int]) -> Counter[Topic]:
+    def named(self, counts: dict[int, int]) -> Counter[McapTopic]:
         """Counts by topic instead of by channel number."""
-        total: Counter[Topic] = Counter()
+        total: Counter[McapTopic] = Counter()
         for number, topic in self.topics.items():
             total[topic] += counts.get(number, 0)
         return total

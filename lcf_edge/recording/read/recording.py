@@ -14,23 +14,23 @@ from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
 from lcf_edge.lens import Lens
 from lcf_edge.printable import printable
-from lcf_edge.recording.read.decoding import Grey, PictureError
+from lcf_edge.recording.read.decoding import Grey, ImageDecodeError
 
 WARNINGS_OF_A_KIND = 5  # further skips for the same reason are only counted
 MAX_STAMP_NS = 2**63 - 1
-HELD_PICTURES = 6  # that wait to be put in order
-HELD_SAMPLES = 1024
+MAX_WAITING_FRAMES = 6  # that wait to be put in order
+MAX_WAITING_SAMPLES = 1024
 
 Sample = ImuSample | SpeedSample
 
 
 @dataclass(frozen=True, slots=True)
-class Picture:
+class UndecodedFrame:
     """A picture that is decoded when its turn comes, so that none wait in memory."""
 
     stamp_ns: int
     name: str  # for warnings
-    decode: Callable[[], Grey]  # raises PictureError
+    decode: Callable[[], Grey]  # raises ImageDecodeError
 
 
 class Recording(ABC):
@@ -60,7 +60,7 @@ class Recording(ABC):
         self.first_ns: int | None = None
 
     @abstractmethod
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         """Items in the order of delivery."""
 
     def __iter__(self) -> Iterator[Frame | ImuSample | SpeedSample]:
@@ -70,7 +70,7 @@ class Recording(ABC):
         last_s, start_s, end_s = 0.0, self.start_s, self.start_s + self.duration_s
         begun = start_s <= 0
         for item in self._items():
-            if not isinstance(item, Picture):
+            if not isinstance(item, UndecodedFrame):
                 if begun:
                     yield item
                 continue
@@ -86,7 +86,7 @@ class Recording(ABC):
                 break
             try:
                 image = item.decode()
-            except PictureError as error:
+            except ImageDecodeError as error:
                 self._skip(f"picture {error}", item.name)
                 continue
             shape = shape or image.shape
@@ -117,56 +117,58 @@ class Recording(ABC):
 
 
 def interleave(
-    pictures: Iterable[Picture], imu: Iterable[ImuSample], speed: Iterable[SpeedSample]
-) -> Iterator[Picture | Sample]:
+    frames: Iterable[UndecodedFrame], imu: Iterable[ImuSample], speed: Iterable[SpeedSample]
+) -> Iterator[UndecodedFrame | Sample]:
     """Three streams, each in the order of its stamps, in the order of delivery (see ``Recording``)."""
     streams: tuple[_Stream, _Stream] = (_Stream(imu), _Stream(speed))
-    for picture in pictures:
-        yield from heapq.merge(*(stream.up_to(picture.stamp_ns) for stream in streams), key=_stamp_ns)
-        yield picture
+    for frame in frames:
+        yield from heapq.merge(*(stream.up_to(frame.stamp_ns) for stream in streams), key=_stamp_ns)
+        yield frame
     yield from heapq.merge(*(stream.up_to(math.inf) for stream in streams), key=_stamp_ns)
 
 
-def reorder(items: Iterable[Picture | Sample], late: Callable[[Picture | Sample], None]) -> Iterator[Picture | Sample]:
+def reorder(
+    items: Iterable[UndecodedFrame | Sample], late: Callable[[UndecodedFrame | Sample], None]
+) -> Iterator[UndecodedFrame | Sample]:
     """One stream, only roughly in the order of its stamps, in the order of delivery (see ``Recording``).
 
-    At most ``HELD_PICTURES`` and ``HELD_SAMPLES`` wait for earlier ones; what comes later still, or repeats
+    At most ``MAX_WAITING_FRAMES`` and ``MAX_WAITING_SAMPLES`` wait for earlier ones; what comes later still, or repeats
     the stamp of its kind, goes to ``late``.
     """
-    held: list[Picture | Sample] = []
-    pictures = 0
-    reached_ns: dict[type, float] = dict.fromkeys((Picture, ImuSample, SpeedSample), -math.inf)
+    waiting: list[UndecodedFrame | Sample] = []
+    frames = 0
+    reached_ns: dict[type, float] = dict.fromkeys((UndecodedFrame, ImuSample, SpeedSample), -math.inf)
 
-    def release() -> Iterator[Picture | Sample]:
-        first = held.pop(0)
+    def release() -> Iterator[UndecodedFrame | Sample]:
+        first = waiting.pop(0)
         if first.stamp_ns <= reached_ns[type(first)]:
             late(first)
             return
         reached_ns[type(first)] = first.stamp_ns
-        if isinstance(first, Picture):
+        if isinstance(first, UndecodedFrame):
             yield from ahead(first.stamp_ns)
         yield first
 
     def ahead(stamp_ns: int) -> Iterator[Sample]:
         waited_for = {kind for kind in (ImuSample, SpeedSample) if reached_ns[kind] < stamp_ns}
         index = 0
-        while waited_for and index < len(held):
-            sample = held[index]
-            if isinstance(sample, Picture) or type(sample) not in waited_for:
+        while waited_for and index < len(waiting):
+            sample = waiting[index]
+            if isinstance(sample, UndecodedFrame) or type(sample) not in waited_for:
                 index += 1
                 continue
-            del held[index]
+            del waiting[index]
             waited_for.remove(type(sample))
             reached_ns[type(sample)] = sample.stamp_ns
             yield sample
 
     for item in items:
-        bisect.insort(held, item, key=_stamp_ns)
-        pictures += isinstance(item, Picture)
-        while pictures > HELD_PICTURES or len(held) - pictures > HELD_SAMPLES:
-            pictures -= isinstance(held[0], Picture)
+        bisect.insort(waiting, item, key=_stamp_ns)
+        frames += isinstance(item, UndecodedFrame)
+        while frames > MAX_WAITING_FRAMES or len(waiting) - frames > MAX_WAITING_SAMPLES:
+            frames -= isinstance(waiting[0], UndecodedFrame)
             yield from release()
-    while held:
+    while waiting:
         yield from release()
 
 
@@ -184,5 +186,5 @@ class _Stream:
             yield sample
 
 
-def _stamp_ns(item: Picture | Sample) -> int:
+def _stamp_ns(item: UndecodedFrame | Sample) -> int:
     return item.stamp_ns

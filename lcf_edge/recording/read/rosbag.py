@@ -11,11 +11,11 @@ from lcf_edge import cdr
 from lcf_edge.config import Config
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
 from lcf_edge.lens import Lens
-from lcf_edge.recording.read.decoding import RAW_ENCODINGS, decode_picture, raw_picture
+from lcf_edge.recording.read.decoding import RAW_ENCODINGS, image_from_bytes, image_from_message
 from lcf_edge.recording.read.distortion import distortion
-from lcf_edge.recording.read.mcap_file import McapFile, Message, Topic
-from lcf_edge.recording.read.pictures import natural_order
-from lcf_edge.recording.read.recording import MAX_STAMP_NS, Picture, Recording, Sample, reorder
+from lcf_edge.recording.read.images import natural_order
+from lcf_edge.recording.read.mcap_file import McapFile, McapMessage, McapTopic
+from lcf_edge.recording.read.recording import MAX_STAMP_NS, Recording, Sample, UndecodedFrame, reorder
 
 IMAGE = "sensor_msgs/msg/Image"
 COMPRESSED_IMAGE = "sensor_msgs/msg/CompressedImage"
@@ -65,10 +65,10 @@ class RosBag(Recording):
         if imu and not config.imu.axes:
             self._check_axes(image, imu)
 
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         return reorder(self._stamped(), self._late)
 
-    def _stamped(self) -> Iterator[Picture | Sample]:
+    def _stamped(self) -> Iterator[UndecodedFrame | Sample]:
         for message in self._messages():
             if (kind := self._kinds.get(message.topic)) is None:
                 continue
@@ -80,8 +80,8 @@ class RosBag(Recording):
             except cdr.CdrError:
                 self._skip(f"{kind} message malformed", where)
 
-    def _late(self, item: Picture | Sample) -> None:
-        kind = {Picture: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
+    def _late(self, item: UndecodedFrame | Sample) -> None:
+        kind = {UndecodedFrame: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
         self._skip(f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s")
 
     def _open_files(self) -> list[McapFile]:
@@ -97,18 +97,18 @@ class RosBag(Recording):
                 self._warn(str(error))
         return files
 
-    def _messages(self) -> Iterator[Message]:
+    def _messages(self) -> Iterator[McapMessage]:
         return chain.from_iterable(file.messages(self._warn, self._skip) for file in self._files)
 
-    def _survey(self) -> dict[Topic, bytes]:
+    def _survey(self) -> dict[McapTopic, bytes]:
         """How the first message of every topic that can be used begins, in the order in which they appear."""
-        expected: set[Topic] | None = set()
+        expected: set[McapTopic] | None = set()
         for file in self._files:
             if file.counts is None or expected is None:
                 expected = None  # no summary tells what is to come
             else:
                 expected |= {topic for topic, count in file.counts.items() if count and _is_read(topic)}
-        firsts: dict[Topic, bytes | None] = {}
+        firsts: dict[McapTopic, bytes | None] = {}
         seen_bytes = 0
         for message in self._messages():
             if _is_read(message.topic) and message.topic not in firsts:
@@ -119,7 +119,7 @@ class RosBag(Recording):
                 break
         return {topic: head for topic, head in firsts.items() if head is not None}
 
-    def _choose(self, kind: str, *schemas: str) -> Topic | None:
+    def _choose(self, kind: str, *schemas: str) -> McapTopic | None:
         """The first topic of the first of ``schemas`` that occurs."""
         topics = [topic for schema in schemas for topic in self._firsts if topic.schema == schema]
         if len(topics) > 1:
@@ -127,7 +127,7 @@ class RosBag(Recording):
             self._warn(f"{self.path}: several {kind} topics, {topics[0].name} is read and {others} not")
         return topics[0] if topics else None
 
-    def _read_lens(self, image: Topic) -> Lens | None:
+    def _read_lens(self, image: McapTopic) -> Lens | None:
         """The lens by the CameraInfo in the namespace of the pictures' topic."""
         infos = [topic for topic in self._firsts if topic.schema == CAMERA_INFO]
         topics = [topic for topic in infos if image.name.startswith(f"{topic.name.rpartition('/')[0]}/")]
@@ -144,7 +144,7 @@ class RosBag(Recording):
             self._warn(f"{self.path}: {topic.name}: {error}; not used")
             return None
 
-    def _check_axes(self, image: Topic, imu: Topic) -> None:
+    def _check_axes(self, image: McapTopic, imu: McapTopic) -> None:
         try:
             own, camera = (cdr.decode_header(self._firsts[topic]).frame_id for topic in (imu, image))
         except cdr.CdrError:
@@ -161,11 +161,11 @@ def bag_files(path: Path) -> list[Path]:
     return sorted(path.glob("*.mcap"), key=lambda file: natural_order(file.name)) if path.is_dir() else [path]
 
 
-def _is_read(topic: Topic) -> bool:
+def _is_read(topic: McapTopic) -> bool:
     return topic.schema in SCHEMAS and topic.encoding == "cdr"
 
 
-def _is_usable(topic: Topic, first: bytes) -> bool:
+def _is_usable(topic: McapTopic, first: bytes) -> bool:
     """Whether a topic tells what its type promises, by its first message: depth pictures and IMU topics
     with half of the values do not.
     """
@@ -182,15 +182,17 @@ def _is_usable(topic: Topic, first: bytes) -> bool:
     return True
 
 
-def _parse(message: Message, where: str) -> Picture | Sample:
+def _parse(message: McapMessage, where: str) -> UndecodedFrame | Sample:
     """Raises ``CdrError`` or ``_MessageError``."""
     match message.topic.schema:
         case schema if schema == IMAGE:
             image = cdr.decode_image(message.data)
-            return Picture(_stamp_ns(image.header, message), where, partial(raw_picture, image))
+            return UndecodedFrame(_stamp_ns(image.header, message), where, partial(image_from_message, image))
         case schema if schema == COMPRESSED_IMAGE:
             compressed = cdr.decode_compressed_image(message.data)
-            return Picture(_stamp_ns(compressed.header, message), where, partial(decode_picture, compressed.data))
+            return UndecodedFrame(
+                _stamp_ns(compressed.header, message), where, partial(image_from_bytes, compressed.data)
+            )
         case schema if schema == IMU:
             imu = cdr.decode_imu(message.data)
             if imu.gyro is None or imu.accel is None:
@@ -207,7 +209,7 @@ def _parse(message: Message, where: str) -> Picture | Sample:
             return SpeedSample(_stamp_ns(twist.header, message), speed_mps, yaw_rate_radps)
 
 
-def _stamp_ns(header: cdr.Header, message: Message) -> int:
+def _stamp_ns(header: cdr.Header, message: McapMessage) -> int:
     stamp_ns = header.stamp_ns if header.stamp_ns > 0 else message.log_time_ns
     if stamp_ns > MAX_STAMP_NS:
         raise _MessageError("without a time")

@@ -28,7 +28,7 @@ _MODELS = {"none": "plumb_bob", "radial-tangential": "plumb_bob", "equidistant":
 _PNG_COMPRESSION = 1  # of 9; more takes several times as long for a few percent
 
 
-class Topic(NamedTuple):
+class RecordedTopic(NamedTuple):
     """Messages of one type."""
 
     name: str  # below the prefix
@@ -42,30 +42,30 @@ class Topic(NamedTuple):
         return f"/{self.name}" if self.is_global else f"/{prefix}/{self.name}"
 
 
-PICTURES = Topic("camera/image_raw/compressed", "sensor_msgs/msg/CompressedImage")
-CAMERA_INFO = Topic("camera/camera_info", "sensor_msgs/msg/CameraInfo")
-IMU = Topic("imu", "sensor_msgs/msg/Imu")
-SPEED = Topic("speed", "geometry_msgs/msg/TwistStamped")
-SCENE = Topic("scene", "lcf_msgs/msg/Scene")
-ANNOTATIONS = Topic("annotations", image_annotations.MESSAGE)
-MARKERS = Topic("markers", markers.MESSAGE, is_stamped=False)
-TRANSFORM = Topic("tf_static", camera_transform.MESSAGE, is_global=True, is_stamped=False, is_lasting=True)
-DIAGNOSTICS = Topic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
+IMAGES = RecordedTopic("camera/image_raw/compressed", "sensor_msgs/msg/CompressedImage")
+CAMERA_INFO = RecordedTopic("camera/camera_info", "sensor_msgs/msg/CameraInfo")
+IMU = RecordedTopic("imu", "sensor_msgs/msg/Imu")
+SPEED = RecordedTopic("speed", "geometry_msgs/msg/TwistStamped")
+SCENE = RecordedTopic("scene", "lcf_msgs/msg/Scene")
+ANNOTATIONS = RecordedTopic("annotations", image_annotations.MESSAGE)
+MARKERS = RecordedTopic("markers", markers.MESSAGE, is_stamped=False)
+TRANSFORM = RecordedTopic("tf_static", camera_transform.MESSAGE, is_global=True, is_stamped=False, is_lasting=True)
+DIAGNOSTICS = RecordedTopic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray")
 
-TOPICS = (PICTURES, CAMERA_INFO, IMU, SPEED, SCENE, ANNOTATIONS, MARKERS, TRANSFORM, DIAGNOSTICS)
+TOPICS = (IMAGES, CAMERA_INFO, IMU, SPEED, SCENE, ANNOTATIONS, MARKERS, TRANSFORM, DIAGNOSTICS)
 
 
 @dataclass(frozen=True, slots=True)
-class Message:
+class RecordedMessage:
     """A message before it has its final stamp."""
 
-    topic: Topic
+    topic: RecordedTopic
     stamp_ns: int  # monotonic
     payload: bytes
 
 
 @dataclass(frozen=True, slots=True)
-class Seen:
+class FrameAndScene:
     """A picture and what was made of it."""
 
     frame: Frame
@@ -80,7 +80,7 @@ class Statuses:
     statuses: Sequence[DeviceStatus]
 
 
-Record = Seen | ImuSample | SpeedSample | Statuses
+Record = FrameAndScene | ImuSample | SpeedSample | Statuses
 
 
 class Encoder:
@@ -92,30 +92,34 @@ class Encoder:
         self._info: tuple[Config, int, int, bytes] | None = None
         self._known_setup: tuple[Config, int, int, Setup] | None = None
 
-    def encode(self, record: Record) -> Iterator[Message]:
+    def encode(self, record: Record) -> Iterator[RecordedMessage]:
         """The messages of a record. Raises ``CdrError``."""
         publish = self.config.publish
         match record:
-            case Seen(frame, scene):
-                yield Message(CAMERA_INFO, frame.stamp_ns, self._camera_info(scene.image_width, scene.image_height))
-                yield Message(PICTURES, frame.stamp_ns, self._picture(frame))
-                yield Message(SCENE, frame.stamp_ns, cdr.encode_scene(scene, publish.frame_id))
-                yield Message(ANNOTATIONS, frame.stamp_ns, encode_image_annotations(scene))
+            case FrameAndScene(frame, scene):
+                yield RecordedMessage(
+                    CAMERA_INFO, frame.stamp_ns, self._camera_info(scene.image_width, scene.image_height)
+                )
+                yield RecordedMessage(IMAGES, frame.stamp_ns, self._image(frame))
+                yield RecordedMessage(SCENE, frame.stamp_ns, cdr.encode_scene(scene, publish.frame_id))
+                yield RecordedMessage(ANNOTATIONS, frame.stamp_ns, encode_image_annotations(scene))
                 setup = self._setup(scene.image_width, scene.image_height)
-                yield Message(MARKERS, frame.stamp_ns, encode_markers(replace(scene, stamp_ns=0), setup))
+                yield RecordedMessage(MARKERS, frame.stamp_ns, encode_markers(replace(scene, stamp_ns=0), setup))
             case ImuSample():
                 # The samples are in the IMU's own axes; without a rotation these are the camera's.
                 frame_id = "imu" if self.config.imu.axes else publish.frame_id
-                yield Message(IMU, record.stamp_ns, cdr.encode_imu(0, frame_id, record.gyro, record.accel))
+                yield RecordedMessage(IMU, record.stamp_ns, cdr.encode_imu(0, frame_id, record.gyro, record.accel))
             case SpeedSample(stamp_ns, speed_mps, yaw_rate_radps):
-                yield Message(SPEED, stamp_ns, cdr.encode_twist_stamped(0, "base_link", speed_mps, yaw_rate_radps))
+                yield RecordedMessage(
+                    SPEED, stamp_ns, cdr.encode_twist_stamped(0, "base_link", speed_mps, yaw_rate_radps)
+                )
             case Statuses(stamp_ns, statuses):
-                yield Message(DIAGNOSTICS, stamp_ns, cdr.encode_diagnostics(0, publish.robot, statuses))
+                yield RecordedMessage(DIAGNOSTICS, stamp_ns, cdr.encode_diagnostics(0, publish.robot, statuses))
                 camera = self.config.camera
                 place = Setup.from_config(self.config, Lens.from_config(camera, camera.width, camera.height))
-                yield Message(TRANSFORM, stamp_ns, encode_camera_transform(0, place))
+                yield RecordedMessage(TRANSFORM, stamp_ns, encode_camera_transform(0, place))
 
-    def _picture(self, frame: Frame) -> bytes:
+    def _image(self, frame: Frame) -> bytes:
         record = self.config.record
         flags = {
             "jpeg": (cv2.IMWRITE_JPEG_QUALITY, record.jpeg_quality),

@@ -1,6 +1,6 @@
 """How ``ros2 bag play`` is to publish a topic: what rosbag2 finds in the channel as ``offered_qos_profiles`` (YAML)."""
 
-from lcf_edge.recording.write.messages import Topic
+from lcf_edge.recording.write.messages import RecordedTopic
 
 # In numbers, as every version of rosbag2 reads them; 2147483647 s is for ever.
 _RELIABLE, _VOLATILE, _TRANSIENT_LOCAL, _KEEP_LAST, _AUTOMATIC = 1, 2, 1, 1, 1
@@ -8,7 +8,7 @@ _DEPTH = 10
 _FOR_EVER = "sec: 2147483647\n    nsec: 4294967295"
 
 
-def offered_qos(topic: Topic) -> str:
+def offered_qos(topic: RecordedTopic) -> str:
     """Reliable; a lasting topic keeps its last message for late subscribers."""
     return (
         f"- history: {_KEEP_LAST}\n"

@@ -9,7 +9,7 @@ from mcap.writer import CompressionType, Writer
 from lcf_edge import __version__
 from lcf_edge.cdr import restamped
 from lcf_edge.config.attached import IN_RECORDING
-from lcf_edge.recording.write.messages import TOPICS, Message
+from lcf_edge.recording.write.messages import TOPICS, RecordedMessage
 from lcf_edge.recording.write.qos import offered_qos
 from lcf_edge.recording.write.schemas import ENCODING, schema
 
@@ -66,7 +66,7 @@ class RecordingFile:
         stamp_ns = _written(now_ns + self._offset_ns)
         self._writer.add_attachment(stamp_ns, stamp_ns, IN_RECORDING, "application/toml", config_text.encode())
 
-    def add(self, message: Message) -> None:
+    def add(self, message: RecordedMessage) -> None:
         """Append a message. Raises ``CdrError`` when its stamp is none."""
         stamp_ns = message.stamp_ns + self._offset_ns
         payload = restamped(message.payload, stamp_ns) if message.topic.is_stamped else message.payload

@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from lcf_edge.recording.write.messages import Message
+from lcf_edge.recording.write.messages import RecordedMessage
 
 
 class Ring:
@@ -11,9 +11,9 @@ class Ring:
     def __init__(self, before_s: float) -> None:
         self.bytes = 0
         self._before_ns = round(before_s * 1e9)
-        self._messages: deque[Message] = deque()
+        self._messages: deque[RecordedMessage] = deque()
 
-    def add(self, message: Message, limit_bytes: int) -> None:
+    def add(self, message: RecordedMessage, limit_bytes: int) -> None:
         """Keep a message; then no more than ``limit_bytes`` are kept."""
         self._messages.append(message)
         self.bytes += size_bytes(message)
@@ -22,7 +22,7 @@ class Ring:
         ):
             self.bytes -= size_bytes(self._messages.popleft())
 
-    def take(self) -> list[Message]:
+    def take(self) -> list[RecordedMessage]:
         """All that it keeps, oldest first."""
         messages = list(self._messages)
         self._messages.clear()
@@ -30,6 +30,6 @@ class Ring:
         return messages
 
 
-def size_bytes(message: Message) -> int:
+def size_bytes(message: RecordedMessage) -> int:
     """What a message takes in memory, with the objects that hold it."""
     return len(message.payload) + 256

@@ -31,7 +31,7 @@ from drivers.errors import (
 )
 from drivers.samples import Frame
 from hil_mocks.libcamera_device import MODES, World, command
-from hil_mocks.v4l2_device import picture
+from hil_mocks.v4l2_device import drawn_image
 
 SIZE = {"width": 160, "height": 120, "fps": 30.0}
 
@@ -68,8 +68,8 @@ def read_until_error(camera: LibcameraCamera) -> DriverError:
 
 def started(world: World) -> dict[str, Any]:
     """With which mode and controls the camera was started."""
-    told: dict[str, Any] = json.loads(Path(world.told_in).read_text(encoding="utf-8"))
-    return told
+    started_with: dict[str, Any] = json.loads(Path(world.log_path).read_text(encoding="utf-8"))
+    return started_with
 
 
 class TestPictures:
@@ -80,7 +80,7 @@ class TestPictures:
     def test_luminance_arrives_as_the_camera_saw_it(self, open_camera: Open, offered: str, padding: int) -> None:
         camera = open_camera(World(formats=(offered,), padding=padding))
         for frame in take(camera, 3):
-            assert np.array_equal(frame.image, picture(frame.seq, 160, 120))
+            assert np.array_equal(frame.image, drawn_image(frame.seq, 160, 120))
 
     def test_the_cheapest_format_is_taken(self, open_camera: Open) -> None:
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420"))).mode.pixel_format == "YU12"
@@ -167,14 +167,14 @@ class TestField:
     def test_the_mode_that_sees_the_most_at_the_rate(
         self, open_camera: Open, tmp_path: Path, fps: float, mode: tuple[int, int]
     ) -> None:
-        world = World(told_in=str(tmp_path / "started"))
+        world = World(log_path=str(tmp_path / "started"))
         open_camera(world, width=640, height=480, fps=fps)
         read_first = started_when_there(world)
         assert tuple(read_first["mode"]) == mode
         assert read_first["FrameDurationLimits"] == [round(1e6 / fps)] * 2
 
     def test_left_alone_it_would_have_been_a_part_of_the_picture(self, open_camera: Open, tmp_path: Path) -> None:
-        world = World(told_in=str(tmp_path / "started"), chooses_modes=False)
+        world = World(log_path=str(tmp_path / "started"), chooses_modes=False)
         open_camera(world, width=640, height=480)
         assert MODES[tuple(started_when_there(world)["mode"])][0] == (1280, 960)
 
@@ -185,7 +185,7 @@ class TestField:
 
 def started_when_there(world: World) -> dict[str, Any]:
     """The stream starts right after its being granted was told."""
-    while not Path(world.told_in).exists() or not Path(world.told_in).read_text(encoding="utf-8"):
+    while not Path(world.log_path).exists() or not Path(world.log_path).read_text(encoding="utf-8"):
         os.sched_yield()
     return started(world)
 
@@ -194,30 +194,38 @@ class TestSettings:
     """What is locked, and what is refused."""
 
     def test_what_is_not_locked_is_automatic(self, open_camera: Open, tmp_path: Path) -> None:
-        world = World(told_in=str(tmp_path / "started"))
+        world = World(log_path=str(tmp_path / "started"))
         open_camera(world)
-        told = started_when_there(world)
-        assert told["AeEnable"] is True
-        assert not {"ExposureTime", "AnalogueGain", "AeFlickerMode"} & set(told)
+        started_with = started_when_there(world)
+        assert started_with["AeEnable"] is True
+        assert not {"ExposureTime", "AnalogueGain", "AeFlickerMode"} & set(started_with)
 
     def test_locks(self, open_camera: Open, tmp_path: Path) -> None:
-        world = World(told_in=str(tmp_path / "started"))
+        world = World(log_path=str(tmp_path / "started"))
         open_camera(world, exposure_s=0.008, gain=2, power_line_hz=50)
-        told = started_when_there(world)
-        assert (told["ExposureTime"], told["AnalogueGain"], told["AeEnable"]) == (8000, 2.0, False)
-        assert (told["AeFlickerMode"], told["AeFlickerPeriod"]) == (1, 10_000)
+        started_with = started_when_there(world)
+        assert (started_with["ExposureTime"], started_with["AnalogueGain"], started_with["AeEnable"]) == (
+            8000,
+            2.0,
+            False,
+        )
+        assert (started_with["AeFlickerMode"], started_with["AeFlickerPeriod"]) == (1, 10_000)
 
     def test_locks_of_newer_releases_are_modes(self, open_camera: Open, tmp_path: Path) -> None:
-        world = World(told_in=str(tmp_path / "started"), newer=True)
+        world = World(log_path=str(tmp_path / "started"), newer=True)
         open_camera(world, exposure_s=0.008)
-        told = started_when_there(world)
-        assert (told["ExposureTime"], told["ExposureTimeMode"], told["AnalogueGainMode"]) == (8000, 1, 0)
+        started_with = started_when_there(world)
+        assert (started_with["ExposureTime"], started_with["ExposureTimeMode"], started_with["AnalogueGainMode"]) == (
+            8000,
+            1,
+            0,
+        )
 
     def test_autofocus_is_off_and_the_lens_at_its_default(self, open_camera: Open, tmp_path: Path) -> None:
-        world = World(told_in=str(tmp_path / "started"), focuses=True)
+        world = World(log_path=str(tmp_path / "started"), focuses=True)
         open_camera(world)
-        told = started_when_there(world)
-        assert (told["AfMode"], told["LensPosition"]) == (0, 1.0)
+        started_with = started_when_there(world)
+        assert (started_with["AfMode"], started_with["LensPosition"]) == (0, 1.0)
 
     @pytest.mark.parametrize(
         ("setting", "text"),

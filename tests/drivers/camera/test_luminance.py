@@ -7,10 +7,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.camera.luminance import PIXEL_FORMATS, FrameError, least_stride, luminance
-from hil_mocks.v4l2_device import encode, picture
+from hil_mocks.v4l2_device import drawn_image, encode
 
 WIDTH, HEIGHT = 64, 48
-IMAGE = picture(7, WIDTH, HEIGHT)
+IMAGE = drawn_image(7, WIDTH, HEIGHT)
 BAYER = PIXEL_FORMATS[PIXEL_FORMATS.index("MJPG") + 1 :]
 SEPARATE = ("NM12", "NM21", "NM16", "NM61", "YM12", "YM21")  # luminance has a buffer of its own
 RAW = tuple(name for name in PIXEL_FORMATS if name not in {"MJPG", *BAYER})
@@ -108,7 +108,7 @@ def test_too_few_bytes_are_refused(pixel_format: str) -> None:
         (JPEG[2:], "corrupt"),
         (b"\xff\xd8" + bytes(1000), "corrupt"),
         (JPEG[: len(JPEG) // 2] + b"\xff\xe1" + JPEG[len(JPEG) // 2 :], "corrupt"),
-        (encode(picture(7, 2 * WIDTH, HEIGHT), "MJPG"), "wrong size"),
+        (encode(drawn_image(7, 2 * WIDTH, HEIGHT), "MJPG"), "wrong size"),
     ],
     ids=["nothing", "cut off", "without its end", "without its start", "zeros", "a lost packet", "another size"],
 )

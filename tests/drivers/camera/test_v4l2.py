@@ -25,7 +25,7 @@ from drivers.errors import (
     WrongDeviceError,
 )
 from drivers.samples import Frame
-from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel, picture
+from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel, drawn_image
 from hil_mocks.virtual_clock import VirtualClock
 
 PATH = "/dev/video0"
@@ -106,16 +106,16 @@ class TestPictures:
         webcam.modes = {pixel_format: {(640, 480): (30.0,)}}
         webcam.row_padding = 64 * (pixel_format != "NV12")
         first, second = take(open_camera(pixel_format=pixel_format), 2)
-        assert np.array_equal(first.image, picture(0, 640, 480))
-        assert np.array_equal(second.image, picture(1, 640, 480))
+        assert np.array_equal(first.image, drawn_image(0, 640, 480))
+        assert np.array_equal(second.image, drawn_image(1, 640, 480))
 
     def test_jpegs_are_decoded(self, open_camera: Open) -> None:
         frame = take(open_camera(pixel_format="MJPG"), 1)[0]
-        assert np.abs(frame.image.astype(int) - picture(0, 640, 480)).max() < 10
+        assert np.abs(frame.image.astype(int) - drawn_image(0, 640, 480)).max() < 10
 
     def test_a_picture_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         frames = take(open_camera(), 2 * BUFFERS)
-        assert all(np.array_equal(frame.image, picture(n, 640, 480)) for n, frame in enumerate(frames))
+        assert all(np.array_equal(frame.image, drawn_image(n, 640, 480)) for n, frame in enumerate(frames))
 
     def test_stamps_are_the_kernels_and_numbers_count_without_gaps(
         self, open_camera: Open, clock: VirtualClock
@@ -190,11 +190,11 @@ class TestMultiPlanar:
         camera = open_camera()
         assert camera.mode.pixel_format == "NM12"
         for number, frame in enumerate(take(camera, 6)):
-            assert np.array_equal(frame.image, picture(number, 640, 480))
+            assert np.array_equal(frame.image, drawn_image(number, 640, 480))
 
     def test_formats_in_one_memory_are_read_as_well(self, open_camera: Open) -> None:
         frame = take(open_camera(pixel_format="YUYV"), 1)[0]
-        assert np.array_equal(frame.image, picture(0, 640, 480))
+        assert np.array_equal(frame.image, drawn_image(0, 640, 480))
 
     def test_half_a_picture_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.short = 1
@@ -242,7 +242,7 @@ class TestNewest:
         clock.sleep_s(5.0)
         (frame,) = take(camera, 1)
         exposed = round((clock.monotonic_ns() - VirtualClock().monotonic_ns()) * 30 / 1e9 - webcam.transfer)
-        assert np.array_equal(frame.image, picture(exposed, 640, 480))
+        assert np.array_equal(frame.image, drawn_image(exposed, 640, 480))
 
     def test_being_away_is_not_a_stall(self, open_camera: Open, clock: VirtualClock) -> None:
         camera = open_camera()
@@ -324,7 +324,7 @@ class TestBadPictures:
     def test_what_the_kernel_flags_is_corrupt(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera()
         webcam.flag_error = 2
-        assert np.array_equal(take(camera, 1)[0].image, picture(2, 640, 480))
+        assert np.array_equal(take(camera, 1)[0].image, drawn_image(2, 640, 480))
         assert counted(camera) == {"corrupt": 2}
 
     @pytest.mark.parametrize(("pixel_format", "reason"), [("YUYV", "short"), ("MJPG", "corrupt")])
@@ -339,7 +339,7 @@ class TestBadPictures:
     def test_a_picture_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera(pixel_format="MJPG")
         take(camera, 1)
-        webcam.pictures = lambda seq, _width, _height: picture(seq, 320, 240)
+        webcam.images = lambda seq, _width, _height: drawn_image(seq, 320, 240)
         assert camera.read() == []
         assert counted(camera) == {"wrong size": 1}
 
@@ -375,7 +375,7 @@ class TestSettings:
         camera = open_camera(width=640, height=480)
         assert (camera.mode.pixel_format, camera.mode.reduction) == ("MJPG", reduction)
         image = take(camera, 1)[0].image
-        assert np.abs(image.astype(int) - picture(0, 640, 480)).max() < 8
+        assert np.abs(image.astype(int) - drawn_image(0, 640, 480)).max() < 8
 
     def test_a_jpeg_that_is_no_multiple_is_not_bent_to_fit(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.modes = {"MJPG": {(1280, 720): (30.0,)}}
@@ -383,7 +383,7 @@ class TestSettings:
             open_camera(width=640, height=480)
 
     @pytest.mark.parametrize(
-        ("settings", "told"),
+        ("settings", "message"),
         [
             ({"width": 123, "height": 77}, ["123x77", "YUYV: ", "640x480 (30, 15/s)", "1280x720 (10/s)"]),
             ({"fps": 17}, ["at 17/s", "(30, 15/s)"]),
@@ -392,11 +392,11 @@ class TestSettings:
         ids=["size", "rate", "format"],
     )
     def test_what_is_not_offered_is_refused_with_what_is(
-        self, open_camera: Open, settings: dict[str, object], told: list[str]
+        self, open_camera: Open, settings: dict[str, object], message: list[str]
     ) -> None:
         with pytest.raises(UnsupportedSettingError) as caught:
             open_camera(**settings)
-        assert all(part in str(caught.value) for part in told)
+        assert all(part in str(caught.value) for part in message)
         assert "\n" not in str(caught.value)
 
     def test_a_size_that_is_offered_but_not_granted_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
@@ -448,16 +448,16 @@ class TestSettings:
         assert webcam.controls[v4l2.CID_POWER_LINE_FREQUENCY].value == 2
 
     @pytest.mark.parametrize(
-        ("settings", "told"),
+        ("settings", "message"),
         [
             ({"exposure_s": 10.0}, "choose 3 to 2047"),
             ({"gain": 256}, "choose 0 to 255"),
         ],
     )
     def test_a_value_out_of_range_is_refused_with_the_range(
-        self, open_camera: Open, settings: dict[str, object], told: str
+        self, open_camera: Open, settings: dict[str, object], message: str
     ) -> None:
-        with pytest.raises(UnsupportedSettingError, match=told):
+        with pytest.raises(UnsupportedSettingError, match=message):
             open_camera(**settings)
 
     def test_a_value_that_becomes_another_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
@@ -492,7 +492,7 @@ class TestNames:
 
     @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
     @pytest.mark.parametrize("name", [PATH, "rp1-cfe"])
-    def test_a_ribbon_cable_camera_is_told_at_once_with_the_remedy(
+    def test_a_ribbon_cable_camera_is_reported_at_once_with_the_remedy(
         self, open_camera: Open, kernel: MockKernel, clock: VirtualClock, name: str, interface: int
     ) -> None:
         kernel.unplug(PATH)
@@ -558,7 +558,7 @@ class TestNames:
         take(open_camera("Mock Webcam"), 1)
 
     @pytest.mark.parametrize("name", ["C920", "/dev/video9", "/dev/v4l/by-id/other"])
-    def test_a_camera_that_is_not_there_is_told_with_those_that_are(self, open_camera: Open, name: str) -> None:
+    def test_a_camera_that_is_not_there_is_reported_with_those_that_are(self, open_camera: Open, name: str) -> None:
         with pytest.raises(DeviceMissingError, match=rf"{name}: no .*found: /dev/video0 \(Mock Webcam\)"):
             open_camera(name)
 

@@ -105,11 +105,11 @@ def test_a_cards_name_is_printable_text() -> None:
         (errno.EIO, DeviceLostError, "cable"),
     ],
 )
-def test_the_kernels_error_numbers_are_told_with_a_remedy(number: int, kind: type, remedy: str) -> None:
-    told = driver_error("/dev/video7", OSError(number, os.strerror(number)))
-    assert type(told) is kind
-    assert str(told).startswith("/dev/video7: ")
-    assert remedy in str(told)
+def test_the_kernels_error_numbers_are_reported_with_a_remedy(number: int, kind: type, remedy: str) -> None:
+    error = driver_error("/dev/video7", OSError(number, os.strerror(number)))
+    assert type(error) is kind
+    assert str(error).startswith("/dev/video7: ")
+    assert remedy in str(error)
 
 
 class TestLinuxKernel:

@@ -28,7 +28,7 @@ def test_the_accelerometer_is_found_at_its_other_address(rig: RigMaker) -> None:
     assert bench.read_for(0.2)
 
 
-def test_an_accelerometer_that_is_not_there_is_told(rig: RigMaker) -> None:
+def test_an_accelerometer_that_is_not_there_is_reported(rig: RigMaker) -> None:
     bench = rig("bmi088")
     del bench.wire.chips[0x18]
     with pytest.raises(DeviceMissingError, match=r"its accelerometer is neither at 0x18 nor at 0x19; check the wiring"):

@@ -15,16 +15,16 @@ from hil_mocks.i2c.bmi import Bmi270
 RigMaker = Callable[..., Any]
 
 
-def test_a_missing_file_is_told(rig: RigMaker, tmp_path: Path) -> None:
+def test_a_missing_file_is_reported(rig: RigMaker, tmp_path: Path) -> None:
     bench = rig("bmi270")
     bench.firmware = tmp_path / "nothing.fw"
-    with pytest.raises(FirmwareError) as told:
+    with pytest.raises(FirmwareError) as raised:
         bench.open()
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"{tmp_path}/nothing.fw: cannot be read (No such file or directory);"
         " put Bosch's bmi270-init-data.fw there (see docs/imus.md) or set imu.firmware"
     )
-    assert not told.value.retry
+    assert not raised.value.retry
     assert bench.wire.closed
 
 
@@ -46,7 +46,7 @@ def test_the_documents_recipe_makes_the_file_of_boschs_source(rig: RigMaker, tmp
 
 
 @pytest.mark.parametrize("size", [0, 8191, 8193, 100_000])
-def test_a_file_of_another_size_is_told(rig: RigMaker, tmp_path: Path, size: int) -> None:
+def test_a_file_of_another_size_is_reported(rig: RigMaker, tmp_path: Path, size: int) -> None:
     bench = rig("bmi270")
     bench.firmware = tmp_path / "other.fw"
     bench.firmware.write_bytes(bytes(size))
@@ -54,7 +54,7 @@ def test_a_file_of_another_size_is_told(rig: RigMaker, tmp_path: Path, size: int
         bench.open()
 
 
-def test_a_file_that_the_chip_refuses_is_told(rig: RigMaker, tmp_path: Path) -> None:
+def test_a_file_that_the_chip_refuses_is_reported(rig: RigMaker, tmp_path: Path) -> None:
     bench = rig("bmi270")
     bench.firmware = tmp_path / "other.fw"
     bench.firmware.write_bytes(Bmi270.firmware[::-1])

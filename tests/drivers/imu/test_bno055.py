@@ -92,7 +92,9 @@ def test_a_system_error_is_mended_by_a_reset(rig: RigMaker) -> None:
     assert bench.chip.registers[0x39] == 5
 
 
-def test_a_chip_that_never_comes_back_from_its_reset_is_told(rig: RigMaker, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_chip_that_never_comes_back_from_its_reset_is_reported(
+    rig: RigMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr("hil_mocks.i2c.bno055.BOOT_S", 60.0)
     bench = rig("bno055")
     bench.read_for(0.5)

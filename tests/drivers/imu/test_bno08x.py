@@ -46,7 +46,7 @@ def test_the_rate_is_as_asked_up_to_400(rig: RigMaker, asked_hz: float, granted_
 
 
 @pytest.mark.parametrize(("axis", "sign"), [(0, 1), (1, -1), (5, 1)])
-def test_an_axis_at_the_end_of_its_range_is_told(rig: RigMaker, axis: int, sign: int) -> None:
+def test_an_axis_at_the_end_of_its_range_is_reported(rig: RigMaker, axis: int, sign: int) -> None:
     values = [0.0] * 6
     values[axis] = sign * (50.0 if axis < 3 else 100.0)
     bench = rig("bno08x", motion=lambda _: (tuple(values[:3]), tuple(values[3:])))
@@ -74,7 +74,7 @@ def test_one_that_resets_itself_is_asked_anew_and_counted(bench: Any) -> None:
         assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.01)
 
 
-def test_one_that_says_nothing_is_asked_again_and_at_last_told(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_one_that_says_nothing_is_asked_again_and_at_last_reported(bench: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     asked = []
     monkeypatch.setattr(bench.chip, "send", lambda data: asked.append(data) or b"")
     with pytest.raises(DeviceStalledError, match="answers, but has no samples; switch its supply off and on"):
@@ -138,7 +138,7 @@ def test_unplugged_and_plugged_in_again_it_comes_back(bench: Any) -> None:
     assert bench.clock.monotonic_ns() - plugged_ns < 2.5e9
 
 
-def test_nobody_at_the_address_is_told_with_who_else_is_there(bench: Any) -> None:
+def test_nobody_at_the_address_is_reported_with_who_else_is_there(bench: Any) -> None:
     bench.wire.chips = {0x4B: bench.chip}
     with pytest.raises(DeviceMissingError, match=r"no such chip at 0x4a \(BNO08x\); there is 0x4b; set imu\.address"):
         bench.open()
@@ -152,7 +152,7 @@ def test_a_bus_that_hangs_is_given_up(bench: Any) -> None:
         bench.device.read()
 
 
-def test_a_range_that_it_does_not_have_is_told(rig: RigMaker) -> None:
+def test_a_range_that_it_does_not_have_is_reported(rig: RigMaker) -> None:
     with pytest.raises(UnsupportedSettingError, match=r"has no range 16; set imu\.accel_range_g to one of 2, 4, 8"):
         rig("bno08x", settings=ImuSettings(accel_range_g=16)).open()
 

@@ -33,7 +33,7 @@ def test_the_time_may_be_left_out() -> None:
     assert reading == Reading((0.01, -0.02, 0.5), (0.1, -9.8, 1.0))
 
 
-def test_an_axis_out_of_its_range_is_told_after_the_last_number() -> None:
+def test_an_axis_out_of_its_range_is_reported_after_the_last_number() -> None:
     clipped, _ = lines("1,0,0,0,0,0,9.8,1\n2,0,0,0,0,0,9.8,0\n")
 
     assert [reading.saturated for reading in clipped] == [True, False]

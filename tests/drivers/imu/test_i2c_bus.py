@@ -16,17 +16,17 @@ from hil_mocks.virtual_clock import VirtualClock
 NOBODY = 65534
 
 
-def test_a_missing_bus_is_told_with_those_that_are_there(tmp_path: Path) -> None:
+def test_a_missing_bus_is_reported_with_those_that_are_there(tmp_path: Path) -> None:
     for number in (0, 10):
         (tmp_path / f"i2c-{number}").touch()
-    with pytest.raises(DeviceMissingError) as told:
+    with pytest.raises(DeviceMissingError) as raised:
         I2cBus(1, dev=tmp_path)
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"{tmp_path}/i2c-1: no such bus; there is {tmp_path}/i2c-0, {tmp_path}/i2c-10; set imu.bus"
     )
 
 
-def test_no_bus_at_all_is_told(tmp_path: Path) -> None:
+def test_no_bus_at_all_is_reported(tmp_path: Path) -> None:
     with pytest.raises(DeviceMissingError, match="no such bus; there is none at all; enable I2C and load i2c-dev"):
         I2cBus(1, dev=tmp_path)
 
@@ -47,7 +47,7 @@ def test_a_bus_without_permission_names_the_group(forbidden: Path) -> None:
         I2cBus(1, dev=forbidden)
 
 
-def test_what_is_no_bus_is_told_and_closed(tmp_path: Path) -> None:
+def test_what_is_no_bus_is_reported_and_closed(tmp_path: Path) -> None:
     (tmp_path / "i2c-1").touch()
     before = set(os.listdir("/proc/self/fd"))  # noqa: PTH208 descriptors, not files
     with pytest.raises(DeviceLostError, match=r"i2c-1: cannot be opened .*; is it an I2C bus\?"):
@@ -74,7 +74,7 @@ def test_scan_ends_when_the_bus_hangs() -> None:
     assert wire.transfers == 1
 
 
-def test_a_bus_without_block_transfers_is_told() -> None:
+def test_a_bus_without_block_transfers_is_reported() -> None:
     wire = wire_with(0x68)
     wire.fail(errno.EOPNOTSUPP)
     with pytest.raises(UnsupportedSettingError, match="no I2C block transfers; use another bus"):

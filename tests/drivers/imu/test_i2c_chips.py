@@ -149,7 +149,7 @@ RANGE_OF_4_G = {"bmi088": 6}  # of those that have no range of 4 g
 
 @every_chip
 @pytest.mark.parametrize(("axis", "sign"), [(0, 1), (1, -1), (5, 1)])
-def test_an_axis_at_the_end_of_its_range_is_told(rig: RigMaker, driver: str, axis: int, sign: int) -> None:
+def test_an_axis_at_the_end_of_its_range_is_reported(rig: RigMaker, driver: str, axis: int, sign: int) -> None:
     values = [0.0] * 6
     values[axis] = sign * (50.0 if axis < 3 else 100.0)
     bench = rig(driver, motion=lambda _: (tuple(values[:3]), tuple(values[3:])))
@@ -244,7 +244,7 @@ def test_the_whole_6500_family_is_known(rig: RigMaker, driver: str, identity: in
         ("lsm6dso", 0x6B, "ism330dhcx"),
     ],
 )
-def test_a_relative_is_told_with_its_driver(rig: RigMaker, driver: str, identity: int, remedy: str) -> None:
+def test_a_relative_is_reported_with_its_driver(rig: RigMaker, driver: str, identity: int, remedy: str) -> None:
     bench = rig(driver)
     bench.chip.registers[registry.DRIVERS[driver].load().identity_register] = identity
     with pytest.raises(WrongDeviceError, match=rf"says 0x{identity:02x}, .*; set imu\.driver to {remedy}$"):
@@ -304,7 +304,7 @@ def test_closing_lets_the_bus_go_and_may_happen_twice(rig: RigMaker) -> None:
         bench.device.read()
 
 
-def test_unknown_chip_is_told_with_the_known_ones() -> None:
+def test_unknown_chip_is_reported_with_the_known_ones() -> None:
     with pytest.raises(UnsupportedSettingError, match=r"nosuch: no such chip; set imu\.driver to one of mpu6050, "):
         chip_on(I2cBus(1, SimulatedBus(VirtualClock(), {})), "nosuch")
 
@@ -313,9 +313,9 @@ def test_unknown_chip_is_told_with_the_known_ones() -> None:
 def test_by_hand_without_a_bus_says_so_in_one_line(driver: str, capsys: pytest.CaptureFixture[str]) -> None:
     main = import_module(f"drivers.imu.{driver}").main
     assert main(["--bus", "217", "--address", "0x69"]) == 1
-    told = capsys.readouterr()
-    assert (told.out, told.err.count("\n")) == ("", 1)
-    assert told.err.startswith("/dev/i2c-217: no such bus; ")
+    output = capsys.readouterr()
+    assert (output.out, output.err.count("\n")) == ("", 1)
+    assert output.err.startswith("/dev/i2c-217: no such bus; ")
 
 
 def test_by_hand_it_tells_rate_and_values(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -158,18 +158,18 @@ def test_a_fifo_whose_reads_always_fail_is_stalled(rig: RigMaker, driver: str) -
 
 
 @every_chip
-def test_nobody_at_the_address_is_told_with_who_else_is_there(rig: RigMaker, driver: str) -> None:
+def test_nobody_at_the_address_is_reported_with_who_else_is_there(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
     bench.wire.chips = {0x29: bench.chip, 0x76: bench.chip}
-    with pytest.raises(DeviceMissingError) as told:
+    with pytest.raises(DeviceMissingError) as raised:
         bench.open()
     address = MODELS[driver].address
-    assert str(told.value).startswith(f"/dev/i2c-1: no such chip at 0x{address:02x} (")
-    assert str(told.value).endswith("); there is 0x29, 0x76; set imu.address")
+    assert str(raised.value).startswith(f"/dev/i2c-1: no such chip at 0x{address:02x} (")
+    assert str(raised.value).endswith("); there is 0x29, 0x76; set imu.address")
     assert bench.wire.closed
 
 
-def test_an_empty_bus_is_told(rig: RigMaker) -> None:
+def test_an_empty_bus_is_reported(rig: RigMaker) -> None:
     bench = rig()
     bench.wire.chips.clear()
     with pytest.raises(
@@ -179,7 +179,7 @@ def test_an_empty_bus_is_told(rig: RigMaker) -> None:
 
 
 @every_chip
-def test_another_chip_at_the_address_is_told(rig: RigMaker, driver: str) -> None:
+def test_another_chip_at_the_address_is_reported(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
     other = rig("mpu6050" if bench.chip.address == 0x6A else "lsm6ds3").chip
     bench.wire.chips = {bench.chip.address: other}
@@ -187,7 +187,7 @@ def test_another_chip_at_the_address_is_told(rig: RigMaker, driver: str) -> None
         bench.open()
 
 
-def test_a_chip_that_the_kernel_owns_is_told(rig: RigMaker) -> None:
+def test_a_chip_that_the_kernel_owns_is_reported(rig: RigMaker) -> None:
     bench = rig()
     bench.wire.owned_by_kernel.add(0x68)
     with pytest.raises(DeviceBusyError, match=r"a kernel driver owns it; set imu.driver to iio"):
@@ -201,13 +201,13 @@ def test_another_address_can_be_set(rig: RigMaker) -> None:
     assert bench.read_for(0.1)
 
 
-def test_a_range_that_no_chip_has_is_told(rig: RigMaker) -> None:
+def test_a_range_that_no_chip_has_is_reported(rig: RigMaker) -> None:
     with pytest.raises(UnsupportedSettingError, match=r"set imu.gyro_range_dps to one of 250, 500, 1000, 2000"):
         rig(settings=ImuSettings(gyro_range_dps=300)).open()
 
 
 @every_fifo_chip
-def test_a_chip_that_does_not_keep_a_setting_is_told(
+def test_a_chip_that_does_not_keep_a_setting_is_reported(
     rig: RigMaker, driver: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     bench = rig(driver)
@@ -348,14 +348,14 @@ def test_a_twin_that_says_the_same_of_itself_is_known_by_gravity_at_rest(
     bench = rig(driver, motion=at_rest)
     bench.wire.chips = {0x6A: rig(model, motion=at_rest).chip}
     bench.wire.chips[0x6A]._clock = bench.clock
-    with pytest.raises(WrongDeviceError) as told:
+    with pytest.raises(WrongDeviceError) as raised:
         bench.read_for(1.5)
-    assert str(told.value) == (
+    assert str(raised.value) == (
         f"{bench.device.name}: measures {gravity:.2f} g at rest instead of 1 g; set imu.driver to {model}"
     )
 
 
-def test_a_broken_accelerometer_is_told(rig: RigMaker) -> None:
+def test_a_broken_accelerometer_is_reported(rig: RigMaker) -> None:
     bench = rig("lsm6dso", motion=lambda _: ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
     with pytest.raises(WrongDeviceError, match=r"0\.00 g at rest instead of 1 g; its accelerometer is broken"):
         bench.read_for(1.5)

@@ -175,18 +175,18 @@ def test_a_device_is_found_by_name_by_folder_or_by_its_gyro(tree: Tree, device: 
     assert polled(root, VirtualClock(), device).name == "bmi160 (iio:device3)"
 
 
-def test_a_missing_device_is_told_with_those_that_are_there(tree: Tree) -> None:
+def test_a_missing_device_is_reported_with_those_that_are_there(tree: Tree) -> None:
     root = tree()
     with pytest.raises(DeviceMissingError, match=r"bmi160: no such device under .*; there is mpu6050 \(iio:device0\)"):
         polled(root, VirtualClock(), "bmi160")
 
 
-def test_no_device_at_all_is_told(tmp_path: Path) -> None:
+def test_no_device_at_all_is_reported(tmp_path: Path) -> None:
     with pytest.raises(DeviceMissingError, match="there is no gyro at all; is the kernel's driver loaded"):
         polled(tmp_path, VirtualClock())
 
 
-def test_a_gyro_alone_is_told(tree: Tree) -> None:
+def test_a_gyro_alone_is_reported(tree: Tree) -> None:
     root = tree()
     (root / "iio:device0/in_accel_x_raw").unlink()
     with pytest.raises(WrongDeviceError, match="has no accelerometer"):
@@ -202,7 +202,7 @@ def test_a_gyro_alone_is_told(tree: Tree) -> None:
         ({"sampling_frequency": "\xff\xfe"}, WrongDeviceError),
     ],
 )
-def test_attributes_that_make_no_sense_are_told(tree: Tree, files: dict[str, str], error: type[Exception]) -> None:
+def test_attributes_that_make_no_sense_are_reported(tree: Tree, files: dict[str, str], error: type[Exception]) -> None:
     root = tree(files=files)
     with pytest.raises(error):
         polled(root, VirtualClock())
@@ -377,13 +377,13 @@ def test_without_any_trigger_the_values_are_polled(tree: Tree) -> None:
 
 
 @pytest.mark.usefixtures("pipe")
-def test_a_type_that_is_unknown_is_told(tree: Tree) -> None:
+def test_a_type_that_is_unknown_is_reported(tree: Tree) -> None:
     with pytest.raises(UnsupportedSettingError, match="in_accel_y has the unknown type be:f16/16>>0"):
         buffered(tree(files={**BUFFER, "scan_elements/in_accel_y_type": "be:f16/16>>0"}))
 
 
 @pytest.mark.usefixtures("pipe")
-def test_no_scans_are_told_as_a_stall(tree: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_scans_are_reported_as_a_stall(tree: Tree, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(iio, "STALL_S", 0.01)
     device = buffered(tree(files={**BUFFER, "sampling_frequency_available": "200"}))
     with pytest.raises(DeviceStalledError, match=r"no scan for 0\.05 s"):

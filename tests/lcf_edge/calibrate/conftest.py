@@ -78,7 +78,7 @@ class Studio:
         """Of the board, m."""
         return np.asarray((self.board.places.min(axis=0) + self.board.places.max(axis=0)) / 2, np.float64)
 
-    def picture(self, turn: Floats, shift: Floats, seed: int = 0) -> Grey:
+    def image(self, turn: Floats, shift: Floats, seed: int = 0) -> Grey:
         """The board with its middle at ``shift`` (3,) m, turned by ``turn`` (3, 3)."""
         plane = np.column_stack([turn[:, 0], turn[:, 1], shift - turn @ self.middle])
         at = self._rays @ np.linalg.inv(plane).T
@@ -115,7 +115,7 @@ class Studio:
     def views(self, count: int) -> list[Frame]:
         """Pictures of the board in different poses."""
         return [
-            Frame(START_NS + seq * 10**9, seq, self.picture(turn, shift, seq))
+            Frame(START_NS + seq * 10**9, seq, self.image(turn, shift, seq))
             for seq, (turn, shift) in enumerate(self.poses(count))
         ]
 

@@ -106,16 +106,16 @@ def swinging(times_s: Floats) -> Floats:
 
 
 @pytest.mark.parametrize(
-    ("told", "change"),
+    ("message", "change"),
     [
         ("turned too little", {"angles": only(0, 0.02)}),
         ("several offsets", {"angles": swinging}),
         ("apart by more than 0.5 s", {"offset_s": 0.53}),
     ],
 )
-def test_motion_that_tells_nothing_is_refused(turntable: Make, told: str, change: dict[str, Any]) -> None:
+def test_motion_that_tells_nothing_is_refused(turntable: Make, message: str, change: dict[str, Any]) -> None:
     table = turntable(**change)
-    with pytest.raises(CalibrationError, match=told):
+    with pytest.raises(CalibrationError, match=message):
         align(table.turns(0.002), table.samples())
 
 
@@ -162,7 +162,7 @@ def test_axes_are_taken_as_exact_within_the_tolerance() -> None:
     assert "taken as exact (--snap 0 keeps what was measured)" in words[0]
 
 
-def test_how_far_the_configured_axes_are_is_told() -> None:
+def test_how_far_the_configured_axes_are_is_reported() -> None:
     config = Config(imu=Imu(axes=CHIP.tolist()))
     result = axes_result(CHIP, ("measured",), {}, config, lambda _: None)
     assert result.findings == ("measured", "the configured axes are 0.0° from these")

@@ -71,15 +71,15 @@ def test_the_stated_uncertainty_is_about_right(studio: Make, lens: Lens, model: 
 
 
 @pytest.mark.parametrize(
-    ("told", "views"),
+    ("message", "views"),
     [
         ("in one place; move it", {"spread": 0.1}),
         ("tilted in 0 views, 3 are needed", {"tilt_rad": 0.05}),
         (r"corners are \d.\d+ px from where a radial-tangential lens would put them", {"noise_px": 3.0}),
     ],
 )
-def test_views_that_tell_no_lens_are_refused(studio: Make, told: str, views: dict[str, float]) -> None:
-    with pytest.raises(CalibrationError, match=told):
+def test_views_that_tell_no_lens_are_refused(studio: Make, message: str, views: dict[str, float]) -> None:
+    with pytest.raises(CalibrationError, match=message):
         solve(studio(CHECKERBOARD, WEBCAM).sightings(12, **views), "radial-tangential")
 
 
@@ -116,7 +116,7 @@ def test_a_board_in_motion_is_waited_for(views: list[Frame]) -> None:
     assert "hold it in the" in film.wish()
 
 
-def test_a_view_whose_error_stands_out_is_left_out_and_told(studio: Make) -> None:
+def test_a_view_whose_error_stands_out_is_left_out_and_reported(studio: Make) -> None:
     views = studio(CHECKERBOARD, WEBCAM).sightings(12)
     views.kept[3].corners[20:30, 0] += 4.0  # as when somebody bends it
     result = solve(views, "radial-tangential")

@@ -69,7 +69,7 @@ def test_what_it_prints_is_toml_and_what_it_writes_is_used(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told", "status"),
+    ("arguments", "message", "status"),
     [
         (["camera", "--board", "charuco:8x6:30mm"], "0 usable views of charuco:8x6:30mm", 1),
         (["foe"], "camera", 1),
@@ -85,14 +85,14 @@ def test_what_it_prints_is_toml_and_what_it_writes_is_used(
     ],
 )
 def test_errors_are_one_line(
-    recording: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str, status: int
+    recording: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str, status: int
 ) -> None:
     options = ["--from", str(recording)] if arguments else []
     assert main(["calibrate", *arguments, *options]) == status
     errors = capsys.readouterr().err.splitlines()
     assert len(errors) == 1
     assert errors[0].startswith("lcf-edge: ")
-    assert told in errors[0]
+    assert message in errors[0]
 
 
 @pytest.mark.parametrize("name", ["board.png", "board.pdf", "board.svg"])
@@ -121,7 +121,7 @@ def close(items: Iterator[Any]) -> None:
     items.close()  # type: ignore[attr-defined]
 
 
-def test_a_device_that_is_not_there_is_told() -> None:
+def test_a_device_that_is_not_there_is_reported() -> None:
     with pytest.raises(ConfigError, match=r"imu.driver: none is configured"):
         LiveSource(load(None, []), camera=True, imu=True)
     with pytest.raises(DeviceMissingError, match=r"/dev/no-such-camera"):

@@ -41,7 +41,7 @@ def drive(seed: int, yaw_rad: float = 0.0, pitch_rad: float = 0.0, **changes: An
     )
 
 
-def pictures(of: Drive) -> list[Frame]:
+def frames_of(of: Drive) -> list[Frame]:
     return [frame for frame, _ in scenes.frames(of)]
 
 
@@ -49,7 +49,7 @@ def pictures(of: Drive) -> list[Frame]:
 def test_the_mounting_is_found_within_half_a_degree(
     given: Make, guide: Guide, seed: int, yaw_rad: float, pitch_rad: float
 ) -> None:
-    frames = pictures(drive(seed, yaw_rad, pitch_rad))
+    frames = frames_of(drive(seed, yaw_rad, pitch_rad))
     values = calibrate_foe(given(frames, lens=PINHOLE), Config(), None, guide).values
     assert values["yaw_rad"] == pytest.approx(yaw_rad, abs=math.radians(0.3))
     assert values["pitch_rad"] == pytest.approx(pitch_rad, abs=math.radians(0.3))
@@ -57,23 +57,23 @@ def test_the_mounting_is_found_within_half_a_degree(
 
 @pytest.fixture(scope="module")
 def straight() -> list[Frame]:
-    return pictures(drive(3))
+    return frames_of(drive(3))
 
 
 def test_what_is_no_straight_drive_is_refused(given: Make, guide: Guide, straight: list[Frame]) -> None:
-    turning = pictures(drive(3, yaw_rate=Profile(((0.0, 0.3),))))[:16]
+    turning = frames_of(drive(3, yaw_rate=Profile(((0.0, 0.3),))))[:16]
     blank = [replace(frame, image=np.full_like(frame.image, 90)) for frame in straight]
     standing = [replace(frame, image=straight[0].image) for frame in straight * 2]
     standing = [replace(frame, stamp_ns=straight[0].stamp_ns + i * 10**8) for i, frame in enumerate(standing)]
     backwards = [replace(frame, image=other.image) for frame, other in zip(straight, reversed(straight), strict=True)]
-    for frames, told in (
+    for frames, message in (
         (turning, "the drive is not straight, it turned in"),
         (blank, "followed over 0 intervals"),
         (standing, "next to nothing came nearer"),
         (backwards, "it drives backwards"),
         ([], "no pictures came"),
     ):
-        with pytest.raises(CalibrationError, match=told):
+        with pytest.raises(CalibrationError, match=message):
             calibrate_foe(given(frames, lens=PINHOLE), Config(), None, guide)
 
 

@@ -20,14 +20,14 @@ from lcf_edge.rendered.drives import Drive
 Grey = npt.NDArray[np.uint8]
 
 
-def watched(pictures: Sequence[Grey]) -> Stillness:
-    stillness = Stillness(*pictures[0].shape)
-    for picture in pictures:
-        stillness.add(picture)
+def watched(images: Sequence[Grey]) -> Stillness:
+    stillness = Stillness(*images[0].shape)
+    for image in images:
+        stillness.add(image)
     return stillness
 
 
-def pictures_of(drive: Drive) -> list[Grey]:
+def images_of(drive: Drive) -> list[Grey]:
     return [frame.image for frame, _ in scenes.frames(replace(drive, fps=5.0))]
 
 
@@ -42,11 +42,11 @@ def filled(drive: Drive) -> npt.NDArray[np.bool_]:
 @pytest.mark.parametrize("plain", [False, True], ids=["textured", "plain"])
 def test_a_bumper_is_outlined(seed: int, plain: bool) -> None:
     drive = scenes.make("own_bumper", seed)
-    true, pictures = filled(drive), pictures_of(drive)
+    true, images = filled(drive), images_of(drive)
     if plain:
-        pictures = [np.where(true, 30, picture).astype(np.uint8) for picture in pictures]
+        images = [np.where(true, 30, image).astype(np.uint8) for image in images]
     proposed = np.zeros(true.shape, np.uint8)
-    for polygon in outlines(own_parts(watched(pictures))):
+    for polygon in outlines(own_parts(watched(images))):
         cv2.fillPoly(proposed, [np.rint(polygon).astype(np.int32)], (1,))
     assert (proposed[true] > 0).mean() > 0.98
     assert (proposed[~true] > 0).mean() < 0.02
@@ -54,18 +54,18 @@ def test_a_bumper_is_outlined(seed: int, plain: bool) -> None:
 
 @pytest.mark.parametrize("kind", ["passing", "turn", "long_lines"])
 def test_a_vehicle_without_own_parts_in_view_has_none(kind: str) -> None:
-    assert not own_parts(watched(pictures_of(scenes.make(kind, 23)))).any()
+    assert not own_parts(watched(images_of(scenes.make(kind, 23)))).any()
 
 
 def test_who_stands_still_is_told_to_drive() -> None:
-    still = pictures_of(scenes.make("passing", 23, seconds=0.2))[:1] * 30
+    still = images_of(scenes.make("passing", 23, seconds=0.2))[:1] * 30
     with pytest.raises(CalibrationError, match="drive past things"):
         own_parts(watched(still))
 
 
 def test_few_pictures_tell_nothing() -> None:
     with pytest.raises(CalibrationError, match="20 are needed"):
-        own_parts(watched(pictures_of(scenes.make("passing", 23, seconds=2.0))))
+        own_parts(watched(images_of(scenes.make("passing", 23, seconds=2.0))))
 
 
 @pytest.fixture(scope="module")

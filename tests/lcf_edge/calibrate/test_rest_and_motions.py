@@ -96,7 +96,7 @@ def tremble(row: int, gyro: Floats, accel: Floats) -> None:  # noqa: ARG001
 
 
 @pytest.mark.parametrize(
-    ("told", "change"),
+    ("message", "change"),
     [
         ("it moved while it should rest", nudge),
         ("it moved while it should rest", tip),
@@ -105,8 +105,8 @@ def tremble(row: int, gyro: Floats, accel: Floats) -> None:  # noqa: ARG001
         ("too restless for the daemon to see that it stands", tremble),
     ],
 )
-def test_what_is_no_rest_is_refused(at_rest: list[ImuSample], told: str, change: Any) -> None:
-    with pytest.raises(CalibrationError, match=told):
+def test_what_is_no_rest_is_refused(at_rest: list[ImuSample], message: str, change: Any) -> None:
+    with pytest.raises(CalibrationError, match=message):
         measure(changed(at_rest, change))
 
 
@@ -142,7 +142,7 @@ def test_the_mounting_of_the_camera_is_allowed_for(turntable: Make, given: Make,
 
 
 @pytest.mark.parametrize(
-    ("told", "angles"),
+    ("message", "angles"),
     [
         ("the motions contradict each other", by_hand(side_deg=-45)),
         ("the motions contradict each other", by_hand(left_deg=-90)),
@@ -152,9 +152,9 @@ def test_the_mounting_of_the_camera_is_allowed_for(turntable: Make, given: Make,
     ],
 )
 def test_motions_that_tell_no_axes_are_refused(
-    turntable: Make, given: Make, guide: Guide, told: str, angles: Any
+    turntable: Make, given: Make, guide: Guide, message: str, angles: Any
 ) -> None:
-    with pytest.raises(CalibrationError, match=told):
+    with pytest.raises(CalibrationError, match=message):
         calibrate_motions(given(of_motions(turntable, angles=angles)), Config(), 0.3, guide)
 
 

@@ -35,7 +35,7 @@ def test_the_report_has_medians_and_99th_percentiles_and_ends_with_a_line_that_s
         "30 a second 15.0% of a core; detect 3.00 / 3.98, filter 6.00 / 7.96, whole 12.00 / 15.92 ms (median / 99 %)"
     )
     assert empty == ""
-    for told in (
+    for text in (
         "uncompiled" if uncompiled() else " compiled |",
         "A board, aarch64, 4 cores",
         "700 corners",
@@ -43,7 +43,7 @@ def test_the_report_has_medians_and_99th_percentiles_and_ends_with_a_line_that_s
         "filter 3.00/3.98/6.00/7.96 ms",
         "15.0% of a core at 30/s",
     ):
-        assert told in short
+        assert text in short
     assert short.isprintable()
 
 

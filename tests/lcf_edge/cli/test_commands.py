@@ -86,7 +86,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return scenes.write(drive, tmp_path_factory.mktemp("drive"))
 
 
-def pictures(video: Path) -> Iterator[tuple[int, ...]]:
+def frame_shapes(video: Path) -> Iterator[tuple[int, ...]]:
     capture = cv2.VideoCapture(str(video))
     while (got := capture.read())[0]:
         yield got[1].shape
@@ -153,7 +153,7 @@ def test_an_error_is_one_line_in_a_process_of_its_own(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("source", ["", "raise OSError", "import no_such_module"])
-def test_a_folder_with_the_name_of_the_drivers_is_told_in_one_line(tmp_path: Path, source: str) -> None:
+def test_a_folder_with_the_name_of_the_drivers_is_reported_in_one_line(tmp_path: Path, source: str) -> None:
     (tmp_path / "drivers").mkdir()
     (tmp_path / "drivers" / "__init__.py").write_text(source)
     done = lcf_edge("run", cwd=tmp_path)
@@ -253,14 +253,14 @@ def test_the_video_has_two_panels_and_every_frame(
     replayed: tuple[Done, Path],
 ) -> None:
     video = replayed[1] / "overlay.webm"
-    assert list(pictures(video)) == [(240, 640, 3)] * FRAMES
+    assert list(frame_shapes(video)) == [(240, 640, 3)] * FRAMES
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
 
 
 def test_the_plot_is_a_picture(replayed: tuple[Done, Path]) -> None:
-    picture = cv2.imread(str(replayed[1] / "sizes.png"))
-    assert picture is not None
-    assert picture.std() > 10
+    image = cv2.imread(str(replayed[1] / "sizes.png"))
+    assert image is not None
+    assert image.std() > 10
 
 
 def without_timing(line: bytes) -> dict[str, object]:
@@ -346,7 +346,7 @@ def test_a_part_of_a_recording_is_replayed(recording: Path) -> None:
     assert sequence(lcf_edge("replay", recording, "-o", "-", "--start", "2")) == list(range(20, FRAMES))
 
 
-def test_a_start_beyond_the_end_is_told_with_the_length(refused: Refused, recording: Path) -> None:
+def test_a_start_beyond_the_end_is_reported_with_the_length(refused: Refused, recording: Path) -> None:
     refused("replay", recording, "--start", "60", status=1, parts=("ends after 2.3 s", "earlier start than 60 s"))
 
 
@@ -397,7 +397,7 @@ def test_options_of_a_replay_are_refused_where_they_mean_nothing(
     refused(*arguments, status=2, parts=parts)
 
 
-def test_a_recording_that_is_not_there_is_told_by_view_and_watch(refused: Refused) -> None:
+def test_a_recording_that_is_not_there_is_reported_by_view_and_watch(refused: Refused) -> None:
     for command in ("view", "watch"):
         refused(command, "nowhere", status=1, parts=("nowhere",))
 
@@ -570,9 +570,9 @@ def test_the_demo_goes_the_whole_way(shown: tuple[Done, Path]) -> None:
     assert len(lines) == 20
     assert "received 20 of 20 scenes in the second process" in done.stdout
     assert ", 0 broken" in done.stdout
-    assert len(list(pictures(folder / "overlay.webm"))) == 20
-    for picture in (folder / "sizes.png", folder / "picture-1.png"):
-        assert cv2.imread(str(picture)) is not None
+    assert len(list(frame_shapes(folder / "overlay.webm"))) == 20
+    for image in (folder / "sizes.png", folder / "picture-1.png"):
+        assert cv2.imread(str(image)) is not None
     memory = re.search(r"memory +(\d+) MiB", done.stdout)
     assert memory
     assert 20 < int(memory[1]) < 400

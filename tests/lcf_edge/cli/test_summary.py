@@ -35,7 +35,7 @@ def evicting(seq: int, evicted: int, **rows: int) -> PipelineScene:
     return replace(seen(seq), sizes=Sizes(evicted=evicted, **rows))
 
 
-def told(summary: Summary) -> str:
+def eviction_line(summary: Summary) -> str:
     """What is said of evictions."""
     (line,) = (line for line in summary.lines() if line.startswith("evicted"))
     return line
@@ -45,14 +45,16 @@ def test_evictions_come_with_the_key_to_raise() -> None:
     summary = Summary(Memory(groups=20))
     summary.add(evicting(0, 0, groups=5, psi=32))
     summary.add(evicting(1, 7, groups=20, psi=3))
-    assert told(summary) == "evicted  7 rows in 1 of 2 frames, because a table was full; raise memory.groups (20)"
+    assert (
+        eviction_line(summary) == "evicted  7 rows in 1 of 2 frames, because a table was full; raise memory.groups (20)"
+    )
 
 
 def test_where_corners_found_no_place_fewer_are_the_other_way() -> None:
     summary = Summary()
     summary.add(evicting(0, 40, corners=1500, edges_normal=1499, chains=5))
     summary.add(evicting(1, 2, corners=1400, edges_normal=1500))
-    assert told(summary) == (
+    assert eviction_line(summary) == (
         "evicted  42 rows in 2 of 2 frames, because a table was full; "
         "raise memory.corners (1500) and memory.edges_normal (1500), or lower filter.corners_target"
     )
@@ -61,7 +63,7 @@ def test_where_corners_found_no_place_fewer_are_the_other_way() -> None:
 def test_where_no_table_is_full_any_more_the_fullest_is_named() -> None:
     summary = Summary()
     summary.add(evicting(0, 1, corners=300, circles_rebel=30))
-    assert told(summary).endswith("; raise memory.circles_rebel (32)")
+    assert eviction_line(summary).endswith("; raise memory.circles_rebel (32)")
 
 
 def test_without_evictions_nothing_is_said_of_them() -> None:
@@ -75,4 +77,4 @@ def test_every_table_with_a_capacity_is_looked_at() -> None:
     for table in tables:
         summary = Summary()
         summary.add(evicting(0, 1, **{table: getattr(Memory(), table)}))
-        assert f"raise memory.{table} " in told(summary)
+        assert f"raise memory.{table} " in eviction_line(summary)

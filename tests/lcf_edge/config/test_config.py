@@ -101,7 +101,7 @@ def test_a_setting_is_a_toml_value_or_a_bare_word(setting: str, table: str, key:
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "message"),
     [
         ("vehicle.half_width_m", "write KEY=VALUE"),
         ("=0.6", "write KEY=VALUE"),
@@ -110,10 +110,10 @@ def test_a_setting_is_a_toml_value_or_a_bare_word(setting: str, table: str, key:
         ("vehicle.half_width_m=0.6\nhorizon_s=2", "cannot be printed"),
     ],
 )
-def test_a_setting_of_another_form_is_refused(setting: str, told: str) -> None:
+def test_a_setting_of_another_form_is_refused(setting: str, message: str) -> None:
     text = refused(None, setting)
     assert text.startswith("--set")
-    assert told in text
+    assert message in text
 
 
 def test_a_setting_below_a_value_is_refused() -> None:
@@ -124,7 +124,7 @@ def test_a_setting_below_a_value_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         ("[vehicle\n", "not valid TOML"),
         ("[vehicle]\nhorizon_s = 2\nhorizon_s = 3\n", "not valid TOML"),
@@ -143,11 +143,13 @@ def test_a_setting_below_a_value_is_refused() -> None:
         "dots", "quoted dots", "dots of a table", "dots within a value", "dots behind odd strings",
     ],
 )  # fmt: skip
-def test_a_file_that_is_no_toml_is_named(file: Callable[[str | bytes], Path], content: str | bytes, told: str) -> None:
+def test_a_file_that_is_no_toml_is_named(
+    file: Callable[[str | bytes], Path], content: str | bytes, message: str
+) -> None:
     path = file(content)
     text = refused(path)
     assert text.startswith(f"{path}: ")
-    assert told in text
+    assert message in text
 
 
 @pytest.mark.parametrize(
@@ -207,9 +209,9 @@ def test_a_folder_and_a_missing_file_are_named(tmp_path: Path) -> None:
     ],
 )
 def test_an_unknown_key_names_the_closest_valid_one(file: Callable[[str], Path], key: str, hint: str) -> None:
-    for told in (refused(None, f"{key}=1"), refused(file(f"{key} = 1\n"))):
-        assert told.endswith(f"; did you mean {hint}?")
-        assert ": unknown key " in told
+    for message in (refused(None, f"{key}=1"), refused(file(f"{key} = 1\n"))):
+        assert message.endswith(f"; did you mean {hint}?")
+        assert ": unknown key " in message
 
 
 def test_nothing_is_suggested_for_what_resembles_nothing() -> None:
@@ -217,12 +219,12 @@ def test_nothing_is_suggested_for_what_resembles_nothing() -> None:
 
 
 def test_an_unknown_key_is_shown_short_and_obeyed_by_no_terminal(file: Callable[[str], Path]) -> None:
-    told = refused(file('"\\u001b]0;evil\\u0007\\u009b31m' + "k" * 5000 + '" = 1\n'))
-    assert len(told) < 300
-    assert told.isprintable()
-    told = refused(file("[publish]\nrobot = 7\n[camera]\nformat = '" + "\u009b31m" * 1000 + "'\n"))
-    assert len(told) < 600
-    assert told.isprintable()
+    message = refused(file('"\\u001b]0;evil\\u0007\\u009b31m' + "k" * 5000 + '" = 1\n'))
+    assert len(message) < 300
+    assert message.isprintable()
+    message = refused(file("[publish]\nrobot = 7\n[camera]\nformat = '" + "\u009b31m" * 1000 + "'\n"))
+    assert len(message) < 600
+    assert message.isprintable()
 
 
 @pytest.mark.parametrize(

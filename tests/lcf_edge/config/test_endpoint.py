@@ -44,12 +44,12 @@ def test_what_can_be_an_endpoint_is_taken(endpoint: str) -> None:
         ("", "no endpoint, which is protocol/address"),
     ],
 )
-def test_what_can_be_none_is_told_with_a_remedy(endpoint: str, why: str) -> None:
-    told = fault(endpoint)
-    assert told.startswith(f"{endpoint}: {why}; write ")
+def test_what_can_be_none_is_reported_with_a_remedy(endpoint: str, why: str) -> None:
+    message = fault(endpoint)
+    assert message.startswith(f"{endpoint}: {why}; write ")
 
 
-def test_keys_in_an_endpoint_are_not_told() -> None:
+def test_keys_in_an_endpoint_are_not_reported() -> None:
     assert fault("tls/rover#root_ca_certificate_base64=c2VjcmV0") == fault("tls/rover")
 
 
@@ -60,11 +60,11 @@ def test_a_configuration_with_one_is_refused(key: str) -> None:
 
 
 @pytest.mark.parametrize("command", ["watch", "view"])
-def test_who_looks_is_told_at_once(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_who_looks_is_reported_at_once(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert main([command, "--connect", "tcp/127.0.0.1"]) == 1
     assert capsys.readouterr().err.startswith("lcf-edge: zenoh.connect: tcp/127.0.0.1: no port; write ")
 
 
-def test_a_planner_is_told_at_once() -> None:
+def test_a_planner_is_reported_at_once() -> None:
     with pytest.raises(PublishError, match="no port"):
         scenes("tcp/127.0.0.1")

@@ -20,7 +20,7 @@ def refusal(setting: str) -> str:
 
 
 @pytest.mark.parametrize(
-    ("setting", "told"),
+    ("setting", "message"),
     [
         (
             "camera.driver=v4l",
@@ -44,21 +44,21 @@ def refusal(setting: str) -> str:
         ("zenoh.gossip=[]", "true or false is needed, not a list"),
     ],
 )
-def test_what_can_be_written_instead_is_told(setting: str, told: str) -> None:
-    assert refusal(setting) == f": {told}"
+def test_what_can_be_written_instead_is_said(setting: str, message: str) -> None:
+    assert refusal(setting) == f": {message}"
 
 
 def test_a_driver_is_suggested_and_all_are_listed() -> None:
-    told = refusal("imu.driver=mpu650")
-    assert "; did you mean mpu6500 or mpu6050? write one of " in told
-    assert {"none", "bno08x_uart", "xsens"} <= set(told.partition("write one of ")[2].split(", "))
+    message = refusal("imu.driver=mpu650")
+    assert "; did you mean mpu6500 or mpu6050? write one of " in message
+    assert {"none", "bno08x_uart", "xsens"} <= set(message.partition("write one of ")[2].split(", "))
 
 
-def test_the_place_in_a_list_is_told() -> None:
+def test_the_place_in_a_list_is_reported() -> None:
     assert refusal('camera.intrinsics=[500, 500, "middle", 240]').startswith("[2]: a number (")
 
 
-def test_keys_in_an_endpoint_are_not_told() -> None:
+def test_keys_in_an_endpoint_are_not_reported() -> None:
     assert refusal('zenoh.listen="tls/rover:7447#connect_private_key_base64=c2VjcmV0"') == (
         ": a list in brackets is needed, not a text"
     )

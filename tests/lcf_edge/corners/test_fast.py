@@ -96,7 +96,7 @@ print(count, zlib.crc32(pixel.tobytes() + strength.tobytes()))
 
 @needs_extension
 def test_compiled_and_uncompiled_the_scores_are_the_same() -> None:
-    told = [
+    outputs = [
         subprocess.run(
             (sys.executable, "-c", _DIGEST),
             env={**os.environ, **environment},
@@ -107,5 +107,5 @@ def test_compiled_and_uncompiled_the_scores_are_the_same() -> None:
         ).stdout
         for environment in ({}, {"LCF_EDGE_PURE": "1"})
     ]
-    assert told[0] == told[1]
-    assert int(told[0].split()[0]) > 10
+    assert outputs[0] == outputs[1]
+    assert int(outputs[0].split()[0]) > 10

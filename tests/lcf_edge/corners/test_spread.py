@@ -48,32 +48,32 @@ def test_every_square_keeps_its_strongest_and_none_keeps_more_than_its_share(
     for name in had:
         rows = np.array([each == name for each in square])
         assert keeps[name] >= min(had[name], most - 1)
-        weakest_held = strength[rows & held].min(initial=np.inf)
-        assert weakest_held > strength[rows & ~held].max(initial=-1)
+        weakest_kept = strength[rows & held].min(initial=np.inf)
+        assert weakest_kept > strength[rows & ~held].max(initial=-1)
 
 
 PLACES = st.sets(st.tuples(st.integers(0, 319), st.integers(0, 239)), max_size=80)
 
 
-def in_picture(places: set[tuple[int, int]]) -> npt.NDArray[np.int32]:
+def in_image(places: set[tuple[int, int]]) -> npt.NDArray[np.int32]:
     return np.array(sorted(places), np.int32).reshape(-1, 2)
 
 
-def picture() -> Squares:
+def image() -> Squares:
     return Squares(WIDTH, HEIGHT, side_px(WIDTH, HEIGHT))
 
 
 @given(places=PLACES, most=st.integers(1, 5), seed=st.integers(0, 99))
 def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, seed: int) -> None:
-    pixel = in_picture(places)
+    pixel = in_image(places)
     strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
-    square = squares(pixel, picture().side_px)
+    square = squares(pixel, image().side_px)
     expected = []
     for row, name in enumerate(square):
         stronger = sum(strength[other] > strength[row] for other, each in enumerate(square) if each == name)
         if stronger < most:
             expected.append((pixel[row].tolist(), float(strength[row])))
-    kept, how_strong = strongest(picture(), pixel.copy(), strength.copy(), most)
+    kept, how_strong = strongest(image(), pixel.copy(), strength.copy(), most)
     assert list(zip(kept.tolist(), how_strong.tolist(), strict=True)) == expected
 
 
@@ -81,7 +81,7 @@ def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, 
 def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
     places: set[tuple[int, int]], first_row: int, without: set[int]
 ) -> None:
-    looked_at, pixel = picture(), in_picture(places)
+    looked_at, pixel = image(), in_image(places)
     among = np.ones((looked_at.rows, looked_at.columns), np.uint8)
     among.ravel()[list(without)] = 0
     square = np.empty(len(pixel), np.int32)

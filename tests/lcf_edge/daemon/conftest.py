@@ -48,7 +48,7 @@ class KeptLink:
             self.statuses = {one.name: one for one in status}
             self._changed.notify_all()
 
-    def preview_wanted(self) -> bool:
+    def has_preview_subscriber(self) -> bool:
         return self.looks
 
     def put_preview(self, jpeg: bytes, stamp_ns: int) -> None:

@@ -28,7 +28,7 @@ def test_all_is_well() -> None:
 
 
 @pytest.mark.parametrize(("grey", "word"), [(5, "dark: "), (180, "blind: ")])
-def test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees(grey: int, word: str) -> None:
+def test_a_dark_or_covered_lens_is_reported_after_half_a_second_and_until_it_sees(grey: int, word: str) -> None:
     degradation = Degradation(Config())
     degradation.add(frame(0), scene(0))
     degradation.add(frame(400, grey), scene(1, corners=0, speed_mps=0))
@@ -39,19 +39,21 @@ def test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees(gr
     assert not degradation.notes
 
 
-def test_a_camera_that_is_dark_from_the_start_is_told_too() -> None:
+def test_a_camera_that_is_dark_from_the_start_is_reported_too() -> None:
     degradation = Degradation(Config())
     for stamp_ms in (0, 300, 600):
         degradation.add(frame(stamp_ms, 0), scene(0, corners=0))
     assert degradation.notes[0].startswith("dark: ")
 
 
-@pytest.mark.parametrize(("interval_ms", "speed_mps", "told"), [(33, 1.5, False), (500, 1.5, True), (500, -1.5, True)])
-def test_a_frame_rate_too_low_for_the_motion(interval_ms: int, speed_mps: float, told: bool) -> None:
+@pytest.mark.parametrize(
+    ("interval_ms", "speed_mps", "is_noted"), [(33, 1.5, False), (500, 1.5, True), (500, -1.5, True)]
+)
+def test_a_frame_rate_too_low_for_the_motion(interval_ms: int, speed_mps: float, is_noted: bool) -> None:
     degradation = Degradation(Config(filter=Filter(leap_px=40.0, scene_depth_m=4.0)))
     degradation.add(frame(0), scene(0, speed_mps=speed_mps))
     degradation.add(frame(interval_ms), scene(1, speed_mps=speed_mps))
-    assert [note.partition(":")[0] for note in degradation.notes] == ["frame rate too low for the motion"] * told
+    assert [note.partition(":")[0] for note in degradation.notes] == ["frame rate too low for the motion"] * is_noted
 
 
 def test_without_a_speed_nothing_is_said_of_the_rate() -> None:
@@ -73,7 +75,7 @@ def test_without_a_speed_nothing_is_said_of_the_rate() -> None:
         "speed drifts",
     ],
 )
-def test_what_ego_motion_lacks_is_told(note: str) -> None:
+def test_what_ego_motion_lacks_is_reported(note: str) -> None:
     degradation = Degradation(Config())
     degradation.add(frame(0), scene(0, notes=("first frame", note)))
     assert len(degradation.notes) == 1
@@ -96,13 +98,13 @@ def test_a_gyro_that_is_not_fully_believed_says_why(note: str, words: str) -> No
 
 @pytest.mark.parametrize("note", ["imu gap", "gyro stuck"])
 def test_nobody_is_sent_to_the_cable_of_a_recording(note: str) -> None:
-    def told(config: Config) -> str:
+    def is_noted(config: Config) -> str:
         degradation = Degradation(config)
         degradation.add(frame(0), scene(0, notes=(note,)))
         (words,) = degradation.notes
         return words
 
-    assert "check " in told(Config(imu=Imu(driver="mpu6050")))
-    of_a_recording = told(Config(imu=Imu(driver="recording", recording="drive")))
+    assert "check " in is_noted(Config(imu=Imu(driver="mpu6050")))
+    of_a_recording = is_noted(Config(imu=Imu(driver="recording", recording="drive")))
     assert "recording" in of_a_recording
     assert "check " not in of_a_recording

@@ -18,20 +18,20 @@ DOCUMENT = (HERE.parents[2] / "docs/operation.md").read_text(encoding="utf-8")
 TESTS = {
     "no camera": "test_without_a_camera_it_lives_and_says_since_when",
     "camera silent": "test_a_camera_that_falls_silent_is_stale",
-    "dark lens": "test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees",
-    "covered lens": "test_a_dark_or_covered_lens_is_told_after_half_a_second_and_until_it_sees",
+    "dark lens": "test_a_dark_or_covered_lens_is_reported_after_half_a_second_and_until_it_sees",
+    "covered lens": "test_a_dark_or_covered_lens_is_reported_after_half_a_second_and_until_it_sees",
     "frame rate too low for the motion": "test_a_frame_rate_too_low_for_the_motion",
-    "no IMU": "test_an_imu_that_is_away_widens_and_is_told",
+    "no IMU": "test_an_imu_that_is_away_widens_and_is_reported",
     "gyro's bias not known yet": "test_a_gyro_that_is_not_fully_believed_says_why",
     "gyro repeats one value (a chip or bus that hangs)": "test_a_gyro_that_is_not_fully_believed_says_why",
     "no speed": "test_without_speed_ranges_are_unknown",
     "pipeline too slow": "test_every_frame_is_a_scene_or_counted",
     "pipeline stuck": "test_the_watchdog_is_fed_by_the_progress_of_the_pipeline",
-    "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_told",
+    "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_reported",
     "disk full, or gone": "test_a_disk_that_takes_nothing_costs_the_recording_only",
     "memory short": "test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so",
     "file descriptors used up by connections": "test_without_descriptors_it_lives_tells_and_reads_its_configuration",
-    "board hot": "test_a_board_that_is_hot_is_told",
+    "board hot": "test_a_board_that_is_hot_is_reported",
 }
 
 
@@ -58,11 +58,11 @@ def test_what_is_given_up_has_its_order(link: Any) -> None:
 
 @pytest.mark.parametrize(("row", "tables"), [(0, PIPELINE_KEYS), (1, OTHER_KEYS)])
 def test_the_keys_of_a_reload_are_those(row: int, tables: dict[str, frozenset[str]]) -> None:
-    told: dict[str, set[str]] = {}
+    listed: dict[str, set[str]] = {}
     for part in cells("Reload")[row][0].split("; "):
         for clause in re.findall(r"((?:all|`\w+`(?:, `\w+`)*)) of `(\w+)`(?: but `(\w+)`)?", part):
             names, table, but = clause
-            told[table] = {"all", *([f"-{but}"] if but else [])} if names == "all" else set(re.findall(r"\w+", names))
+            listed[table] = {"all", *([f"-{but}"] if but else [])} if names == "all" else set(re.findall(r"\w+", names))
     for table, keys in tables.items():
-        assert told.pop(table) in ({"all"}, {"all", "-budget_mib"}, keys), table
-    assert not told
+        assert listed.pop(table) in ({"all"}, {"all", "-budget_mib"}, keys), table
+    assert not listed

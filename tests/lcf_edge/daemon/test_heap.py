@@ -35,8 +35,8 @@ go_on.set()
 @pytest.mark.parametrize(("heaps", "has_others"), [("one", False), ("as many as glibc likes", True)])
 def test_threads_have_no_heaps_of_their_own(heaps: str, has_others: bool) -> None:
     command = (sys.executable, "-c", COUNT_HEAPS, heaps)
-    told = subprocess.run(command, check=True, capture_output=True, text=True).stdout
-    assert (int(told) > 0) == has_others
+    output = subprocess.run(command, check=True, capture_output=True, text=True).stdout
+    assert (int(output) > 0) == has_others
 
 
 LEAVE_START = """
@@ -66,8 +66,8 @@ print(resident_kib("RssFile") / files_kib)
 
 
 def test_code_that_only_the_start_needed_is_let_go_and_what_is_used_comes_back() -> None:
-    told = subprocess.run((sys.executable, "-c", LEAVE_START), check=True, capture_output=True, text=True).stdout
-    left, used = map(float, told.split())
+    output = subprocess.run((sys.executable, "-c", LEAVE_START), check=True, capture_output=True, text=True).stdout
+    left, used = map(float, output.split())
     assert left < 0.6
     assert used > left
 

@@ -108,7 +108,7 @@ def test_what_a_library_writes_by_itself_is_limited_too() -> None:
     lines = done.stderr.splitlines()
     assert "by Python" in lines
     assert "lcf-edge: end" in lines
-    told = [line for line in lines if line.startswith("lcf-edge: warning: library: Corrupt JPEG data")]
-    assert 1 <= len(told) <= log.AT_ONCE
-    assert len(lines) == len(told) + 2
+    warnings = [line for line in lines if line.startswith("lcf-edge: warning: library: Corrupt JPEG data")]
+    assert 1 <= len(warnings) <= log.AT_ONCE
+    assert len(lines) == len(warnings) + 2
     assert "\x1b" not in done.stderr

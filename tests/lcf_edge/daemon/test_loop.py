@@ -87,22 +87,22 @@ def test_live_is_the_same_as_replay(config: Config, start: Start, mail: Mail, li
 def test_stamps_are_of_the_system_clock(plain: Config, start: Start, mail: Mail, link: Any, approach: Any) -> None:
     start(plain)
     before_ns, now_ns, after_ns = time.time_ns(), time.monotonic_ns(), time.time_ns()
-    mail.frames.put(Frame(now_ns, 0, approach().picture(0)))
+    mail.frames.put(Frame(now_ns, 0, approach().image(0)))
     link.wait_for(lambda: link.scenes)
     assert before_ns - 10**6 <= link.scenes[0].stamp_ns <= after_ns + 10**6
 
 
-def test_stamps_follow_a_step_of_the_system_clock_and_it_is_told(
+def test_stamps_follow_a_step_of_the_system_clock_and_it_is_reported(
     plain: Config, start: Start, mail: Mail, link: Any, approach: Any, caplog: pytest.LogCaptureFixture
 ) -> None:
     ahead_ns = 0
     start(plain, SystemTime(time.monotonic_ns, lambda: time.time_ns() + ahead_ns))
     stamps_ns = [time.monotonic_ns(), time.monotonic_ns() + 50_000_000]
-    mail.frames.put(Frame(stamps_ns[0], 0, approach().picture(0)))
+    mail.frames.put(Frame(stamps_ns[0], 0, approach().image(0)))
     link.wait_for(lambda: len(link.scenes) == 1)
     ahead_ns = 3600 * 10**9
     threading.Event().wait(0.3)  # a turn without a frame sees it too
-    mail.frames.put(Frame(stamps_ns[1], 1, approach().picture(1)))
+    mail.frames.put(Frame(stamps_ns[1], 1, approach().image(1)))
     link.wait_for(lambda: len(link.scenes) == 2)
     step_ns = link.scenes[1].stamp_ns - link.scenes[0].stamp_ns - (stamps_ns[1] - stamps_ns[0])
     assert abs(step_ns - ahead_ns) < 10**6
@@ -115,12 +115,12 @@ def test_a_frame_that_is_overtaken_is_counted(
     plain: Config, start: Start, mail: Mail, link: Any, approach: Any
 ) -> None:
     loop = start(plain)
-    begin_ns, picture = time.monotonic_ns(), approach().picture(0)
+    begin_ns, image = time.monotonic_ns(), approach().image(0)
     link.held.clear()
-    mail.frames.put(Frame(begin_ns, 0, picture))
+    mail.frames.put(Frame(begin_ns, 0, image))
     link.wait_for(lambda: len(link.scenes) == 1)  # in whose put the loop is held
     for seq in range(1, 10):
-        mail.frames.put(Frame(begin_ns + seq * 10**7, seq, picture))
+        mail.frames.put(Frame(begin_ns + seq * 10**7, seq, image))
     link.held.set()
     link.wait_for(lambda: link.scenes[-1].seq == 9)
     assert [scene.seq for scene in link.scenes] == [0, 9]
@@ -136,7 +136,7 @@ def test_progress_goes_on_without_frames_and_stops_when_the_loop_is_held(
     while loop.turns < 2:
         idle.wait(0.01)
     link.held.clear()
-    mail.frames.put(Frame(time.monotonic_ns(), 0, approach().picture(0)))
+    mail.frames.put(Frame(time.monotonic_ns(), 0, approach().image(0)))
     link.wait_for(lambda: link.scenes)
     turns = loop.turns
     idle.wait(0.6)
@@ -152,7 +152,7 @@ def test_speeds_of_the_link_are_taken_in_the_sender_s_time(
     for seq in range(3):
         now_ns = time.monotonic_ns()
         link.speeds.append((now_ns, SpeedSample(time.time_ns(), 1.25, 0.0)))
-        mail.frames.put(Frame(now_ns + 10**6, seq, approach().picture(seq)))
+        mail.frames.put(Frame(now_ns + 10**6, seq, approach().image(seq)))
         link.wait_for(lambda seq=seq: len(link.scenes) == seq + 1)
     assert link.scenes[-1].vehicle_speed == pytest.approx(1.25)
 
@@ -161,7 +161,7 @@ def test_without_speed_ranges_are_unknown(plain: Config, start: Start, mail: Mai
     loop = start(plain)
     begin_ns = time.monotonic_ns()
     for seq in range(12):
-        mail.frames.put(Frame(begin_ns + seq * 50_000_000, seq, approach().picture(seq)))
+        mail.frames.put(Frame(begin_ns + seq * 50_000_000, seq, approach().image(seq)))
         link.wait_for(lambda seq=seq: len(link.scenes) == seq + 1)
     assert np.isnan([scene.vehicle_speed for scene in link.scenes]).all()
     assert all(np.isnan(scene.circles["range"]).all() for scene in link.scenes)
@@ -173,12 +173,12 @@ def test_a_rebuilt_pipeline_takes_over_with_the_next_frame(
     plain: Config, start: Start, mail: Mail, link: Any, noise: Any
 ) -> None:
     loop = start(plain)
-    picture = noise(width=320, height=240)
-    mail.frames.put(Frame(time.monotonic_ns(), 0, picture))
+    image = noise(width=320, height=240)
+    mail.frames.put(Frame(time.monotonic_ns(), 0, image))
     link.wait_for(lambda: len(link.scenes) == 1)
     mail.imu.put([ImuSample(0, (np.nan, 0, 0), (0, 0, 0))])
     loop.rebuild(msgspec.structs.replace(plain, memory=Memory(corners=50)))
-    mail.frames.put(Frame(time.monotonic_ns(), 1, picture))
+    mail.frames.put(Frame(time.monotonic_ns(), 1, image))
     link.wait_for(lambda: len(link.scenes) == 2)
     assert [scene.sizes.corners for scene in link.scenes] == [1500, 50]
     with pytest.raises(ConfigError):
@@ -194,7 +194,7 @@ def test_what_earlier_pipelines_refused_is_not_forgotten(
     for seq in range(2):
         mail.imu.put([ImuSample(0, (float("nan"), 0, 0), (0, 0, 0))])
         loop.rebuild(plain)
-        mail.frames.put(Frame(time.monotonic_ns(), seq, approach().picture(seq)))
+        mail.frames.put(Frame(time.monotonic_ns(), seq, approach().image(seq)))
         link.wait_for(lambda seq=seq: len(link.scenes) == seq + 1)
     assert loop.refused == {"imu not finite": 2}
 
@@ -213,7 +213,7 @@ def test_a_preview_is_drawn_only_while_somebody_looks(
     start(plain)
     for seq, looks in enumerate((False, True)):
         link.looks = looks
-        mail.frames.put(Frame(time.monotonic_ns(), seq, approach().picture(seq)))
+        mail.frames.put(Frame(time.monotonic_ns(), seq, approach().image(seq)))
         link.wait_for(lambda seq=seq: len(link.scenes) == seq + 1)
     link.wait_for(lambda: link.previews)
     ((jpeg, stamp_ns),) = link.previews

@@ -21,12 +21,12 @@ def test_the_words_are_those_of_sd_notify(manager: Any) -> None:
     notifier.stopping()
     notifier.close()
     notifier.ready()  # nothing any more
-    told = [manager.next() for _ in range(5)]
-    assert told[:3] == ["READY=1", "STATUS=30.0 frames/s, 12 circles", "WATCHDOG=1"]
-    first, second = told[3].split("\n")
+    messages = [manager.next() for _ in range(5)]
+    assert messages[:3] == ["READY=1", "STATUS=30.0 frames/s, 12 circles", "WATCHDOG=1"]
+    first, second = messages[3].split("\n")
     assert first == "RELOADING=1"
     assert before_us <= int(second.removeprefix("MONOTONIC_USEC=")) <= time.monotonic_ns() // 1000
-    assert told[4] == "STOPPING=1"
+    assert messages[4] == "STOPPING=1"
 
 
 def test_an_abstract_address_begins_with_an_at_sign() -> None:

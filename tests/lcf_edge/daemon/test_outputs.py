@@ -63,7 +63,7 @@ def test_two_methods_make_a_sink_and_the_rest_does_nothing(tmp_path: Path) -> No
     assert results.read_text(encoding="utf-8").startswith('{"stamp_ns":5,"seq":7,')
 
 
-def test_a_sink_that_fails_is_left_out_and_told_once(link: Any, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_sink_that_fails_is_left_out_and_reported_once(link: Any, caplog: pytest.LogCaptureFixture) -> None:
     failing, kept = Kept("disk/full: cannot be written"), Kept()
     outputs = Outputs([LinkedScenes(link), failing, kept])
     for _ in range(3):

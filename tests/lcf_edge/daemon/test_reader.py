@@ -118,7 +118,7 @@ def test_a_stop_does_not_wait_for_the_next_attempt() -> None:
     assert reader.counts["failed"] >= 1
 
 
-def test_a_missing_device_is_told_once(config: Config, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_missing_device_is_reported_once(config: Config, caplog: pytest.LogCaptureFixture) -> None:
     clock = StoppableClock()
     missing = Faults(unplugged=True)
     tries = 0

@@ -81,15 +81,15 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
     assert "lcf-edge: stopping: 1.5 s are over" in said
     with AnyReader([file]) as reader:
         counts = Counter(connection.topic for connection, _, _ in reader.messages())
-    pictures = counts["/lcf/camera/image_raw/compressed"]
-    assert out.startswith(f"{file}: {pictures} pictures, {counts.total()} messages, ")
-    assert pictures == counts["/lcf/scene"] == counts["/lcf/camera/camera_info"] >= 10
-    assert counts["/lcf/imu"] >= 5 * pictures
+    frame_count = counts["/lcf/camera/image_raw/compressed"]
+    assert out.startswith(f"{file}: {frame_count} pictures, {counts.total()} messages, ")
+    assert frame_count == counts["/lcf/scene"] == counts["/lcf/camera/camera_info"] >= 10
+    assert counts["/lcf/imu"] >= 5 * frame_count
     assert counts["/lcf/speed"] > 0
     assert counts["/lcf/diagnostics"] > 0
     assert load(file).camera.height_m == 0.77
     assert load(file).record.when == "never"  # run -c drive.mcap records nothing unasked
-    assert replayed(file, "-c", file).split()[:2] == ["frames", f"{pictures},"]
+    assert replayed(file, "-c", file).split()[:2] == ["frames", f"{frame_count},"]
 
 
 def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start, tmp_path: Path) -> None:
@@ -101,11 +101,11 @@ def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start,
     assert files[:2] == ["drive_0.mcap", "drive_1.mcap"]
     with Reader(folder) as bag:  # reads what metadata.yaml names, and nothing else
         counts = Counter(connection.topic for connection, _, _ in bag.messages())
-        told = {connection.topic: connection.msgcount for connection in bag.connections}
+        recorded = {connection.topic: connection.msgcount for connection in bag.connections}
         qualities = {connection.topic: connection.ext.offered_qos_profiles for connection in bag.connections}
         assert bag.message_count == counts.total() == sum(messages_in(folder / name) for name in files)
         assert bag.start_time < bag.end_time
-    assert {topic: count for topic, count in told.items() if count} == counts
+    assert {topic: count for topic, count in recorded.items() if count} == counts
     (lasting,) = qualities["/tf_static"]
     assert lasting.durability is QosDurability.TRANSIENT_LOCAL
     assert replayed(folder).split()[1] == f"{counts['/lcf/scene']},"

@@ -218,7 +218,7 @@ def test_a_step_of_the_clock_leaves_the_time_of_a_file_alone(tmp_path: Path, beg
     system_time = SystemTime(time.monotonic_ns, lambda: time.time_ns() + ahead_ns)
     recorder = begin(system_time)
     recorder.put(*seen(0))
-    until(lambda: recorder.pictures == 1)
+    until(lambda: recorder.frames == 1)
     ahead_ns = -3600 * 10**9
     assert system_time.notice()
     recorder.put(*seen(1))
@@ -325,7 +325,7 @@ def test_at_its_age_a_file_ends(tmp_path: Path, begin: Begin) -> None:
     recorder = begin(file_s=0.01)
     for seq in range(5):
         recorder.put(*seen(seq))
-        until(lambda seq=seq: recorder.pictures == seq + 1 and recorder.status().message.startswith("waits"))
+        until(lambda seq=seq: recorder.frames == seq + 1 and recorder.status().message.startswith("waits"))
     files = scenes_in(tmp_path)
     assert len(files) >= 5
     assert [scene.seq for scenes in files for scene in scenes] == list(range(5))
@@ -345,7 +345,7 @@ def small_disk(folder: Path) -> Iterator[Path]:
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk")
 @pytest.mark.usefixtures("often")
-def test_a_full_disk_is_told_once_and_the_file_goes_on_when_there_is_room(
+def test_a_full_disk_is_reported_once_and_the_file_goes_on_when_there_is_room(
     tmp_path: Path, begin: Begin, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level("INFO", "lcf_edge")
@@ -371,9 +371,9 @@ def test_a_full_disk_is_told_once_and_the_file_goes_on_when_there_is_room(
         ended(recorder)
         ((*_, final),) = scenes_in(disk)  # one file, whole
         assert final.seq == last
-    told = [record.getMessage() for record in caplog.records]
-    assert len([line for line in told if "cannot be written" in line]) == 1
-    assert [line.split()[1] for line in told] == ["records", str(disk / told[0].split("/")[-1]) + ":", "goes"]
+    logged = [record.getMessage() for record in caplog.records]
+    assert len([line for line in logged if "cannot be written" in line]) == 1
+    assert [line.split()[1] for line in logged] == ["records", str(disk / logged[0].split("/")[-1]) + ":", "goes"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk")
@@ -385,7 +385,7 @@ def test_a_disk_that_is_full_from_the_start_gets_no_empty_files(tmp_path: Path, 
         until(lambda: recorder.put(*seen(0)) or int(recorder.status().values["lost to the disk"]) > 5)
         assert [path.name for path in disk.iterdir()] == ["others"]
         (disk / "others").unlink()
-        until(lambda: recorder.put(*seen(1)) or recorder.pictures > 0)
+        until(lambda: recorder.put(*seen(1)) or recorder.frames > 0)
         ended(recorder)
         assert len(scenes_in(disk)) == 1
 
@@ -419,7 +419,7 @@ def test_room_for_others_is_left(tmp_path: Path, begin: Begin) -> None:
 def test_a_file_that_somebody_removes_is_followed_by_another(tmp_path: Path, begin: Begin) -> None:
     recorder = begin()
     recorder.put(*seen(0))
-    until(lambda: recorder.pictures == 1)
+    until(lambda: recorder.frames == 1)
     next(tmp_path.glob("*.mcap")).unlink()
     until(lambda: recorder.put(*seen(1)) or recorder.status().values["files"] == "2")
     ended(recorder)
@@ -437,7 +437,7 @@ def test_what_fits_no_message_is_counted(begin: Begin) -> None:
 def test_a_new_configuration_is_attached(tmp_path: Path, begin: Begin) -> None:
     recorder = begin()
     recorder.put(*seen(0))
-    until(lambda: recorder.pictures == 1)
+    until(lambda: recorder.frames == 1)
     recorder.show_config(Config(memory=Memory(corners=77)))
     recorder.put(*seen(1))
     ended(recorder)

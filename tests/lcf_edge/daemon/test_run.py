@@ -66,8 +66,8 @@ def test_a_subscriber_receives_scenes_of_now_until_sigterm(start: Start, manager
     assert (seen[0][1].image_width, seen[0][1].image_height) == (320, 240)
     numbers = [scene.seq for _, scene in seen]
     assert numbers == sorted(set(numbers))
-    told = manager.until("READY=1")
-    assert told[-1] == "READY=1"
+    messages = manager.until("READY=1")
+    assert messages[-1] == "READY=1"
     daemon.send_signal(signal.SIGTERM)
     manager.until("STOPPING=1")
     status, said = ended(daemon)
@@ -93,7 +93,7 @@ def test_sigint_ends_it_too_and_sighup_reads_again(start: Start, manager: Any, t
     assert said[-1] == "lcf-edge: stopping: SIGINT"
 
 
-def test_an_uncompiled_filter_is_told_once_at_the_start(
+def test_an_uncompiled_filter_is_reported_once_at_the_start(
     start: Start, manager: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("LCF_EDGE_PURE", "1")
@@ -127,10 +127,10 @@ def test_without_a_camera_it_lives_and_says_since_when(start: Start, manager: An
         assert str(alive.recv().key_expr) == "lcf/@alive/rover"
         alive.undeclare()
         subscriber: Any = session.declare_subscriber("lcf/diagnostics", handler)
-        told = subscriber.recv().payload.to_bytes()
+        messages = subscriber.recv().payload.to_bytes()
         subscriber.undeclare()
-    assert b"away since 2" in told
-    assert b"/dev/no-such-camera" in told
+    assert b"away since 2" in messages
+    assert b"/dev/no-such-camera" in messages
     daemon.terminate()
     status, said = ended(daemon)
     assert status == 0

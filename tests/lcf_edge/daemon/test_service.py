@@ -74,10 +74,10 @@ def test_ready_when_frames_flow_and_closed_in_order(config: Config, runs: Runs, 
     begun = runs.start(config)
     manager.until("READY=1")
     assert link.scenes
-    while "circles" not in (told := manager.until("STATUS=")[-1]):
+    while "circles" not in (status := manager.until("STATUS=")[-1]):
         pass
-    assert " frames/s, " in told
-    assert told.endswith(" MiB")
+    assert " frames/s, " in status
+    assert status.endswith(" MiB")
     begun.stop("test")
     manager.until("STOPPING=1")
     assert runs.failure() is None
@@ -85,10 +85,10 @@ def test_ready_when_frames_flow_and_closed_in_order(config: Config, runs: Runs, 
     assert {"camera", "imu", "speed", "pipeline"}.isdisjoint(thread.name for thread in threading.enumerate())
 
 
-def test_without_a_camera_it_is_ready_once_that_is_told(runs: Runs, link: Any, manager: Any) -> None:
+def test_without_a_camera_it_is_ready_once_that_is_reported(runs: Runs, link: Any, manager: Any) -> None:
     runs.start(Config(camera=Camera(device="/dev/no-such-camera")))
-    told = manager.until("READY=1")
-    assert any("no camera" in message and "/dev/no-such-camera" in message for message in told)
+    messages = manager.until("READY=1")
+    assert any("no camera" in message and "/dev/no-such-camera" in message for message in messages)
     link.wait_for(lambda: link.statuses and link.statuses["camera"].message.startswith("away since 2"))
     assert link.statuses["camera"].level is Level.ERROR
     assert "/dev/no-such-camera" in link.statuses["camera"].message
@@ -103,8 +103,8 @@ def test_the_watchdog_is_fed_by_the_progress_of_the_pipeline(
     manager.until("WATCHDOG=1")
     link.held.clear()
     manager.until("STATUS=")
-    told = [message for _ in range(6) for message in manager.until("STATUS=")]
-    assert "WATCHDOG=1" not in told[4:]  # the last turn may have been just before
+    messages = [message for _ in range(6) for message in manager.until("STATUS=")]
+    assert "WATCHDOG=1" not in messages[4:]  # the last turn may have been just before
     link.held.set()
     manager.until("WATCHDOG=1")
 
@@ -187,7 +187,7 @@ def test_diagnostics_tell_of_each_part(config: Config, runs: Runs, link: Any) ->
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
 
 
-def test_when_no_more_sessions_are_let_in_that_is_told(config: Config, runs: Runs, link: Any) -> None:
+def test_when_no_more_sessions_are_let_in_that_is_reported(config: Config, runs: Runs, link: Any) -> None:
     runs.start(config)
     link.wait_for(lambda: link.statuses)
     assert link.statuses["link"].level is Level.OK
@@ -197,7 +197,7 @@ def test_when_no_more_sessions_are_let_in_that_is_told(config: Config, runs: Run
     assert link.statuses["link"].values["sessions"] == "2"
 
 
-def test_an_imu_that_is_away_widens_and_is_told(config: Config, runs: Runs, link: Any) -> None:
+def test_an_imu_that_is_away_widens_and_is_reported(config: Config, runs: Runs, link: Any) -> None:
     runs.start(msgspec.structs.replace(config, imu=Imu(driver="csv", port="/dev/no-such-port")))
     link.wait_for(lambda: link.statuses and link.statuses["pipeline"].level is Level.WARN and link.scenes)
     assert link.statuses["imu"].level is Level.WARN
@@ -218,8 +218,8 @@ def test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so(
     link.wait_for(lambda: link.statuses and "half of the corners" in link.statuses["memory"].message)
     assert link.statuses["memory"].level is Level.WARN
     assert link.statuses["memory"].message == "gave up the preview, half of the corners"
-    told = [record.getMessage() for record in caplog.records if record.getMessage().startswith("memory: ")]
-    assert ["the preview" in told[0], "half of the corners" in told[1]] == [True, True]
+    messages = [record.getMessage() for record in caplog.records if record.getMessage().startswith("memory: ")]
+    assert ["the preview" in messages[0], "half of the corners" in messages[1]] == [True, True]
     link.wait_for(lambda: link.statuses["pipeline"].values["corners_fill"].endswith("/750"))
     previews, scenes = len(link.previews), len(link.scenes)
     link.wait_for(lambda: len(link.scenes) > scenes + 5)
@@ -232,14 +232,16 @@ def test_the_recording_buffer_goes_before_the_corners(
     monkeypatch.setattr(service, "ResidentMemory", lambda: lambda: 1050.0)
     runs.start(msgspec.structs.replace(config, record=Record(when="threat", folder=str(tmp_path))))
     link.wait_for(lambda: link.statuses and "corners" in link.statuses["memory"].message)
-    told = "gave up the preview, most of the recording buffer, half of the corners"
-    assert link.statuses["memory"].message == told
+    given_up = "gave up the preview, most of the recording buffer, half of the corners"
+    assert link.statuses["memory"].message == given_up
 
 
 # Recording.
 
 
-def test_what_it_records_is_told_and_closed_at_the_end(config: Config, runs: Runs, link: Any, tmp_path: Path) -> None:
+def test_what_it_records_is_reported_and_closed_at_the_end(
+    config: Config, runs: Runs, link: Any, tmp_path: Path
+) -> None:
     record = Record(when="always", folder=str(tmp_path), free_mib=0)
     begun = runs.start(msgspec.structs.replace(config, record=record))
     link.wait_for(lambda: link.statuses and int(link.statuses["recorder"].values["pictures"]) > 5)
@@ -441,7 +443,9 @@ def test_a_camera_that_falls_silent_is_stale(
     assert link.statuses["camera"].message.startswith("silent since 2")
 
 
-def test_a_board_that_is_hot_is_told(config: Config, runs: Runs, link: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_board_that_is_hot_is_reported(
+    config: Config, runs: Runs, link: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(health, "read_board", lambda _: Board(91.0, ("cpufreq-cpu0",)))
     runs.start(config)
     link.wait_for(lambda: link.statuses)

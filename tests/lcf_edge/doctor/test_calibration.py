@@ -45,10 +45,10 @@ def test_a_mounting_that_is_set_to_the_default_is_measured(machine: Machine) -> 
     assert "camera.height_m" not in warned(machine(given=frozenset({"camera.height_m", "camera.pitch_rad"})))
 
 
-def learnt(machine: Machine, pitch_rad: str, sigma_rad: str, *, told_rad: float = 0.0) -> list[Finding]:
+def learnt(machine: Machine, pitch_rad: str, sigma_rad: str, *, configured_rad: float = 0.0) -> list[Finding]:
     """What is said of the pitch when the daemon that runs has learnt this."""
     values = {"camera_pitch_rad": pitch_rad, "camera_pitch_sigma_rad": sigma_rad}
-    context = machine(Config(camera=Camera(pitch_rad=told_rad)), path=Path("/etc/lcf-edge/config.toml"))
+    context = machine(Config(camera=Camera(pitch_rad=configured_rad)), path=Path("/etc/lcf-edge/config.toml"))
     status = DeviceStatus("pipeline", Level.OK, "runs", values)
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"pipeline": status}, "")
     return [finding for finding in calibration.check(context) if "driving shows" in finding.text]
@@ -62,14 +62,14 @@ def test_a_mounting_that_driving_contradicts_is_warned_of_with_the_key_to_set(ma
 
 
 @pytest.mark.parametrize(
-    ("pitch_rad", "sigma_rad", "told_rad"),
+    ("pitch_rad", "sigma_rad", "configured_rad"),
     [("0.0350", "0.0030", 0.03), ("0.0350", "0.0200", 0.0), ("0.0150", "0.0010", 0.0)],
     ids=["as told", "not sure", "less than a degree"],
 )
 def test_a_mounting_that_may_be_right_is_good(
-    machine: Machine, pitch_rad: str, sigma_rad: str, told_rad: float
+    machine: Machine, pitch_rad: str, sigma_rad: str, configured_rad: float
 ) -> None:
-    (found,) = learnt(machine, pitch_rad, sigma_rad, told_rad=told_rad)
+    (found,) = learnt(machine, pitch_rad, sigma_rad, configured_rad=configured_rad)
     assert found.level is Severity.OK
 
 

@@ -45,7 +45,7 @@ def plain(grey: int) -> Callable[[int, int, int], Grey]:
 
 @pytest.fixture
 def webcam() -> MockCamera:
-    return MockCamera(pictures=lambda _, width, height: drawn(width, height))
+    return MockCamera(images=lambda _, width, height: drawn(width, height))
 
 
 @pytest.fixture
@@ -80,7 +80,7 @@ def one(findings: list[Finding], level: Severity) -> Finding:
     return found
 
 
-def test_a_good_camera_is_told_with_its_figures(look: Look) -> None:
+def test_a_good_camera_is_reported_with_its_figures(look: Look) -> None:
     name, rate, light = look()
     assert {finding.level for finding in (name, rate, light)} == {Severity.OK}
     assert name.text == "/dev/video0: Mock Webcam"
@@ -118,7 +118,7 @@ class TestThroughLibcamera:
 
         return find
 
-    def test_it_is_told_with_its_figures(self, look: Look) -> None:
+    def test_it_is_reported_with_its_figures(self, look: Look) -> None:
         name, rate, _ = look(World())
         assert (name.level, name.text) == (Severity.OK, "/dev/video0: through libcamera")
         assert re.match(r"(29|30)\.\d/s", rate.text)
@@ -149,7 +149,7 @@ def test_without_permission_the_group_is_named(look: Look, webcam: MockCamera) -
     assert found.remedy.startswith("sudo usermod -aG video $USER")
 
 
-def test_a_node_without_pictures_is_told(look: Look) -> None:
+def test_a_node_without_pictures_is_reported(look: Look) -> None:
     found = one(look(video0=MockCamera(caps=v4l2.CAP_STREAMING), video1=MockCamera()), Severity.FAIL)
     assert "gives no pictures" in found.text
     assert "camera.device=/dev/video1" in found.remedy
@@ -226,13 +226,13 @@ def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera)
 
 
 @pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "burnt out")])
-def test_a_picture_without_use_is_told(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
-    webcam.pictures = plain(grey)
+def test_a_picture_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
+    webcam.images = plain(grey)
     found = one(look(), Severity.WARN)
     assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")
 
 
-def test_stamps_of_another_clock_are_told(look: Look, webcam: MockCamera) -> None:
+def test_stamps_of_another_clock_are_reported(look: Look, webcam: MockCamera) -> None:
     webcam.stamp_flags = v4l2.FLAG_STAMPED_AT_EXPOSURE
     assert one(look(), Severity.WARN).text.startswith("stamps that cannot be true (stamped at arrival ")
 
@@ -254,5 +254,5 @@ def test_a_camera_that_the_daemon_has_is_not_opened_but_asked_for(
 
     status = DeviceStatus("camera", Level.STALE, "silent since then", {"rate_hz": "29.97"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"camera": status}, "")
-    _, told = camera.check(context)
-    assert (told.level, told.text) == (Severity.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")
+    _, found = camera.check(context)
+    assert (found.level, found.text) == (Severity.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")

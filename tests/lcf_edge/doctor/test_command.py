@@ -45,7 +45,7 @@ def test_on_a_recording_nothing_fails(doctor: Doctor, capsys: pytest.CaptureFixt
     assert errors == ""
     *lines, empty, last = said.splitlines()
     assert (empty, last.partition(",")[0]) == ("", "nothing failed")
-    found = [told.split()[:2] for told in lines if not told.startswith(" ")]
+    found = [line_text.split()[:2] for line_text in lines if not line_text.startswith(" ")]
     assert {level for level, _ in found} <= LEVELS
     subjects = list(dict.fromkeys(subject for _, subject in found))
     assert subjects[0] == "configuration"
@@ -55,7 +55,7 @@ def test_on_a_recording_nothing_fails(doctor: Doctor, capsys: pytest.CaptureFixt
 
 def test_json_is_one_object_a_line(doctor: Doctor, capsys: pytest.CaptureFixture[str]) -> None:
     assert doctor("--json") == 0
-    found = [json.loads(told) for told in capsys.readouterr().out.splitlines()]
+    found = [json.loads(line_text) for line_text in capsys.readouterr().out.splitlines()]
     assert all(set(one) == {"level", "subject", "text", "remedy"} and one["level"] in LEVELS for one in found)
     assert any(one["subject"] == "camera" and "/s, jitter" in one["text"] for one in found)
 
@@ -67,7 +67,7 @@ def test_a_failure_is_exit_status_1_and_one_line(doctor: Doctor, capsys: pytest.
     assert errors == "lcf-edge: 1 check failed; fix the first one and look again\n"
 
 
-def test_a_wrong_configuration_is_exit_status_2_and_the_rest_is_told(
+def test_a_wrong_configuration_is_exit_status_2_and_the_rest_is_reported(
     doctor: Doctor, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert doctor("--set", "camera.fsp=30") == 2
@@ -99,7 +99,7 @@ def test_what_is_no_device_fails_in_one_line(
     subject = setting.partition(".")[0]
     driver = {"camera": "camera.driver=v4l2", "imu": "imu.driver=csv"}[subject]
     assert doctor("--set", driver, "--set", setting.format(place=tmp_path), "--json") == 1
-    found = [json.loads(told) for told in capsys.readouterr().out.splitlines()]
+    found = [json.loads(line_text) for line_text in capsys.readouterr().out.splitlines()]
     assert [one["subject"] for one in found if one["level"] == "fail"] == [subject]
 
 
@@ -118,13 +118,13 @@ def test_colours_are_for_terminals_that_want_them(no_color: str, colours: bool) 
 
 
 def test_names_of_others_do_not_command_the_terminal() -> None:
-    told = line(Finding(Severity.FAIL, "network", "taken by \x1b]0;mine\x07\x9b2J\n, process 7", "kill 7"))
-    assert all(part.isprintable() for part in told.split("\n"))
-    assert len(told.split("\n")) == 2
+    line_text = line(Finding(Severity.FAIL, "network", "taken by \x1b]0;mine\x07\x9b2J\n, process 7", "kill 7"))
+    assert all(part.isprintable() for part in line_text.split("\n"))
+    assert len(line_text.split("\n")) == 2
 
 
 def test_the_remedy_is_below_and_can_be_pasted() -> None:
-    told = line(Finding(Severity.WARN, "clock", "wrong", "sudo timedatectl set-ntp true"))
-    first, remedy = told.splitlines()
+    line_text = line(Finding(Severity.WARN, "clock", "wrong", "sudo timedatectl set-ntp true"))
+    first, remedy = line_text.splitlines()
     assert first == "warn  clock          wrong"
     assert remedy == " " * first.index("wrong") + "sudo timedatectl set-ntp true"

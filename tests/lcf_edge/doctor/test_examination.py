@@ -37,7 +37,7 @@ def test_findings_come_in_the_order_of_the_checks(machine: Machine) -> None:
     assert [finding.text for finding in examine(machine(), steps)] == ["one", "two", "three"]
 
 
-def test_a_check_that_hangs_is_told_and_left_behind(machine: Machine) -> None:
+def test_a_check_that_hangs_is_reported_and_left_behind(machine: Machine) -> None:
     released = threading.Event()
 
     def hangs(_: Context) -> Iterator[Finding]:

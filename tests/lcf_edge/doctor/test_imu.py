@@ -78,7 +78,7 @@ def bad(findings: list[Finding]) -> Finding:
 
 
 @pytest.mark.parametrize("driver", [driver for driver in CHIPS if driver != "bmi270"])  # that one wants its firmware
-def test_a_chip_at_rest_is_told_with_rate_gravity_and_bias(look: Look, driver: str) -> None:
+def test_a_chip_at_rest_is_reported_with_rate_gravity_and_bias(look: Look, driver: str) -> None:
     rate, gravity, bias = look(Imu(driver=driver), driver)  # type: ignore[arg-type]
     assert {finding.level for finding in (rate, gravity, bias)} == {Severity.OK}
     assert "/s, jitter " in rate.text
@@ -113,7 +113,7 @@ def test_without_a_driver_the_chip_that_is_there_is_proposed(look: Look) -> None
     assert found.remedy.startswith("lcf-edge doctor --set imu.driver=lsm6dso --set imu.address=0x6a ")
 
 
-def test_a_copy_that_no_driver_knows_is_told_and_how_to_learn_what_it_says(
+def test_a_copy_that_no_driver_knows_is_reported_and_how_to_learn_what_it_says(
     machine: Machine, clock: VirtualClock, write: Write
 ) -> None:
     write("dev/i2c-1", "")
@@ -234,7 +234,7 @@ def _with(context: Context, opened: object) -> Context:
     return context
 
 
-def test_a_noisy_wire_is_told(machine: Machine, clock: VirtualClock, write: Write) -> None:
+def test_a_noisy_wire_is_reported(machine: Machine, clock: VirtualClock, write: Write) -> None:
     write("dev/i2c-1", "")
     bus = Bus(clock, "mpu6050", resting())
 
@@ -301,7 +301,7 @@ def listen(machine: Machine) -> Callable[..., list[Finding]]:
     return find
 
 
-def test_a_serial_imu_at_rest_is_told(
+def test_a_serial_imu_at_rest_is_reported(
     listen: Look, plugged: Callable[..., str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(imu, "SECONDS", 0.5)
@@ -339,7 +339,7 @@ def test_a_missing_port_names_those_that_are_there(listen: Look, write: Write, t
     assert found.remedy.startswith(f"lcf-edge doctor --set imu.port={tmp_path}/dev/ttyACM0 ")
 
 
-def test_an_adapter_that_holds_bytes_back_is_told(listen: Look, write: Write, tmp_path: Path) -> None:
+def test_an_adapter_that_holds_bytes_back_is_reported(listen: Look, write: Write, tmp_path: Path) -> None:
     write("sys/bus/usb-serial/devices/ttyUSB0/latency_timer", "16\n")
     first, *_ = listen(Imu(driver="csv", port=str(tmp_path / "dev/ttyUSB0")))
     assert (first.level, first.text) == (Severity.WARN, "ttyUSB0: the adapter holds bytes back for 16 ms")

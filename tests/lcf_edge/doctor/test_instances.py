@@ -57,7 +57,7 @@ def test_a_configuration_belongs_to_the_instance_of_its_name_where_those_of_unit
     assert unit_of(Path(path), Path("/etc/lcf-edge")) == unit
 
 
-def test_two_that_share_nothing_are_told(front: Callable[[str, str], Context]) -> None:
+def test_two_that_share_nothing_are_reported(front: Callable[[str, str], Context]) -> None:
     (found,) = instances.check(front(REAR, "UnitFileState=enabled"))
     assert (found.level, found.text) == (Severity.OK, "nothing of lcf-edge@front collides with lcf-edge@rear")
 
@@ -88,7 +88,7 @@ def test_a_file_of_a_developer_has_no_others_beside_it(machine: Machine, tmp_pat
 
 
 @pytest.mark.parametrize(
-    ("same", "told"),
+    ("same", "collision"),
     [
         (Config(camera=Camera(device="/dev/video7")), "camera.device = /dev/video7"),
         (Config(imu=Imu(driver="csv", port="/dev/ttyUSB3")), "imu.port = /dev/ttyUSB3"),
@@ -100,8 +100,8 @@ def test_a_file_of_a_developer_has_no_others_beside_it(machine: Machine, tmp_pat
         (Config(metrics=Metrics(textfile="/run/a.prom")), "metrics.textfile = /run/a.prom"),
     ],
 )
-def test_what_only_one_can_have_is_named_with_its_value(same: Config, told: str) -> None:
-    assert told in instances.collisions(same, same)
+def test_what_only_one_can_have_is_named_with_its_value(same: Config, collision: str) -> None:
+    assert collision in instances.collisions(same, same)
 
 
 def test_what_is_not_in_use_collides_with_nothing() -> None:

@@ -38,7 +38,7 @@ def bad(findings: list[Finding]) -> Finding:
 # Board.
 
 
-def test_a_cool_board_is_told_with_name_and_temperature(machine: Machine, write: Write) -> None:
+def test_a_cool_board_is_reported_with_name_and_temperature(machine: Machine, write: Write) -> None:
     write("sys/firmware/devicetree/base/model", "Raspberry Pi 4 Model B Rev 1.4\0")
     write("sys/class/thermal/thermal_zone0/temp", "48312\n")
     write("sys/devices/system/cpu/cpu0/cpufreq/scaling_governor", "ondemand\n")
@@ -60,7 +60,7 @@ def test_a_cool_board_is_told_with_name_and_temperature(machine: Machine, write:
         ({"devices/system/cpu/cpu0/cpufreq/scaling_governor": "powersave"}, "kept slow (powersave)"),
     ],
 )
-def test_what_slows_a_board_down_is_told(machine: Machine, write: Write, files: dict[str, str], text: str) -> None:
+def test_what_slows_a_board_down_is_reported(machine: Machine, write: Write, files: dict[str, str], text: str) -> None:
     for name, content in files.items():
         write(f"sys/{name}", content)
     found = bad(list(board.check(machine(NO_FOLDER))))
@@ -74,7 +74,7 @@ def test_powersave_of_a_driver_that_steers_itself_is_good(machine: Machine, writ
     assert all(finding.level is Severity.OK for finding in board.check(machine(NO_FOLDER)))
 
 
-def test_a_full_disk_is_told(machine: Machine) -> None:
+def test_a_full_disk_is_reported(machine: Machine) -> None:
     full = Config(record=Record(folder="/", free_mib=1e12))
     assert "nothing is recorded, record.free_mib" in bad(list(board.check(machine(full)))).text
 
@@ -96,7 +96,7 @@ def test_the_clock_of_this_machine_can_be_read(machine: Machine) -> None:
         ({"resolution_s": 0.004}, "the monotonic clock steps by 4.0 ms"),
     ],
 )
-def test_a_clock_that_is_wrong_or_coarse_is_told(wrong: dict[str, float], text: str) -> None:
+def test_a_clock_that_is_wrong_or_coarse_is_reported(wrong: dict[str, float], text: str) -> None:
     assert all(finding.level is Severity.OK for finding in clock.judged(GOOD_CLOCK))
     found = bad(list(clock.judged(replace(GOOD_CLOCK, **wrong))))  # type: ignore[arg-type]
     assert found.level is Severity.WARN
@@ -121,12 +121,13 @@ def test_a_budget_that_is_too_small_comes_with_one_that_is_not(machine: Machine,
 
 
 @pytest.mark.parametrize(
-    ("told", "level"), [(meminfo(500), Severity.OK), (meminfo(60), Severity.FAIL), (meminfo(500, 200), Severity.WARN)]
+    ("meminfo_text", "level"),
+    [(meminfo(500), Severity.OK), (meminfo(60), Severity.FAIL), (meminfo(500, 200), Severity.WARN)],
 )
 def test_the_budget_must_be_free_and_nothing_swapped(
-    machine: Machine, write: Write, told: str, level: Severity
+    machine: Machine, write: Write, meminfo_text: str, level: Severity
 ) -> None:
-    write("proc/meminfo", told)
+    write("proc/meminfo", meminfo_text)
     assert [finding.level for finding in memory.check(machine())] == [Severity.OK, level]
 
 
@@ -221,7 +222,7 @@ def test_only_the_groups_of_configured_devices_are_looked_at(machine: Machine) -
     ]
 
 
-def test_a_device_of_another_group_is_told(machine: Machine, write: Write, tmp_path: Path) -> None:
+def test_a_device_of_another_group_is_reported(machine: Machine, write: Write, tmp_path: Path) -> None:
     write("dev/video0", "")
     os.chown(tmp_path / "dev/video0", -1, os.getgid())
     found = bad(list(permissions.check(machine())))
@@ -243,7 +244,7 @@ def test_versions_of_this_environment_are_good(machine: Machine) -> None:
     assert set(levels) == {Severity.OK}
 
 
-def test_a_filter_that_runs_uncompiled_is_told_with_the_remedy() -> None:
+def test_a_filter_that_runs_uncompiled_is_reported_with_the_remedy() -> None:
     assert software.compilation(Compiled("_compiled.abi3.so")).level is Severity.OK
     found = software.compilation(Compiled(reason="it was installed without a compiler", command="sudo apt install gcc"))
     assert found.level is Severity.WARN
@@ -255,7 +256,7 @@ def test_a_filter_that_runs_uncompiled_is_told_with_the_remedy() -> None:
     ("version", "level"),
     [("0.10.1", Severity.FAIL), ("1.4.9", Severity.FAIL), ("1.5.0", Severity.OK), ("2.0.0", Severity.WARN)],
 )
-def test_a_version_out_of_range_is_told(version: str, level: Severity) -> None:
+def test_a_version_out_of_range_is_reported(version: str, level: Severity) -> None:
     first, *_ = software.packages({"numpy": "2.1.0", "opencv-python-headless": "4.10.0", "eclipse-zenoh": version})
     assert first.level is level
     if level is not Severity.OK:

@@ -140,7 +140,9 @@ def test_a_port_of_a_program_that_may_not_be_known(machine: Machine, other: tupl
     assert found.remedy == f"sudo ss -ltnp 'sport = :{other[1]}'"
 
 
-def test_a_neighbour_that_cannot_be_reached_is_told(machine: Machine, endpoint: str, other: tuple[int, int]) -> None:
+def test_a_neighbour_that_cannot_be_reached_is_reported(
+    machine: Machine, endpoint: str, other: tuple[int, int]
+) -> None:
     with socket.socket() as silent:
         silent.bind(("127.0.0.1", 0))  # but it does not listen
         away = f"tcp/127.0.0.1:{silent.getsockname()[1]}"
@@ -181,7 +183,7 @@ def test_encryption_wants_certificates_of_both_and_the_gate(
     assert text in found.text
 
 
-def test_keys_that_others_can_read_are_told(tmp_path: Path) -> None:
+def test_keys_that_others_can_read_are_reported(tmp_path: Path) -> None:
     key, file = tmp_path / "rover.key", tmp_path / "zenoh.json5"
     key.touch(mode=0o600)
     file.write_text(f'{{transport: {{link: {{tls: {{listen_private_key: "{key}"}}}}}}}}')
@@ -256,7 +258,7 @@ def test_what_listens_but_is_no_daemon_is_not_waited_for_long(
     assert daemon.ask(Config(zenoh=Zenoh(listen=[f"tcp/127.0.0.1:{other[1]}"]))) is None
 
 
-def test_a_daemon_that_does_not_answer_is_told(machine: Machine, process: Callable[..., None]) -> None:
+def test_a_daemon_that_does_not_answer_is_reported(machine: Machine, process: Callable[..., None]) -> None:
     process(5, "lcf-edge", "run")
     found = bad(list(health.check(machine())))
     assert found.text.startswith("lcf-edge run, process 5 does not answer")

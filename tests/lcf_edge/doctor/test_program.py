@@ -35,9 +35,9 @@ def test_where_the_system_has_none_or_another_it_is_the_path(environment: Path, 
 
 
 @pytest.mark.parametrize("environment_has_it", [True, False])
-def test_what_is_told_here_runs_in_an_empty_folder(tmp_path: Path, environment_has_it: bool) -> None:
-    told = context_of(None, []).program if environment_has_it else program(tmp_path)
+def test_what_is_recommended_here_runs_in_an_empty_folder(tmp_path: Path, environment_has_it: bool) -> None:
+    program_line = context_of(None, []).program if environment_has_it else program(tmp_path)
     done = subprocess.run(
-        [*shlex.split(told), "--version"], cwd=tmp_path, env={}, check=True, capture_output=True, text=True
+        [*shlex.split(program_line), "--version"], cwd=tmp_path, env={}, check=True, capture_output=True, text=True
     )
     assert done.stdout == f"lcf-edge {__version__}\n"

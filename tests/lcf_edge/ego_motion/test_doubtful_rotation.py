@@ -63,8 +63,8 @@ def driven(truth: list[np.ndarray], spoil: Spoil, bias: tuple[float, float, floa
     residuals: list[np.ndarray] = []
     step = pipeline.filter.step
 
-    def watched(corners: object, motion: Motion, picture: object) -> object:
-        taken = step(corners, motion, picture)  # type: ignore[arg-type]
+    def watched(corners: object, motion: Motion, image: object) -> object:
+        taken = step(corners, motion, image)  # type: ignore[arg-type]
         motions.append(motion)
         residuals.append(taken.residual.turn_rad if taken.residual else np.zeros(3))
         return taken
@@ -132,7 +132,7 @@ def hangs(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
 
 
 @pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck"), (hangs, "gyro stuck")])
-def test_a_gyro_that_ends_in_the_middle_is_told_and_the_pictures_go_on(
+def test_a_gyro_that_ends_in_the_middle_is_reported_and_the_pictures_go_on(
     truth: list[np.ndarray], spoil: Spoil, note: str
 ) -> None:
     seen = driven(truth, spoil)

@@ -149,7 +149,7 @@ class TestUncertainty:
         assert quiet.advance(ns(0.2)).rotation_sigma_rad == pytest.approx(short.rotation_sigma_rad / 10, rel=0.1)
         assert long.rotation_sigma_rad > short.rotation_sigma_rad
 
-    def test_a_bias_that_is_unknown_is_part_of_it_and_told(self) -> None:
+    def test_a_bias_that_is_unknown_is_part_of_it_and_reported(self) -> None:
         ego = estimator()
         feed(ego, np.arange(0, 1, 0.01), gyro=lambda _: RATE)
         ego.advance(ns(0.1))
@@ -267,10 +267,10 @@ class TestBias:
         assert about(ego.bias, BIAS)
         np.testing.assert_allclose(ego.bias.mean_radps, BIAS, atol=2e-3)
 
-    @pytest.mark.parametrize("told", ["odometry", "picture"])
+    @pytest.mark.parametrize("rest_by", ["odometry", "image"])
     @pytest.mark.parametrize("bias", [BIAS, (0.35, -0.35, 0.35)], ids=["small", "20 degrees a second"])
     def test_is_learnt_at_rest_although_motors_shake_the_vehicle(
-        self, told: str, bias: tuple[float, float, float]
+        self, rest_by: str, bias: tuple[float, float, float]
     ) -> None:
         ego, random = estimator(), np.random.default_rng(0)
         for t in np.arange(0, 3, 0.05):
@@ -280,9 +280,9 @@ class TestBias:
                 gyro=lambda _: tuple(random.normal(bias, 0.05)),
                 accel=lambda _: tuple(random.normal(LEVEL, 1.3)),
             )
-            if told == "odometry":
+            if rest_by == "odometry":
                 ego.add_speed(SpeedSample(ns(t), 0.0, 0.0))
-            motion = ego.advance(ns(t + 0.045), still=t > 0.5 if told == "picture" else None)
+            motion = ego.advance(ns(t + 0.045), still=t > 0.5 if rest_by == "image" else None)
         assert about(ego.bias, bias)
         assert ego.bias.known
         assert motion.speed_mps == 0.0
@@ -360,7 +360,7 @@ class TestBrokenGyro:
     def alive(self, t: float) -> tuple[float, float, float]:
         return (0.0, 0.6 + 0.001 * np.sin(997 * t), 0.0)
 
-    def test_one_that_had_noise_and_sticks_is_told_and_not_used(self) -> None:
+    def test_one_that_had_noise_and_sticks_is_reported_and_not_used(self) -> None:
         ego, random = calibrated(), np.random.default_rng(0)
         feed(
             ego,
@@ -381,7 +381,7 @@ class TestBrokenGyro:
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(1.4))
         assert "no imu" in ego.advance(ns(1.5)).notes
-        motion = ego.see_picture(np.array([0.0, -0.06, 0.0]), np.full(3, 0.002))
+        motion = ego.add_image_rotation(np.array([0.0, -0.06, 0.0]), np.full(3, 0.002))
         assert "rotation from pictures" in motion.notes
         np.testing.assert_allclose(motion.rotation, turned_by((0.0, 0.06, 0.0)), atol=1e-3)
         assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.1)
@@ -391,9 +391,9 @@ class TestBrokenGyro:
         ego = calibrated()
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(0.5))
-        told = ego.advance(ns(0.55))
-        seen = ego.see_picture(np.array([0.0, 0.08, 0.0]), np.full(3, 0.002))
-        np.testing.assert_array_equal(seen.rotation, told.rotation)
+        rest_by = ego.advance(ns(0.55))
+        seen = ego.add_image_rotation(np.array([0.0, 0.08, 0.0]), np.full(3, 0.002))
+        np.testing.assert_array_equal(seen.rotation, rest_by.rotation)
         assert ego.bias.known
 
     def test_a_gyro_that_pictures_refute_for_a_second_is_unknown_again(self) -> None:
@@ -402,7 +402,7 @@ class TestBrokenGyro:
         ego.advance(ns(0.5))
         for t in 0.5 + np.arange(1, 30) * 0.05:
             ego.advance(ns(t))
-            ego.see_picture(np.array([0.0, -0.045, 0.0]), np.full(3, 0.002))  # 0.9 rad/s: the bias is -0.3
+            ego.add_image_rotation(np.array([0.0, -0.045, 0.0]), np.full(3, 0.002))  # 0.9 rad/s: the bias is -0.3
         assert ego.bias.mean_radps[1] == pytest.approx(-0.3, abs=0.02)
 
 

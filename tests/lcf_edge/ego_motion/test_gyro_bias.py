@@ -57,7 +57,7 @@ def test_a_bias_is_found_within_the_stated_sigma(size_radps: float) -> None:
 def test_the_first_observation_weighs_as_variances_say() -> None:
     bias = GyroBias()
     bias.advance(DT_S, np.full(3, 0.03), measured=True)
-    assert bias.see_picture(np.full(3, 0.1), np.full(3, 0.04))
+    assert bias.add_image_rotation(np.full(3, 0.1), np.full(3, 0.04))
     weight = PRIOR_RADPS**2 / (PRIOR_RADPS**2 + 0.03**2 + 0.04**2)
     assert bias.mean_radps == pytest.approx(np.full(3, 0.1 * weight), rel=1e-3)
     assert bias.sigma_radps == pytest.approx(np.full(3, PRIOR_RADPS * np.sqrt(1 - weight)), rel=1e-3)
@@ -131,7 +131,7 @@ def test_one_outlier_changes_nothing_and_a_second_of_them_all() -> None:
 def test_without_a_gyro_nothing_is_learnt_of_its_bias() -> None:
     bias = GyroBias()
     bias.advance(DT_S, np.full(3, 0.1), measured=False)
-    bias.see_picture(np.full(3, 0.2), np.full(3, 0.01))
+    bias.add_image_rotation(np.full(3, 0.2), np.full(3, 0.01))
     assert not bias.mean_radps.any()
     assert bias.sigma_radps == pytest.approx(np.full(3, PRIOR_RADPS))
     assert bias.error_radps == pytest.approx(np.full(3, 0.2), abs=0.01)
@@ -139,23 +139,23 @@ def test_without_a_gyro_nothing_is_learnt_of_its_bias() -> None:
 
 
 rates = st.lists(st.floats(-40, 40), min_size=3, max_size=3)
-seen = st.tuples(st.sampled_from(["rest", "picture", "flow", "doubt"]), rates, st.floats(1e-6, 10), st.booleans())
+seen = st.tuples(st.sampled_from(["rest", "image", "flow", "doubt"]), rates, st.floats(1e-6, 10), st.booleans())
 
 
 @given(st.lists(seen, max_size=40), st.floats(0, 10))
 @settings(deadline=None)
-def test_whatever_is_told_numbers_stay_finite_and_sigmas_positive_and_bounded(
-    told: Sequence[tuple[str, list[float], float, bool]], dt_s: float
+def test_whatever_is_reported_numbers_stay_finite_and_sigmas_positive_and_bounded(
+    inputs: Sequence[tuple[str, list[float], float, bool]], dt_s: float
 ) -> None:
     bias = GyroBias()
-    for what, rate, sigma, measured in told:
+    for what, rate, sigma, measured in inputs:
         bias.advance(dt_s, np.full(3, sigma / 7), measured)
         if what == "doubt":
             bias.doubt()
         elif what == "rest":
             bias.see_rest(np.array(rate), sigma)
-        elif what == "picture":
-            bias.see_picture(np.array(rate), np.full(3, sigma))
+        elif what == "image":
+            bias.add_image_rotation(np.array(rate), np.full(3, sigma))
         else:
             bias.see_flow(np.array(rate), np.full(3, sigma), sigma)
         for value in (bias.mean_radps, bias.error_radps):

@@ -35,7 +35,7 @@ def sky_and_walls(seed: int = 0) -> Grey:
 PANORAMA = sky_and_walls()
 
 
-def picture(lens: Lens, turned_rad: npt.ArrayLike = (0.0, 0.0, 0.0), panorama: Grey = PANORAMA) -> Grey:
+def image(lens: Lens, turned_rad: npt.ArrayLike = (0.0, 0.0, 0.0), panorama: Grey = PANORAMA) -> Grey:
     """What a camera sees whose directions have turned by the vector since the start; (height, width)."""
     x, y = np.meshgrid(np.arange(lens.width), np.arange(lens.height))
     ideal = lens.undistort(np.stack((x.ravel(), y.ravel()), axis=1).astype(np.float32)).astype(np.float64)
@@ -55,9 +55,11 @@ def seen(lens: Lens, before: Grey, after: Grey) -> Turn | None:
 
 @pytest.mark.parametrize("lens", LENSES.values(), ids=LENSES.keys())
 @pytest.mark.parametrize("share", [(0.0, 0.0), (0.0, 1.0), (0.0, -1.0), (0.7, 0.7), (-0.4, 0.1)])
-def test_up_to_100_degrees_a_second_are_told_within_the_stated_sigma(lens: Lens, share: tuple[float, float]) -> None:
+def test_up_to_100_degrees_a_second_are_reported_within_the_stated_sigma(
+    lens: Lens, share: tuple[float, float]
+) -> None:
     truth = np.array([*share, 0.0]) * HUNDRED_DEGREES_PER_S
-    turn = seen(lens, picture(lens), picture(lens, truth))
+    turn = seen(lens, image(lens), image(lens, truth))
     assert turn is not None
     assert (np.abs(turn.turn_rad - truth)[:2] < 2 * turn.sigma_rad[:2]).all()
     assert (turn.sigma_rad[:2] < 0.015).all()
@@ -73,8 +75,8 @@ def test_noise_light_and_roll_change_little(
     lens, random = LENSES["640x480"], np.random.default_rng(seed)
     truth = np.array([pitch, yaw, 0.5 * roll]) * HUNDRED_DEGREES_PER_S
     panorama = sky_and_walls(seed)
-    after = picture(lens, truth, panorama) * gain + random.normal(0, noise, (480, 640))
-    turn = seen(lens, picture(lens, (0.0, 0.0, 0.0), panorama), np.clip(after, 0, 255).astype(np.uint8))
+    after = image(lens, truth, panorama) * gain + random.normal(0, noise, (480, 640))
+    turn = seen(lens, image(lens, (0.0, 0.0, 0.0), panorama), np.clip(after, 0, 255).astype(np.uint8))
     assert turn is not None
     assert (np.abs(turn.turn_rad - truth)[:2] < 3 * turn.sigma_rad[:2]).all()
 
@@ -83,7 +85,7 @@ def test_noise_light_and_roll_change_little(
 def test_something_large_that_moves_by_itself_is_not_followed(share: float) -> None:
     lens = LENSES["640x480"]
     truth = np.array([0.0, 0.03, 0.0])
-    before, after = picture(lens), picture(lens, truth)
+    before, after = image(lens), image(lens, truth)
     width = round(share * lens.width)
     body = sky_and_walls(7)[: lens.height, : width + 40]
     before[:, 100 : 100 + width] = body[:, :width]
@@ -95,7 +97,7 @@ def test_something_large_that_moves_by_itself_is_not_followed(share: float) -> N
 
 def test_what_comes_nearer_turns_nothing() -> None:
     lens = LENSES["640x480"]
-    whole = picture(lens)
+    whole = image(lens)
     nearer = cv2.resize(whole[12:-12, 16:-16], (640, 480), interpolation=cv2.INTER_LINEAR)  # 5 % in one picture
     turn = seen(lens, whole, np.asarray(nearer, np.uint8))
     assert turn is not None
@@ -109,14 +111,14 @@ def test_pictures_that_share_nothing_do_not_tell(what: str) -> None:
         "plain": (np.full((480, 640), 120, np.uint8),) * 2,
         "dark": (np.zeros((480, 640), np.uint8),) * 2,
         "other noise": tuple(random.integers(0, 256, (2, 480, 640), np.uint8)),
-        "another place": (picture(lens), picture(lens, (0.0, 0.0, 0.0), sky_and_walls(9))),
+        "another place": (image(lens), image(lens, (0.0, 0.0, 0.0), sky_and_walls(9))),
     }[what]
     assert seen(lens, before, after) is None
 
 
-def test_roll_is_not_told() -> None:
+def test_roll_is_not_reported() -> None:
     lens = LENSES["640x480"]
-    turn = seen(lens, picture(lens), picture(lens))
+    turn = seen(lens, image(lens), image(lens))
     assert turn is not None
     assert turn.sigma_rad[2] > 1
 
@@ -124,10 +126,10 @@ def test_roll_is_not_told() -> None:
 def test_after_forgetting_one_picture_tells_nothing() -> None:
     lens = LENSES["160x120"]
     rotation = ImageRotation(lens)
-    rotation.turn(picture(lens))
+    rotation.turn(image(lens))
     rotation.forget()
-    assert rotation.turn(picture(lens)) is None
-    assert rotation.turn(picture(lens)) is not None
+    assert rotation.turn(image(lens)) is None
+    assert rotation.turn(image(lens)) is not None
 
 
 @given(width=st.integers(8, 400), height=st.integers(8, 400))

@@ -15,7 +15,7 @@ def corners(seed: int = 0, number: int = 300) -> npt.NDArray[np.int32]:
     return np.random.default_rng(seed).integers((12, 12), (WIDTH - 12, HEIGHT - 12), (number, 2)).astype(np.int32)
 
 
-def told(frames: int, place: npt.NDArray[np.int32], px_a_frame: float = 0.0, jump_px: int = 0) -> list[bool | None]:
+def verdicts(frames: int, place: npt.NDArray[np.int32], px_a_frame: float = 0.0, jump_px: int = 0) -> list[bool | None]:
     stillness, random = Stillness(WIDTH, HEIGHT), np.random.default_rng(1)
     answers = []
     for frame in range(frames):
@@ -26,18 +26,18 @@ def told(frames: int, place: npt.NDArray[np.int32], px_a_frame: float = 0.0, jum
 
 
 def test_half_a_second_must_pass_before_it_tells() -> None:
-    answers = told(40, corners())
+    answers = verdicts(40, corners())
     assert answers[:10] == [None] * 10
     assert answers[10:] == [True] * 30
 
 
 def test_motors_may_make_corners_jump_by_a_pixel() -> None:
-    assert told(40, corners(), jump_px=1)[10:] == [True] * 30
+    assert verdicts(40, corners(), jump_px=1)[10:] == [True] * 30
 
 
 @pytest.mark.parametrize("px_a_frame", [0.5, 2.0, -7.0])
 def test_a_picture_that_moves_is_not_still(px_a_frame: float) -> None:
-    assert not any(told(25, corners(), px_a_frame)[10:])
+    assert not any(verdicts(25, corners(), px_a_frame)[10:])
 
 
 @pytest.mark.parametrize(("walkers", "still"), [(60, True), (200, False)])

@@ -49,10 +49,10 @@ def test_one_report_of_many_recordings_and_the_broken_one_is_left_out(
 ) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", str(corpus), "--out", str(out), "--jobs", "2"]) == 0
-    told = capsys.readouterr()
-    assert re.search(r"broken\.mcap: left out: .*broken\.mcap", told.err)
-    assert "read      2 recordings, 1 left out" in told.out
-    assert f"report    {out}/index.html" in told.out
+    output = capsys.readouterr()
+    assert re.search(r"broken\.mcap: left out: .*broken\.mcap", output.err)
+    assert "read      2 recordings, 1 left out" in output.out
+    assert f"report    {out}/index.html" in output.out
     found = rows(out)
     assert found["broken.mcap"].error
     known, bare = found["with-truth"], found["without"]
@@ -70,7 +70,7 @@ def test_the_page_shows_every_picture_and_refers_to_nothing_else(corpus: Path, t
     out = tmp_path / "out"
     assert main(["evaluate", str(corpus), "--out", str(out), "--jobs", "1"]) == 0
     links = Links((out / "index.html").read_text())
-    shown = {picture.file for row in rows(out).values() for picture in row.pictures}
+    shown = {image.file for row in rows(out).values() for image in row.pictures}
     assert shown
     assert {target for target in links.targets if not target.startswith("#")} == shown
     assert {target[1:] for target in links.targets if target.startswith("#")} <= links.ids
@@ -83,7 +83,7 @@ def test_a_second_report_in_the_same_folder_leaves_nothing_of_the_first(corpus: 
         assert main(["evaluate", str(place), "--out", str(out), "--jobs", "1"]) == 0
     (row,) = rows(out).values()
     there = {str(path.relative_to(out)) for path in out.rglob("*") if path.is_file()}
-    assert there == {"index.html", "report.json", row.frames, *(picture.file for picture in row.pictures)}
+    assert there == {"index.html", "report.json", row.frames, *(image.file for image in row.pictures)}
 
 
 def test_names_of_recordings_are_text_in_the_page(corpus: Path, tmp_path: Path) -> None:
@@ -109,7 +109,7 @@ def test_the_same_again_differs_in_no_frame_and_another_configuration_in_some(
     assert f"(was {found} of {FRAMES})" in capsys.readouterr().out
     page = (tmp_path / "other/index.html").read_text()
     assert "filter.corners_target=20" in page
-    different = [picture for picture in row.pictures if picture.why]
+    different = [image for image in row.pictures if image.why]
     assert different
     pair = cv2.imread(str(tmp_path / "other" / different[0].file))
     assert pair is not None
@@ -127,7 +127,7 @@ def test_truth_is_named_for_one_recording_or_as_a_folder_for_many(
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "output"),
     [
         (["--against", "nowhere"], "nowhere: cannot be read"),
         (["--against", "corpus/with-truth/truth.jsonl"], "no report of lcf-edge evaluate"),
@@ -137,13 +137,13 @@ def test_truth_is_named_for_one_recording_or_as_a_folder_for_many(
     ],
 )
 def test_wrong_usage_is_one_line_before_work_begins(
-    corpus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+    corpus: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], arguments: list[str], output: str
 ) -> None:
     monkeypatch.chdir(corpus.parent)
     assert main(["evaluate", "corpus", *arguments]) == 2
     errors = capsys.readouterr().err
     assert len(errors.splitlines()) == 1
-    assert told in errors
+    assert output in errors
     assert not (corpus.parent / "evaluation").exists()
 
 

@@ -69,9 +69,9 @@ def test_small_threats_need_not_be_found() -> None:
 
 
 def test_rebels_with_trust_count_and_nothing_else() -> None:
-    told = circles((1.0, 1.0), (2.0, 2.0), (3.0, 3.0))
-    told["kind"][0], told["trust"][1] = Kind.NORMAL, 2.9
-    assert rebels(told)["x"].tolist() == [3.0]
+    reported = circles((1.0, 1.0), (2.0, 2.0), (3.0, 3.0))
+    reported["kind"][0], reported["trust"][1] = Kind.NORMAL, 2.9
+    assert rebels(reported)["x"].tolist() == [3.0]
 
 
 def test_frames_in_a_row_of_which_the_same_can_be_said_are_one_event() -> None:

@@ -23,14 +23,14 @@ def pattern(width: int, height: int, seed: int, grain_px: float = 2.5) -> Grey:
     return np.asarray(np.clip(128 + 45 * soft / soft.std(), 0, 255), np.uint8)
 
 
-def drawn(picture: Grey, texture: Grey, left: float, top: float, scale: float) -> Grey:
+def drawn(image: Grey, texture: Grey, left: float, top: float, scale: float) -> Grey:
     """The picture with the texture, that many times as large, its corner there, px."""
     matrix = np.array([[scale, 0, left], [0, scale, top]])
-    size = picture.shape[1], picture.shape[0]
+    size = image.shape[1], image.shape[0]
     put = cv2.warpAffine(texture, matrix, size, flags=cv2.INTER_AREA if scale < 0.5 else cv2.INTER_LINEAR)
     where = cv2.warpAffine(np.full_like(texture, 255), matrix, size)
     share = where.astype(np.float32) / 255
-    return np.asarray(np.rint(picture * (1 - share) + put * share), np.uint8)
+    return np.asarray(np.rint(image * (1 - share) + put * share), np.uint8)
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Board:
     height_m: float = 1.0
     speed_mps: float = 1.0
     yaw_rate_radps: float = 0.0
-    told_mps: float | None = None
+    measured_mps: float | None = None
     frames: int = 50
     fps: float = 20.0
     flicker: float = 0.6
@@ -57,19 +57,19 @@ class Board:
     def __iter__(self) -> Iterator[tuple[Corners, Motion, Grey]]:
         detector = CornerDetector(Filter(), LENS, 1500)
         random = np.random.default_rng(self.seed)
-        told_mps = self.speed_mps if self.told_mps is None else self.told_mps
+        measured_mps = self.speed_mps if self.measured_mps is None else self.measured_mps
         for seq in range(self.frames):
-            picture = self.picture(seq)
-            corners, _ = detector.detect(picture)
+            image = self.image(seq)
+            corners, _ = detector.detect(image)
             kept = random.random(len(corners)) >= self.flicker
             shown = Corners(corners.pixel[kept], corners.position[kept], corners.appearance[kept])
-            yield shown, Motion(1 / self.fps, np.eye(3), 0.001, told_mps, self.yaw_rate_radps), picture
+            yield shown, Motion(1 / self.fps, np.eye(3), 0.001, measured_mps, self.yaw_rate_radps), image
 
     def distance_m(self, seq: int) -> float:
         """From the camera to the board."""
         return self.range_m - self.speed_mps * seq / self.fps
 
-    def picture(self, seq: int) -> Grey:
+    def image(self, seq: int) -> Grey:
         """What the camera sees."""
         background = 160 + pattern(LENS.width, LENS.height, self.seed + 100) // 8
         px_m = LENS.fx / self.distance_m(seq)

@@ -86,7 +86,7 @@ class Drive:
         rotation, place = self.pose(seq)
         return np.asarray((self.points_m + self.velocity_mps * moved_s - place) @ rotation.T)
 
-    def in_picture(self, seq: int) -> npt.NDArray[np.float32]:
+    def in_image(self, seq: int) -> npt.NDArray[np.float32]:
         """(n, 2) px of the ideal pinhole; NaN behind the camera."""
         x, y, z = self.in_camera(seq).T
         z = np.where(z > 0.05, z, np.nan)
@@ -95,7 +95,7 @@ class Drive:
 
     def corners(self, seq: int) -> Corners:
         """Those in the picture, at whole pixels of the input frame."""
-        raw = np.rint(self.lens.distort(self.in_picture(seq)))
+        raw = np.rint(self.lens.distort(self.in_image(seq)))
         size = self.lens.width, self.lens.height
         seen = np.flatnonzero(((raw >= 0) & (raw < size)).all(axis=1))  # NaN compares false
         pixel = raw[seen].astype(np.int32)

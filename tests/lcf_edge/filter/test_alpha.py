@@ -90,7 +90,7 @@ def test_a_landmark_that_jumps_once_is_no_rebel(drive: Drive) -> None:
     """20 px between two frames, then it stands."""
     way = drive(np.array([(1.5, -0.9, 5.0)]), np.array([-4.0, 0, 0]), from_s=0.5, until_s=0.55, frames=30)
     found = rebels_by_frame(way)
-    assert way.in_picture(11)[0, 0] < way.in_picture(10)[0, 0] - 15
+    assert way.in_image(11)[0, 0] < way.in_image(10)[0, 0] - 15
     assert not any(found)
 
 

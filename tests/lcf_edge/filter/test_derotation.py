@@ -65,7 +65,7 @@ def spread(number: int, seed: int = 0) -> npt.NDArray[np.float32]:
 def test_every_stored_position_is_warped() -> None:
     edges, circles, psi = EdgeTable(20, 10, 10), (CircleTable(5), CircleTable(3)), PsiTable(4)
     edges.append(20)
-    edges.rebel[:20:2], edges.links[1:20:4] = True, 1  # the origin of others means nothing
+    edges.rebel[:20:2], edges.suspect_keys[1:20:4] = True, 1  # the origin of others means nothing
     before = spread(20)
     edges.x[:20], edges.y[:20] = before
     edges.origin_x[:20], edges.origin_y[:20] = before[::-1]
@@ -98,7 +98,7 @@ def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float
     """As the middle of the picture does."""
     edges, circles = EdgeTable(4, 2, 2), (CircleTable(3), CircleTable(3))
     edges.append(4)
-    edges.beta[:4], edges.rebel[:2], edges.links[2:4] = 0.5, True, 1
+    edges.beta[:4], edges.rebel[:2], edges.suspect_keys[2:4] = 0.5, True, 1
     for table in circles:
         table.beta[:] = -1.0
         table.active[:] = True

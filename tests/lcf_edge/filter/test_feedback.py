@@ -99,7 +99,7 @@ def test_nothing_on_the_path_is_omitted_however_far(crowd: Any, drive: Drive, bo
     way = crowd + far
     seen = range(len(crowd.points_m), len(way.points_m))
     for seq, tables, _ in steps(way):
-        assert not inside(tables, way.in_picture(seq)[seen]).any()
+        assert not inside(tables, way.in_image(seq)[seen]).any()
 
 
 def test_a_wide_vehicle_omits_less(crowd: Any) -> None:
@@ -125,7 +125,7 @@ def test_a_region_goes_along_with_what_it_was_written_on(crowd: Any, psi_at: Cal
     held: dict[int, npt.NDArray[np.intp]] = {}
     compared = 0
     for seq, tables, _ in steps(crowd):
-        at = crowd.in_picture(seq)
+        at = crowd.in_image(seq)
         holder = psi_at(tables.psi, *at.T)
         for number, row in ids(tables).items():
             before = held.setdefault(number, np.flatnonzero(holder == row))
@@ -173,7 +173,7 @@ def test_a_region_never_covers_what_breaks_the_flow(crowd: Any, drive: Drive, bo
     omitted = 0
     for _, tables, step in steps(replace(way, frames=30)):
         edges, n = tables.edges, tables.edges.count
-        breaks = edges.rebel[:n] | (edges.links[:n] > 0)
+        breaks = edges.rebel[:n] | (edges.suspect_keys[:n] > 0)
         assert not inside(tables, np.stack([edges.x[:n], edges.y[:n]], axis=1)[breaks]).any()
         circles = tables.rebel
         assert not inside(tables, np.stack([circles.x, circles.y], axis=1)[circles.active]).any()

@@ -156,7 +156,7 @@ def test_the_rotation_since_every_key_frame_is_put_right() -> None:
         assert right.rotation_px(slot) < 0.2 * wrong.rotation_px(slot)
 
 
-def test_a_key_frame_keeps_what_the_flow_told_of_its_rotation() -> None:
+def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation() -> None:
     seen = Seen(slot_turn_rad=0.02)
     seen.keys.sigma_rad[0] = 0.02
     rotation = np.asarray(seen.measured().keys.rotation)
@@ -169,7 +169,7 @@ def test_a_key_frame_keeps_what_the_flow_told_of_its_rotation() -> None:
     assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
 
 
-def test_a_key_frame_that_nothing_told_of_stays_as_uncertain_as_the_gyro_leaves_it() -> None:
+def test_a_key_frame_that_the_flow_says_nothing_of_stays_as_uncertain_as_the_gyro_leaves_it() -> None:
     seen = Seen()
     seen.keys.sigma_rad[:] = 0.01
     assert lines.sigma_along(seen.measured(14).baselines, PINHOLE, 0, 500.0, 300.0) == pytest.approx(
@@ -179,9 +179,9 @@ def test_a_key_frame_that_nothing_told_of_stays_as_uncertain_as_the_gyro_leaves_
     few.keys.sigma_rad[:] = 0.01
     few.measured()
     assert few.baselines.is_fitted
-    oldest, told = (lines.sigma_along(few.baselines, PINHOLE, slot, 500.0, 300.0) for slot in (0, KEY_FRAMES - 6))
+    oldest, fitted = (lines.sigma_along(few.baselines, PINHOLE, slot, 500.0, 300.0) for slot in (0, KEY_FRAMES - 6))
     assert oldest >= 0.01 * PINHOLE.focal
-    assert told < 0.3 * oldest
+    assert fitted < 0.3 * oldest
 
 
 def turn_share(distortion: float, frames: int = 60) -> float:

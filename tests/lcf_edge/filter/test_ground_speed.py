@@ -25,7 +25,7 @@ def ground(landmarks: int = 300, height_m: float = 0.3) -> npt.NDArray[np.float6
     return np.stack([x, np.full(landmarks, height_m), z], axis=1)
 
 
-def told(way: Any, speed_mps: float, config: Config | None = None) -> GroundSpeed:
+def ground_speed(way: Any, speed_mps: float, config: Config | None = None) -> GroundSpeed:
     """What the ground tells at the end of a drive of which a wrong speed was told."""
     tables = LineCircleFilter(config or Config(), way.lens)
     for corners, motion in way:
@@ -34,22 +34,22 @@ def told(way: Any, speed_mps: float, config: Config | None = None) -> GroundSpee
 
 
 @pytest.mark.parametrize("wrong_mps", [2.0, 1.0, 3.0, -0.5])
-def test_the_ground_tells_the_speed_whatever_was_told(drive: Drive, clutter: Landmarks, wrong_mps: float) -> None:
+def test_the_ground_tells_the_speed_whatever_was_reported(drive: Drive, clutter: Landmarks, wrong_mps: float) -> None:
     way = replace(drive(ground()) + drive(clutter(100)), frames=16)
-    found = told(way, wrong_mps)
+    found = ground_speed(way, wrong_mps)
     assert found.speed_mps == pytest.approx(2.0, rel=0.1)
     assert abs(found.speed_mps - 2.0) < 2 * found.sigma_mps
-    assert found.told_mps == pytest.approx(wrong_mps, rel=0.1)
+    assert found.measured_mps == pytest.approx(wrong_mps, rel=0.1)
 
 
-def test_where_no_ground_is_seen_nothing_is_told(drive: Drive, clutter: Landmarks) -> None:
+def test_where_no_ground_is_seen_nothing_is_reported(drive: Drive, clutter: Landmarks) -> None:
     above = clutter(200) * np.array([1.0, 1.0, 1.0]) - np.array([0.0, 0.6, 0.0])
-    assert math.isnan(told(replace(drive(above), frames=16), 2.0).speed_mps)
+    assert math.isnan(ground_speed(replace(drive(above), frames=16), 2.0).speed_mps)
 
 
-def test_without_a_height_of_the_camera_nothing_is_told(drive: Drive) -> None:
+def test_without_a_height_of_the_camera_nothing_is_reported(drive: Drive) -> None:
     config = Config(camera=Camera(height_m=0))
-    assert math.isnan(told(replace(drive(ground()), frames=16), 2.0, config).speed_mps)
+    assert math.isnan(ground_speed(replace(drive(ground()), frames=16), 2.0, config).speed_mps)
 
 
 def test_a_speed_by_the_accelerometer_follows_the_ground_as_far_as_it_is_unsure() -> None:

@@ -48,7 +48,7 @@ def test_the_answer_is_that_of_numpy(number: int, seed: int) -> None:
     root = np.sqrt(weights)
     all_rows = np.concatenate([rows * root[:, None], np.diag(np.sqrt(priors))])
     expected = np.linalg.lstsq(all_rows, np.concatenate([measured * root, np.zeros(number)]), rcond=None)[0]
-    assert np.asarray(equations.answer)[:number] == pytest.approx(expected, rel=1e-6, abs=1e-9)
+    assert np.asarray(equations.solution)[:number] == pytest.approx(expected, rel=1e-6, abs=1e-9)
 
 
 @given(unknowns, seeds)
@@ -67,13 +67,13 @@ def test_what_was_measured_without_error_is_found_exactly(number: int, seed: int
     truth = np.random.default_rng(seed).uniform(-3, 3, number)
     equations = entered(rows, rows @ truth, weights, np.zeros(number))
     least_squares.solve(equations)
-    assert np.asarray(equations.answer)[:number] == pytest.approx(truth, rel=1e-5, abs=1e-6)
+    assert np.asarray(equations.solution)[:number] == pytest.approx(truth, rel=1e-5, abs=1e-6)
 
 
 def test_nothing_measured_leaves_the_priors() -> None:
     equations = entered(np.empty((0, 3)), np.empty(0), np.empty(0), np.array([4.0, 1.0, 0.25]))
     least_squares.solve(equations)
-    assert np.asarray(equations.answer)[:3].tolist() == [0.0, 0.0, 0.0]
+    assert np.asarray(equations.solution)[:3].tolist() == [0.0, 0.0, 0.0]
     least_squares.invert(equations)
     assert np.diag(equations.inverse)[:3] == pytest.approx([0.25, 1.0, 4.0])
 
@@ -82,8 +82,8 @@ def test_what_nothing_tells_stays_finite() -> None:
     """Rows that are all alike, without a prior, leave a direction open."""
     equations = entered(np.ones((10, 2)), np.full(10, 3.0), np.ones(10), np.zeros(2))
     least_squares.solve(equations)
-    assert np.isfinite(equations.answer).all()
-    assert sum(np.asarray(equations.answer)[:2]) == pytest.approx(3.0)
+    assert np.isfinite(equations.solution).all()
+    assert sum(np.asarray(equations.solution)[:2]) == pytest.approx(3.0)
 
 
 def test_equations_are_begun_anew() -> None:
@@ -93,4 +93,4 @@ def test_equations_are_begun_anew() -> None:
     equations.row[0] = 2.0
     least_squares.add(equations, 1.0, 6.0)
     least_squares.solve(equations)
-    assert equations.answer[0] == pytest.approx(3.0)
+    assert equations.solution[0] == pytest.approx(3.0)

@@ -86,7 +86,7 @@ def check(tables: LineCircleFilter, step: Step, corners: Corners, memory: Memory
         assert np.isfinite(getattr(edges, name)[:n]).all(), name
     assert (edges.trust[:n] <= TRUST.tr_max).all()
     assert (edges.bl[:n] > 0).all()
-    breaks = edges.rebel[:n] | (edges.links[:n] > 0)
+    breaks = edges.rebel[:n] | (edges.suspect_keys[:n] > 0)
     for circles, rebel in ((tables.normal, False), (tables.rebel, True)):
         live = circles.active
         for name in ("x", "y", "radius", "beta", "speed", "trust"):

@@ -152,7 +152,7 @@ def test_only_trusted_normal_edges_that_are_seen_count(scene: Scene) -> None:
     doubtful, rebels, chains, held = (scene.add(cluster(*at)) for at in (LOWER_RIGHT, UPPER_LEFT, UPPER_RIGHT, FAR))
     scene.edges.trust[doubtful] = TR_S - 0.5
     scene.edges.rebel[rebels] = True
-    scene.edges.links[chains] = 1
+    scene.edges.suspect_keys[chains] = 1
     scene.edges.held[held] = True
     assert scene.update().circles.count == 0
 

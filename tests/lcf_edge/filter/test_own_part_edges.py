@@ -69,7 +69,7 @@ def test_what_stays_in_the_picture_for_a_second_is_nobodys_rebel(street: Any) ->
         if seq > ONE_SECOND:
             assert len(own) > 0.8 * len(bumper.pixel)
         assert not tables.edges.rebel[own].any()
-        assert not tables.edges.links[own].any()
+        assert not tables.edges.suspect_keys[own].any()
 
 
 def test_what_flows_is_no_own_part(street: Any) -> None:

@@ -16,12 +16,12 @@ CONFIG = Config(vehicle=VEHICLE)
 
 def driven(board: Board, config: Config = CONFIG) -> list[LineCircleFilter]:
     """The filter after the drive, once for each frame in which it told of a rebel circle; the last one always."""
-    tables, told = LineCircleFilter(config, LENS), []
-    for corners, motion, picture in board:
-        tables.step(corners, motion, picture)
+    tables, reported = LineCircleFilter(config, LENS), []
+    for corners, motion, image in board:
+        tables.step(corners, motion, image)
         if (tables.rebel.active & (tables.rebel.trust >= config.filter.tr_s)).any():
-            told.append(tables)
-    return told
+            reported.append(tables)
+    return reported
 
 
 def without_patches(config: Config) -> Config:
@@ -33,8 +33,8 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
     assert not driven(board, without_patches(CONFIG))
     tables = LineCircleFilter(CONFIG, LENS)
     ranges_m = []
-    for seq, (corners, motion, picture) in enumerate(board):
-        tables.step(corners, motion, picture)
+    for seq, (corners, motion, image) in enumerate(board):
+        tables.step(corners, motion, image)
         rebel = tables.rebel
         for c in np.flatnonzero(rebel.active & (rebel.trust >= 3)):
             assert rebel.cause[c] == Cause.INCOMING
@@ -47,11 +47,11 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
 
 def test_it_is_an_object_that_stands() -> None:
     tables = LineCircleFilter(CONFIG, LENS)
-    told = 0
-    for corners, motion, picture in Board():
-        tables.step(corners, motion, picture)
-        told += int((tables.objects.active & (tables.objects.trust >= 3)).any())
-    assert told > 5
+    reported = 0
+    for corners, motion, image in Board():
+        tables.step(corners, motion, image)
+        reported += int((tables.objects.active & (tables.objects.trust >= 3)).any())
+    assert reported > 5
 
 
 @pytest.mark.parametrize(
@@ -60,11 +60,11 @@ def test_it_is_an_object_that_stands() -> None:
         pytest.param(Board(right_m=1.2), id="beside the way"),
         pytest.param(Board(range_m=30.0, width_m=4.0, height_m=4.0), id="beyond the horizon"),
         pytest.param(Board(yaw_rate_radps=0.4), id="in a turn, which leaves it aside"),
-        pytest.param(Board(told_mps=math.nan), id="without a speed"),
-        pytest.param(Board(speed_mps=0.0, told_mps=1.0, frames=40), id="while nothing comes nearer"),
+        pytest.param(Board(measured_mps=math.nan), id="without a speed"),
+        pytest.param(Board(speed_mps=0.0, measured_mps=1.0, frames=40), id="while nothing comes nearer"),
     ],
 )
-def test_what_will_not_be_met_is_not_told(board: Board) -> None:
+def test_what_will_not_be_met_is_not_reported(board: Board) -> None:
     assert not driven(board)
 
 

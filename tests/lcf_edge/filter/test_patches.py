@@ -24,21 +24,21 @@ MAX_MISSES, LIFE_S = 4, 2.5  # as the module has them
 Grey = npt.NDArray[np.uint8]
 
 
-def born(picture: Grey, lens: Lens = LENS, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> Patches | None:
+def born(image: Grey, lens: Lens = LENS, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> Patches | None:
     patches = Patches(2)
-    is_born = functions.give_birth(patches, 0, x, y, HALF_PX, memory_of(picture.reshape(-1)), ImagePlane(lens))
+    is_born = functions.give_birth(patches, 0, x, y, HALF_PX, memory_of(image.reshape(-1)), ImagePlane(lens))
     return patches if is_born else None
 
 
-def follow(patches: Patches, picture: Grey, lens: Lens = LENS) -> None:
-    functions.follow(patches, memory_of(picture.reshape(-1)), ImagePlane(lens))
+def follow(patches: Patches, image: Grey, lens: Lens = LENS) -> None:
+    functions.follow(patches, memory_of(image.reshape(-1)), ImagePlane(lens))
 
 
-def grown(picture: Grey, scale: float, right_px: float = 0.0, down_px: float = 0.0) -> Grey:
+def grown(image: Grey, scale: float, right_px: float = 0.0, down_px: float = 0.0) -> Grey:
     """The picture about the middle of the patch, that many times as large, and shifted."""
     x, y = MIDDLE
     matrix = np.array([[scale, 0, x - scale * x + right_px], [0, scale, y - scale * y + down_px]])
-    return np.asarray(cv2.warpAffine(picture, matrix, (640, 480), flags=cv2.INTER_CUBIC), np.uint8)
+    return np.asarray(cv2.warpAffine(image, matrix, (640, 480), flags=cv2.INTER_CUBIC), np.uint8)
 
 
 @given(
@@ -49,11 +49,11 @@ def grown(picture: Grey, scale: float, right_px: float = 0.0, down_px: float = 0
 def test_place_and_scale_are_found_to_a_part_of_a_pixel_whatever_the_light(
     scale: float, right_px: float, down_px: float, contrast: float, light: int, seed: int
 ) -> None:
-    picture = pattern(640, 480, seed)
-    patches = born(picture)
+    image = pattern(640, 480, seed)
+    patches = born(image)
     assume(patches is not None)  # else this place shows no scale
     assert patches is not None
-    seen = np.clip(128 + light + contrast * (grown(picture, scale, right_px, down_px) - 128.0), 0, 255)
+    seen = np.clip(128 + light + contrast * (grown(image, scale, right_px, down_px) - 128.0), 0, 255)
     follow(patches, seen.astype(np.uint8))
     assert not patches.misses[0]
     assert (patches.x[0], patches.y[0]) == pytest.approx((MIDDLE[0] + right_px, MIDDLE[1] + down_px), abs=0.25)
@@ -62,24 +62,24 @@ def test_place_and_scale_are_found_to_a_part_of_a_pixel_whatever_the_light(
 
 
 def test_over_many_pictures_the_scale_is_that_since_the_first_one() -> None:
-    picture = pattern(640, 480, 3, 4.0)
-    patches = born(picture)
+    image = pattern(640, 480, 3, 4.0)
+    patches = born(image)
     assert patches is not None
     for scale in np.linspace(1.0, 1.8, 30):
-        follow(patches, grown(picture, scale))
+        follow(patches, grown(image, scale))
     assert patches.scale[0] == pytest.approx(1.8, abs=0.02)
     assert (patches.x[0], patches.y[0]) == pytest.approx(MIDDLE, abs=0.2)
 
 
 def test_the_lens_is_in_what_is_compared() -> None:
     """Towards the rim a fisheye shows things smaller; what turns there has not gone away."""
-    picture = pattern(1200, 1200, 5, 4.0)
+    image = pattern(1200, 1200, 5, 4.0)
     x, y = np.meshgrid(np.arange(640, dtype=np.float32), np.arange(480, dtype=np.float32))
     ideal = FISHEYE.undistort_pixels(x.ravel().astype(np.int32), y.ravel().astype(np.int32)).reshape(480, 640, 2)
 
     def shown(right_px: float) -> Grey:
         at = ideal - np.array([right_px - 280, -360], np.float32)
-        return np.asarray(cv2.remap(picture, at[..., 0], at[..., 1], cv2.INTER_LINEAR), np.uint8)
+        return np.asarray(cv2.remap(image, at[..., 0], at[..., 1], cv2.INTER_LINEAR), np.uint8)
 
     patches = born(shown(0), FISHEYE, 340.0, 240.0)
     assert patches is not None
@@ -92,12 +92,12 @@ def test_the_lens_is_in_what_is_compared() -> None:
 
 @pytest.mark.parametrize("nothing", ["plain", "an edge", "at the border"])
 def test_what_does_not_show_its_scale_is_no_patch(nothing: str) -> None:
-    picture = pattern(640, 480, 1)
+    image = pattern(640, 480, 1)
     if nothing == "plain":
-        picture[:] = 90
+        image[:] = 90
     if nothing == "an edge":
-        picture[:, :330], picture[:, 330:] = 60, 180
-    assert born(picture, x=5.0 if nothing == "at the border" else MIDDLE[0]) is None
+        image[:, :330], image[:, 330:] = 60, 180
+    assert born(image, x=5.0 if nothing == "at the border" else MIDDLE[0]) is None
 
 
 def test_what_is_gone_is_missed_and_ends_after_a_few_pictures() -> None:
@@ -112,14 +112,14 @@ def test_what_is_gone_is_missed_and_ends_after_a_few_pictures() -> None:
 
 
 def test_it_ends_with_its_time_and_without_a_speed(situation: type[Situation]) -> None:
-    picture = pattern(640, 480, 1)
-    old, lost = born(picture), born(picture)
+    image = pattern(640, 480, 1)
+    old, lost = born(image), born(image)
     assert old is not None
     assert lost is not None
     around = situation(speed_mps=0.0)
     while old.active[0]:
         functions.predict(old, around)
-        follow(old, picture)
+        follow(old, image)
     assert old.elapsed_s[0] == pytest.approx(LIFE_S, abs=2 * around.dt_s)
     functions.predict(lost, situation(speed_mps=float("nan")))
     assert not lost.active[0]
@@ -127,15 +127,15 @@ def test_it_ends_with_its_time_and_without_a_speed(situation: type[Situation]) -
 
 def test_what_stands_tells_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
     """From 5 m to 4 m: s = 5/4, and 1/Z = (s - 1)/ΔZ."""
-    picture, around = pattern(640, 480, 7, 4.0), situation(speed_mps=2.0)
-    patches = born(picture)
+    image, around = pattern(640, 480, 7, 4.0), situation(speed_mps=2.0)
+    patches = born(image)
     assert patches is not None
     for ahead_m in np.arange(0.1, 1.05, 0.1):
         functions.predict(patches, around)
         right_px, down_px = (
             (MIDDLE[k] - (around.focus_x, around.focus_y)[k]) * ahead_m / (5 - ahead_m) for k in range(2)
         )
-        follow(patches, grown(picture, 5 / (5 - ahead_m), right_px, down_px))
+        follow(patches, grown(image, 5 / (5 - ahead_m), right_px, down_px))
     assert patches.depth_m[0] == pytest.approx(1.0)
     assert 1 / patches.inverse[0] == pytest.approx(4.0, rel=0.1)
     assert abs(patches.inverse[0] - 0.25) < 3 * patches.doubt[0]

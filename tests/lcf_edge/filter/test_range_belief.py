@@ -181,9 +181,9 @@ def test_whatever_is_measured_the_belief_is_finite_and_probabilities_are(
 
 def test_what_is_seen_as_small_as_a_hand_is_not_right_in_front(situation: Situation) -> None:
     """Nothing else tells how far it is."""
-    told: dict[str, Any] = {"mm": 4.0, "qq": 4.0, "is_cut": True, "foot": 0.0}
+    unmeasured: dict[str, Any] = {"mm": 4.0, "qq": 4.0, "is_cut": True, "foot": 0.0}
     small, large = (
-        belief_of(evidence_of(0.5, 0, 0, 0.02, 1.0, half_extent=half, **told), situation(speed_mps=1.0))
+        belief_of(evidence_of(0.5, 0, 0, 0.02, 1.0, half_extent=half, **unmeasured), situation(speed_mps=1.0))
         for half in (0.02, 0.5)
     )
     assert small.mean[RANGE] > 2 * large.mean[RANGE]

@@ -217,12 +217,12 @@ def test_an_aligned_circle_gains_one_a_frame_up_to_the_most(scene: Scene) -> Non
     assert seen == [min(NEWBORN + frame, TR_MAX) for frame in range(6)]
 
 
-def test_a_circle_of_few_rebels_is_told_a_frame_later_than_one_of_many(situation: Situation) -> None:
-    def told_after(number: int) -> int:
+def test_a_circle_of_few_rebels_is_reported_a_frame_later_than_one_of_many(situation: Situation) -> None:
+    def reported_after(number: int) -> int:
         scene = Scene(situation())
         return next(frame for frame in range(10) if scene.update(CROSSING, number=number).trust[0] >= TR_S)
 
-    assert [told_after(number) for number in (3, 4, 5, 8)] == [2, 2, 1, 1]
+    assert [reported_after(number) for number in (3, 4, 5, 8)] == [2, 2, 1, 1]
 
 
 def test_a_deviated_circle_takes_the_new_direction_and_loses_one(scene: Scene) -> None:

@@ -73,7 +73,7 @@ class Watched:
 
     def place(self, seq: int) -> npt.NDArray[np.float32]:
         """(2, n) px."""
-        at = self.drive.in_picture(seq).T
+        at = self.drive.in_image(seq).T
         return np.asarray(np.rint(at) if self.rounded else at, np.float32)
 
     def judged(self, edges: EdgeTable, baselines: Baselines, slot: int) -> Verdicts:
@@ -361,7 +361,7 @@ def born(*l123: tuple[float, float]) -> EdgeTable:
     """E_r from key positions L1, L2, L3, the last two 0.1 s apart."""
     edges, first, second = EdgeTable(4, 2, 2), Verdicts(1), Verdicts(1)
     edges.append(1)
-    edges.x[0], edges.y[0], edges.links[0] = *l123[2], 2
+    edges.x[0], edges.y[0], edges.suspect_keys[0] = *l123[2], 2
     for verdicts, (x, y) in zip((first, second), l123[:2], strict=True):
         np.asarray(verdicts.x)[0], np.asarray(verdicts.y)[0] = x, y
     rebel_detection.give_birth(edges.columns, first, 0, second, 0, 0.1, SETTINGS)
@@ -373,7 +373,7 @@ def test_a_rebel_is_born_with_the_papers_numbers() -> None:
     edges = born((10, 10), (20, 10), (30, 14))
     beta = math.atan2(4, 20)
     assert edges.rebel[0]
-    assert edges.links[0] == 0
+    assert edges.suspect_keys[0] == 0
     assert edges.beta[0] == pytest.approx(beta)  # ∠(L3 - L1)
     assert edges.deviation[0] == pytest.approx(beta - 0.0)  # ∠(L3 - L1) - ∠(L2 - L1)
     assert edges.speed[0] == pytest.approx(math.hypot(10, 4) / 0.1)  # |L3 - L2| / t

@@ -14,15 +14,15 @@ from lcf_edge.filter import LineCircleFilter
 Drive = Callable[..., Any]
 Landmarks = Callable[..., npt.NDArray[np.float64]]
 
-TOLD_MPS = 2.0
+MEASURED_MPS = 2.0
 SOON = 15  # pictures, 0.75 s
 
 
-def verdicts(way: Any, config: Config | None = None, told_mps: float = TOLD_MPS) -> Iterator[LineCircleFilter]:
+def verdicts(way: Any, config: Config | None = None, measured_mps: float = MEASURED_MPS) -> Iterator[LineCircleFilter]:
     """The filter after each step, told a speed that need not be true."""
     tables = LineCircleFilter(config or Config(), way.lens)
     for corners, motion in way:
-        tables.step(corners, replace(motion, speed_mps=told_mps))
+        tables.step(corners, replace(motion, speed_mps=measured_mps))
         yield tables
 
 
@@ -39,7 +39,7 @@ def street(ground: Any, drive: Drive, clutter: Landmarks) -> Any:
     return ground + drive(clutter(150))
 
 
-def test_who_stands_is_seen_to_stand_whatever_speed_is_told(street: Any) -> None:
+def test_who_stands_is_seen_to_stand_whatever_speed_is_reported(street: Any) -> None:
     """Also after a second, when nothing has left its pixel for so long that it may be a part of the vehicle."""
     stood = [tables.stands for tables in verdicts(replace(street, speed_mps=0.0, frames=50))]
     assert stood[SOON:] == [True] * 35
@@ -48,7 +48,7 @@ def test_who_stands_is_seen_to_stand_whatever_speed_is_told(street: Any) -> None
 @pytest.mark.parametrize("speed_mps", [0.5, 2.0, -1.0])
 def test_who_drives_does_not_stand(street: Any, speed_mps: float) -> None:
     way = replace(street, speed_mps=speed_mps)
-    assert not any(tables.stands for tables in verdicts(way, told_mps=speed_mps))
+    assert not any(tables.stands for tables in verdicts(way, measured_mps=speed_mps))
 
 
 def test_who_stands_where_somebody_walks_is_seen_to_stand_in_most_pictures(
@@ -60,7 +60,7 @@ def test_who_stands_where_somebody_walks_is_seen_to_stand_in_most_pictures(
 
 
 def test_a_leader_in_a_street_that_flows_does_not_make_it_stand(street: Any, drive: Drive, box: Landmarks) -> None:
-    leader = drive(box((0.0, 0.1, 2.5), (0.6, 0.35, 0.0), landmarks=40), np.array([0, 0, TOLD_MPS]))
+    leader = drive(box((0.0, 0.1, 2.5), (0.6, 0.35, 0.0), landmarks=40), np.array([0, 0, MEASURED_MPS]))
     assert not any(tables.stands for tables in verdicts(street + leader))
 
 
@@ -76,7 +76,7 @@ def test_it_drives_on_once_the_ground_flows(street: Any) -> None:
     stood = []
     for way in (replace(street, speed_mps=0.0), street):
         for corners, motion in way:
-            tables.step(corners, replace(motion, speed_mps=TOLD_MPS))
+            tables.step(corners, replace(motion, speed_mps=MEASURED_MPS))
         stood.append(tables.stands)
     assert stood == [True, False]
 
@@ -94,6 +94,6 @@ def test_from_an_unknown_height_nothing_is_concluded(street: Any) -> None:
     assert not any(tables.stands for tables in verdicts(replace(street, speed_mps=0.0), unknown))
 
 
-@pytest.mark.parametrize("told_mps", [float("nan"), 0.0])
-def test_without_a_speed_there_is_nothing_to_doubt(street: Any, told_mps: float) -> None:
-    assert not any(tables.stands for tables in verdicts(replace(street, speed_mps=0.0), told_mps=told_mps))
+@pytest.mark.parametrize("measured_mps", [float("nan"), 0.0])
+def test_without_a_speed_there_is_nothing_to_doubt(street: Any, measured_mps: float) -> None:
+    assert not any(tables.stands for tables in verdicts(replace(street, speed_mps=0.0), measured_mps=measured_mps))

@@ -73,14 +73,14 @@ def test_who_leaves_to_the_side_never_stands_and_is_never_imminent(
 ) -> None:
     """Beside the path, walking away from it, the vehicle fast."""
     walker = drive(box((1.0 * side, -0.55, 5.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.4 * side, 0, 0]))
-    told = 0
+    reported = 0
     for tables in steps(replace(drive(clutter(150)) + walker, frames=36)):
         objects = tables.objects
         for row in published(objects):
-            told += 1
+            reported += 1
             assert objects.class_id[row] != ObjectClass.STANDING
             assert objects.probability[row] < 0.1
-    assert told > 5
+    assert reported > 5
 
 
 def test_what_goes_ahead_leads(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
@@ -133,15 +133,15 @@ def test_without_a_speed_the_contact_is_known_and_no_speed_over_ground(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
     walker = drive(box((-1.6, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.0, 0, 0]))
-    told = 0
+    reported = 0
     for tables in steps(replace(drive(clutter(150)) + walker, frames=24), speed_mps=math.nan):
         objects = tables.objects
         for row in published(objects):
-            told += 1
+            reported += 1
             assert objects.class_id[row] == ObjectClass.UNKNOWN
             assert math.isnan(objects.forward[row])
             assert not math.isnan(objects.ttc[row])
-    assert told
+    assert reported
 
 
 def test_a_full_table_gives_way_and_counts_it(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
@@ -154,41 +154,41 @@ def test_a_full_table_gives_way_and_counts_it(drive: Drive, box: Landmarks, clut
     assert sum(evicted) > 0
 
 
-def test_an_object_is_told_from_its_third_frame_on(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+def test_an_object_is_reported_from_its_third_frame_on(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     """The numbers of its first frames are those of a few edges."""
     walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
-    told_after_s = []
+    reported_after_s = []
     for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
-        told_after_s += tables.objects.age_s[published(tables.objects)].tolist()
-    assert told_after_s
-    assert min(told_after_s) == pytest.approx(2 / FPS)
+        reported_after_s += tables.objects.age_s[published(tables.objects)].tolist()
+    assert reported_after_s
+    assert min(reported_after_s) == pytest.approx(2 / FPS)
 
 
-def test_of_few_edges_it_is_told_three_frames_later(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+def test_of_few_edges_it_is_reported_three_frames_later(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=6), np.array([1.2, 0, 0]))
-    few, told_after_s = Config(filter=Filter(rebel_support=3)), []
+    few, reported_after_s = Config(filter=Filter(rebel_support=3)), []
     for tables in steps(replace(drive(clutter(150)) + walker, frames=30), few):
-        told_after_s += tables.objects.age_s[published(tables.objects)].tolist()
-    assert min(told_after_s) == pytest.approx(5 / FPS)
+        reported_after_s += tables.objects.age_s[published(tables.objects)].tolist()
+    assert min(reported_after_s) == pytest.approx(5 / FPS)
 
 
 def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
     walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
-    circles_told = 0
+    circles_reported = 0
     for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
         objects, circles = tables.objects, tables.rebel
         for o in published(objects):
             if objects.class_id[o] != ObjectClass.CROSSING or objects.probability[o] > 0.5:
                 continue
             for c in np.flatnonzero(circles.active & (circles.square == o)):
-                circles_told += 1
+                circles_reported += 1
                 assert circles.cause[c] == Cause.CROSSING
                 for number in ("range", "lateral"):
                     of_both = getattr(circles, number)[c], getattr(objects, number)[o]
                     assert of_both[0] == pytest.approx(of_both[1], nan_ok=True)
-    assert circles_told > 5
+    assert circles_reported > 5
 
 
 def test_where_nothing_breaks_the_flow_there_is_no_object(drive: Drive, clutter: Landmarks) -> None:
@@ -234,7 +234,7 @@ def test_who_leaves_the_picture_at_its_side_is_expected_there_for_a_second(
     assert max(unseen_s) < 1.3
 
 
-def test_where_the_speed_is_told_too_low_the_ground_is_no_object(drive: Drive, clutter: Landmarks) -> None:
+def test_where_the_speed_is_reported_too_low_the_ground_is_no_object(drive: Drive, clutter: Landmarks) -> None:
     """By half of the speed the ground would be a thing that stands above it, twice as near."""
     random = np.random.default_rng(4)
     ground = np.stack([random.uniform(-1.5, 1.5, 500), np.full(500, 0.3), random.uniform(0.6, 9, 500)], axis=1)
@@ -244,7 +244,7 @@ def test_where_the_speed_is_told_too_low_the_ground_is_no_object(drive: Drive, c
 
 
 @pytest.mark.parametrize("fps", [10.0, 20.0, 40.0])
-def test_what_is_told_does_not_depend_on_the_frame_rate(
+def test_what_is_reported_does_not_depend_on_the_frame_rate(
     drive: Drive, box: Landmarks, clutter: Landmarks, fps: float
 ) -> None:
     walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))

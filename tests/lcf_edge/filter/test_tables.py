@@ -8,7 +8,20 @@ from hypothesis import strategies as st
 from lcf_edge.filter import edge_rows
 from lcf_edge.filter.tables import NO_CIRCLE, EdgeTable
 
-COLUMNS = ("x", "y", "beta", "speed", "bl", "trust", "deviation", "origin_x", "origin_y", "born_key", "circle", "links")
+COLUMNS = (
+    "x",
+    "y",
+    "beta",
+    "speed",
+    "bl",
+    "trust",
+    "deviation",
+    "origin_x",
+    "origin_y",
+    "born_key",
+    "circle",
+    "suspect_keys",
+)
 
 
 def numbered(rows: int, normal: int = 20, rebel: int = 10, chains: int = 10) -> EdgeTable:
@@ -20,7 +33,7 @@ def numbered(rows: int, normal: int = 20, rebel: int = 10, chains: int = 10) -> 
         getattr(table, name)[:rows] = number
     table.key_x[:rows] = table.key_y[:rows] = number[:, None]
     table.appearance[:rows] = number[:, None]
-    table.links[:rows] = 0
+    table.suspect_keys[:rows] = 0
     return table
 
 
@@ -45,7 +58,7 @@ def test_the_living_stay_whole_and_packed_when_others_are_removed(dead: list[boo
 
 def test_new_rows_are_empty_whoever_was_there_before() -> None:
     table = numbered(30)
-    table.links[:30], table.rebel[:30] = 1, True
+    table.suspect_keys[:30], table.rebel[:30] = 1, True
     table.remove(np.arange(30) >= 10)
     rows = table.append(20)
     assert (rows.start, rows.stop, table.count) == (10, 30, 30)
@@ -72,12 +85,12 @@ def test_the_least_trusted_leave_the_youngest_of_equals_first() -> None:
 def test_trimming_holds_each_kind_to_its_own_capacity_and_counts() -> None:
     table = numbered(30, normal=20, rebel=10, chains=3)
     table.rebel[:6] = True
-    table.links[10:18] = 1
+    table.suspect_keys[10:18] = 1
     evicted = table.trim()
     n = table.count
     assert n - np.count_nonzero(table.rebel[:n]) == 20
     assert np.count_nonzero(table.rebel[:n]) == 6
-    assert np.count_nonzero(table.links[:n]) == 3
+    assert np.count_nonzero(table.suspect_keys[:n]) == 3
     assert evicted == 4 + 5
     assert set(whole(table).tolist()) == set(range(30)) - {6, 7, 8, 9}  # trust is the row's number
     assert table.trim() == 0

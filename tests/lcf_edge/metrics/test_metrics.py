@@ -37,10 +37,10 @@ def read(text: bytes) -> dict[str, float]:
     return found
 
 
-def test_levels_and_numbers_are_told_and_nothing_else() -> None:
-    told = read(prometheus_text(STATUSES, 'ro"v\\er'))
-    assert str(told.pop("lcf_edge_pipeline_bad")) == "nan"
-    assert told == {
+def test_levels_and_numbers_are_reported_and_nothing_else() -> None:
+    metrics = read(prometheus_text(STATUSES, 'ro"v\\er'))
+    assert str(metrics.pop("lcf_edge_pipeline_bad")) == "nan"
+    assert metrics == {
         "camera": 0,
         "pipeline": 1,
         "link": 3,
@@ -71,7 +71,7 @@ def test_the_file_is_replaced_as_a_whole_and_goes_in_the_end(tmp_path: Path) -> 
     assert not path.exists()
 
 
-def test_a_file_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "missing" / "lcf-edge.prom"
     sink = MetricsSink(Config(metrics=Metrics(textfile=str(path))))
     sink.put_diagnostics(5, STATUSES)
@@ -143,6 +143,6 @@ def test_who_sends_slowly_does_not_hold_up_the_end(endpoint: Endpoint, monkeypat
     assert not endpoint._thread.is_alive()
 
 
-def test_a_port_that_is_taken_is_told_by_its_key(endpoint: Endpoint) -> None:
+def test_a_port_that_is_taken_is_reported_by_its_key(endpoint: Endpoint) -> None:
     with pytest.raises(LcfError, match=r"metrics\.port"):
         Endpoint(endpoint.port)

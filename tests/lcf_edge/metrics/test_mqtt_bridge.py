@@ -59,7 +59,7 @@ def messages(broker: int) -> Iterator[queue.Queue[tuple[str, Any]]]:
     client.loop_stop()
 
 
-def test_objects_and_health_arrive_and_its_end_is_told(
+def test_objects_and_health_arrive_and_its_end_is_reported(
     rover: Any, broker: int, messages: queue.Queue[tuple[str, Any]]
 ) -> None:
     command = (sys.executable, str(BRIDGE), rover.endpoint, "127.0.0.1", "--port", str(broker), "--robot", "seven")

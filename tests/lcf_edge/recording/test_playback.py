@@ -226,7 +226,7 @@ class TestFaults:
         assert min(delays_s) < max(delays_s)
         assert all((frame.stamp_ns - start_ns) % FRAME_NS == 0 for frame, _ in frames)
 
-    def test_a_stall_is_told_as_the_real_driver_tells_it(self, devices: Devices) -> None:
+    def test_a_stall_is_reported_as_the_real_driver_tells_it(self, devices: Devices) -> None:
         faults = Faults()
         camera = devices(RecordedCamera, faults=faults)
         camera.read()
@@ -275,8 +275,8 @@ class TestRefusals:
 
     def test_pictures_that_cannot_be_read(self, recording: Path, clock: VirtualClock) -> None:
         camera = RecordedCamera(recording, Config(), clock)
-        for picture in (recording / "mav0/cam0/data").iterdir():
-            picture.write_bytes(b"no picture")
+        for image_path in (recording / "mav0/cam0/data").iterdir():
+            image_path.write_bytes(b"no picture")
         with pytest.raises(DeviceLostError, match="not one picture"):
             camera.read()
         camera.close()

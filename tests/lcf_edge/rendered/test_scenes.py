@@ -18,7 +18,7 @@ from lcf_edge.rendered.rendering import Renderer
 from lcf_edge.rendered.scenes import Box, Drive, Lamp, Lens, Paint, Profile, SensorNoise, Shake
 from lcf_edge.rendered.truth import passages, truth
 
-SILENT = SensorNoise(gyro_radps=0, accel_mps2=0, speed_mps=0, yaw_rate_radps=0, picture=0)
+SILENT = SensorNoise(gyro_radps=0, accel_mps2=0, speed_mps=0, yaw_rate_radps=0, image=0)
 SHAKES = (
     Shake("pitch", 0.02, 7.0, 0.3),
     Shake("roll", 0.015, 5.0, 1.0),
@@ -103,7 +103,7 @@ def test_box_is_clipped_to_the_picture():
 
 def test_surface_moves_exactly_with_its_homography():
     box = standing(0.0, 4.0, width=3.0, height=3.0)
-    pictures = [frame.image for frame, _ in islice(scenes.frames(drive(box, shakes=SHAKES)), 3)]
+    images = [frame.image for frame, _ in islice(scenes.frames(drive(box, shakes=SHAKES)), 3)]
     stage = Stage(drive(box, shakes=SHAKES))
     face = np.array([[-1.0, -1.2, 3.75], [1.0, -1.2, 3.75], [1.0, -0.2, 3.75], [-1.0, -0.2, 3.75]])
     quads = []
@@ -112,11 +112,11 @@ def test_surface_moves_exactly_with_its_homography():
         seen = (face - view.position) @ view.attitude @ stage.optics.matrix.T
         quads.append((seen[:, :2] / seen[:, 2:]).astype(np.float32))
     back = cv2.warpPerspective(
-        pictures[2], cv2.getPerspectiveTransform(quads[1], quads[0]), (640, 480), flags=cv2.INTER_CUBIC
+        images[2], cv2.getPerspectiveTransform(quads[1], quads[0]), (640, 480), flags=cv2.INTER_CUBIC
     )
     inside = np.zeros((480, 640), np.uint8)
     cv2.fillConvexPoly(inside, quads[0].astype(np.int32), 255)
-    still, carried = (cv2.absdiff(pictures[0], other)[inside > 0].mean() for other in (pictures[2], back))
+    still, carried = (cv2.absdiff(images[0], other)[inside > 0].mean() for other in (images[2], back))
     assert carried < 2.0 < 3 * carried + 2.0 < still
 
 
@@ -306,7 +306,7 @@ def test_exposure_scales_the_picture():
 
 
 def test_noise_changes_from_picture_to_picture():
-    spec = drive(standing(0.0, 4.0), speed=0.0, noise=replace(SILENT, picture=3.0))
+    spec = drive(standing(0.0, 4.0), speed=0.0, noise=replace(SILENT, image=3.0))
     (first, _), (second, _) = islice(scenes.frames(spec), 2)
     difference = first.image.astype(float) - second.image
     assert difference.std() == pytest.approx(3.0 * math.sqrt(2), rel=0.1)
@@ -323,11 +323,11 @@ def test_motion_blur_takes_away_detail():
 def test_rows_are_read_one_after_the_other_and_the_middle_one_at_the_stamp():
     spec = drive(yaw_rate=0.8, readout_s=0.032)
     stage = Stage(replace(spec, readout_s=0.0))
-    rolled = Renderer(Stage(spec)).picture(stage.view(0.5)).astype(int)
+    rolled = Renderer(Stage(spec)).image(stage.view(0.5)).astype(int)
     for band in (4, 5, 7):
         rows = np.s_[60 * band : 60 * band + 60]
         late = 0.032 * ((band + 0.5) / 8 - 0.5)
-        same, other = (Renderer(stage).picture(stage.view(0.5 + each)).astype(int) for each in (late, late - 0.02))
+        same, other = (Renderer(stage).image(stage.view(0.5 + each)).astype(int) for each in (late, late - 0.02))
         assert np.abs(rolled[rows] - same[rows]).mean() < 0.1
         assert np.abs(rolled[rows] - other[rows]).mean() > 1.0
 
@@ -361,26 +361,26 @@ def first_bounds(spec, time_s):
     return faces[min(faces)].bounds
 
 
-def first_picture(spec):
+def first_image(spec):
     return next(iter(scenes.frames(spec)))[0].image
 
 
 def test_own_parts_stay_in_their_place_and_hide_the_world():
     part = ((100.0, 300.0), (400.0, 300.0), (400.0, 479.0), (100.0, 479.0))
     spec = drive(standing(0.0, 3.0), own_parts=(part,), shakes=SHAKES)
-    pictures = [frame.image for frame, _ in islice(scenes.frames(spec), 3)]
+    images = [frame.image for frame, _ in islice(scenes.frames(spec), 3)]
     inside = np.s_[301:479, 101:400]
-    assert np.array_equal(pictures[0][inside], pictures[2][inside])
-    assert not np.array_equal(pictures[0][:300], pictures[2][:300])
-    bare = first_picture(replace(spec, own_parts=()))
-    assert np.array_equal(pictures[0][:299], bare[:299])
-    assert cv2.absdiff(pictures[0][inside], bare[inside]).mean() > 10
+    assert np.array_equal(images[0][inside], images[2][inside])
+    assert not np.array_equal(images[0][:300], images[2][:300])
+    bare = first_image(replace(spec, own_parts=()))
+    assert np.array_equal(images[0][:299], bare[:299])
+    assert cv2.absdiff(images[0][inside], bare[inside]).mean() > 10
 
 
 def test_the_floor_mirrors_lamps_where_their_images_are():
     lamp = Lamp(0.5, 10.0, 0.6, 0.8)
     spec = drive(lamps=(lamp,), ceiling_m=2.5, gloss=0.5)
-    lit, dark = (first_picture(each).astype(int) for each in (spec, replace(spec, lamps=())))
+    lit, dark = (first_image(each).astype(int) for each in (spec, replace(spec, lamps=())))
     rows, columns = np.nonzero(np.abs(lit - dark) > 25)
     below = rows > 240
     for y_m, seen in ((-2.5, ~below), (2.5, below)):
@@ -393,7 +393,7 @@ def test_the_floor_mirrors_lamps_where_their_images_are():
 
 def test_tiles_repeat():
     box = replace(standing(0.0, 3.0, width=3.0, height=3.0), paint=Paint(5, tile_m=0.5))
-    face = first_picture(drive(box))[100:300, 200:440].astype(float)
+    face = first_image(drive(box))[100:300, 200:440].astype(float)
     period = round(0.5 * 500 / 2.75)  # px: the tile at the distance of the face
     across = [np.corrcoef(face[:, :-shift].ravel(), face[:, shift:].ravel())[0, 1] for shift in range(1, 2 * period)]
     assert np.argmax(across[period // 2 :]) + period // 2 + 1 == pytest.approx(period, abs=1)
@@ -402,7 +402,7 @@ def test_tiles_repeat():
 
 def test_sharpening_raises_what_differs_from_around():
     def contrast(sharpening):
-        return cv2.Laplacian(first_picture(drive(standing(0.0, 4.0), sharpening=sharpening)), cv2.CV_64F).std()
+        return cv2.Laplacian(first_image(drive(standing(0.0, 4.0), sharpening=sharpening)), cv2.CV_64F).std()
 
     assert contrast(1.0) > 1.5 * contrast(0.0)
 
@@ -499,8 +499,8 @@ def test_recording_holds_what_was_rendered(recording):
     for row, line, (frame, known) in zip(rows, lines, rendered, strict=True):
         stamp, name = row.split(",")
         assert int(stamp) == frame.stamp_ns == line["stamp_ns"]
-        picture = cv2.imread(str(folder / "mav0/cam0/data" / name), cv2.IMREAD_UNCHANGED)
-        np.testing.assert_array_equal(picture, frame.image)
+        image = cv2.imread(str(folder / "mav0/cam0/data" / name), cv2.IMREAD_UNCHANGED)
+        np.testing.assert_array_equal(image, frame.image)
         assert [thing["name"] for thing in line["objects"]] == [thing.name for thing in known.objects]
         for written, thing in zip(line["objects"], known.objects, strict=True):
             assert written["ttc_s"] == (None if math.isinf(thing.ttc_s) else thing.ttc_s)

@@ -43,9 +43,9 @@ def test_a_text_is_its_parts_side_by_side(first: str, second: str) -> None:
 
 
 def test_every_letter_but_the_space_has_ink_and_its_own() -> None:
-    pictures = {letter: lettering(letter).tobytes() for letter in LETTERS}
-    assert [letter for letter, ink in pictures.items() if not any(ink)] == [" "]
-    assert len(set(pictures.values())) == len(LETTERS)
+    inks = {letter: lettering(letter).tobytes() for letter in LETTERS}
+    assert [letter for letter, ink in inks.items() if not any(ink)] == [" "]
+    assert len(set(inks.values())) == len(LETTERS)
 
 
 def test_plus_minus_is_a_plus_with_a_bar_under_it() -> None:

@@ -31,7 +31,7 @@ from lcf_edge.sinks.overlay import (
     WHITE,
     YELLOW,
     Colour,
-    Picture,
+    Image,
     draw,
 )
 
@@ -63,7 +63,7 @@ def region(shape: Shape, x: float, y: float, width: float, height: float) -> npt
     return np.array([(1, shape, x, y, width, height, 5)], PSI_REGION)
 
 
-def picture(
+def panels_of(
     *,
     circles: npt.NDArray[np.void] | None = None,
     psi: npt.NDArray[np.void] | None = None,
@@ -73,7 +73,7 @@ def picture(
     size: tuple[int, int] = (WIDTH, HEIGHT),
     notes: tuple[str, ...] = (),
     **view: Any,
-) -> Picture:
+) -> Image:
     width, height = size
     scene = PipelineScene(
         stamp_ns=1_000_000_000,
@@ -99,7 +99,7 @@ def picture(
     return draw(np.full((height, width), grey, np.uint8), scene, View(**{**parts, **view}))
 
 
-def has(panels: Picture, x: int, y: int, colour: Colour) -> bool:
+def has(panels: Image, x: int, y: int, colour: Colour) -> bool:
     """The colour stands within a pixel of (x, y)."""
     patch = panels[y - 1 : y + 2, x - 1 : x + 2].astype(int)
     return bool((np.abs(patch - colour).max(axis=2) < 60).any())
@@ -107,65 +107,65 @@ def has(panels: Picture, x: int, y: int, colour: Colour) -> bool:
 
 LEFT_OFFSET, RIGHT_OFFSET = 0, WIDTH
 
-SHOWN: dict[str, tuple[Callable[[], Picture], int, int, Colour]] = {
+SHOWN: dict[str, tuple[Callable[[], Image], int, int, Colour]] = {
     "corner": (
-        lambda: picture(corners=points((50, 60)), omitted=np.array([False])),
+        lambda: panels_of(corners=points((50, 60)), omitted=np.array([False])),
         LEFT_OFFSET + 50,
         60,
         YELLOW,
     ),
     "omitted corner": (
-        lambda: picture(corners=points((50, 60)), omitted=np.array([True])),
+        lambda: panels_of(corners=points((50, 60)), omitted=np.array([True])),
         LEFT_OFFSET + 50,
         60,
         RED,
     ),
     "edge": (
-        lambda: picture(edges=points((50, 60)), edge_group=np.array([-1])),
+        lambda: panels_of(edges=points((50, 60)), edge_group=np.array([-1])),
         LEFT_OFFSET + 53,
         60,
         BLUE,
     ),
     "group line": (
-        lambda: picture(edges=points((50, 60)), edge_group=np.array([0]), groups=points((90, 60, 64))),
+        lambda: panels_of(edges=points((50, 60)), edge_group=np.array([0]), groups=points((90, 60, 64))),
         LEFT_OFFSET + 80,
         60,
         GREEN,
     ),
     "psi circle": (
-        lambda: picture(psi=region(Shape.CIRCLE, 100, 100, 80, 80)),
+        lambda: panels_of(psi=region(Shape.CIRCLE, 100, 100, 80, 80)),
         LEFT_OFFSET + 140,
         100,
         YELLOW,
     ),
     "psi rectangle": (
-        lambda: picture(psi=region(Shape.RECTANGLE, 100, 100, 80, 40)),
+        lambda: panels_of(psi=region(Shape.RECTANGLE, 100, 100, 80, 40)),
         LEFT_OFFSET + 70,
         120,
         YELLOW,
     ),
     "normal circle": (
-        lambda: picture(circles=circle(kind=Kind.NORMAL, x=100, y=100, radius=30)),
+        lambda: panels_of(circles=circle(kind=Kind.NORMAL, x=100, y=100, radius=30)),
         RIGHT_OFFSET + 130,
         100,
         GREEN,
     ),
     "rebel circle": (
-        lambda: picture(circles=circle(kind=Kind.REBEL, x=100, y=100, radius=30)),
+        lambda: panels_of(circles=circle(kind=Kind.REBEL, x=100, y=100, radius=30)),
         RIGHT_OFFSET + 70,
         100,
         RED,
     ),
-    "object that passes": (lambda: picture(objects=thing(probability=0.4)), RIGHT_OFFSET + 100, 110, LIGHT_BLUE),
-    "object that will be met": (lambda: picture(objects=thing(probability=0.5)), RIGHT_OFFSET + 140, 140, ORANGE),
-    "rebel edge": (lambda: picture(rebels=points((50, 60))), RIGHT_OFFSET + 47, 60, RED),
-    "focus": (lambda: picture(focus=points((160, 120))[0]), RIGHT_OFFSET + 160, 120, WHITE),
+    "object that passes": (lambda: panels_of(objects=thing(probability=0.4)), RIGHT_OFFSET + 100, 110, LIGHT_BLUE),
+    "object that will be met": (lambda: panels_of(objects=thing(probability=0.5)), RIGHT_OFFSET + 140, 140, ORANGE),
+    "rebel edge": (lambda: panels_of(rebels=points((50, 60))), RIGHT_OFFSET + 47, 60, RED),
+    "focus": (lambda: panels_of(focus=points((160, 120))[0]), RIGHT_OFFSET + 160, 120, WHITE),
 }
 
 
 @pytest.mark.parametrize("offset", [LEFT_OFFSET, RIGHT_OFFSET])
 def test_own_parts_are_hatched_in_both_panels(offset: int) -> None:
-    panels = picture(own_parts=(points((30, 30), (100, 30), (100, 100), (30, 100)),))
+    panels = panels_of(own_parts=(points((30, 30), (100, 30), (100, 100), (30, 100)),))
     for x, y in ((56, 56), (60, 92), (30, 70)):  # on stripes and on the outline
         assert has(panels, offset + x, y, GREY)
     assert not has(panels, offset + 120, 72, GREY)
@@ -180,17 +180,17 @@ def test_each_thing_has_its_place_and_colour(thing: str) -> None:
     assert panels.dtype == np.uint8
     assert has(panels, x, y, colour)
     assert not has(panels, (x + WIDTH) % (2 * WIDTH), y, colour), "in the other panel too"
-    assert not has(picture(), x, y, colour), "there without the thing"
+    assert not has(panels_of(), x, y, colour), "there without the thing"
 
 
-def text_pixels(panels: Picture, reference: Picture) -> npt.NDArray[np.intp]:
+def text_pixels(panels: Image, reference: Image) -> npt.NDArray[np.intp]:
     """(n, 2) row, column of what differs."""
     return np.argwhere((panels != reference).any(axis=2))
 
 
 def test_cause_and_time_to_contact_stand_beside_the_rebel_circle() -> None:
-    def drawn(cause: Cause, ttc: float) -> Picture:
-        return picture(circles=circle(kind=Kind.REBEL, cause=cause, x=100, y=100, radius=20, ttc=ttc))
+    def drawn(cause: Cause, ttc: float) -> Image:
+        return panels_of(circles=circle(kind=Kind.REBEL, cause=cause, x=100, y=100, radius=20, ttc=ttc))
 
     for other in (drawn(Cause.INCOMING, 2.1), drawn(Cause.CROSSING, 3.4), drawn(Cause.CROSSING, np.inf)):
         changed = text_pixels(drawn(Cause.CROSSING, 2.1), other)
@@ -205,7 +205,7 @@ SIDE = np.s_[85:136, WIDTH + 97 : WIDTH + 104]  # the left side of the box, and 
 
 def test_what_is_seen_has_a_whole_box_and_what_is_not_a_dashed_and_thinner_one() -> None:
     def blue(state: ObjectState) -> npt.NDArray[np.bool_]:
-        drawn = picture(objects=thing(state=state))[SIDE].astype(int)
+        drawn = panels_of(objects=thing(state=state))[SIDE].astype(int)
         return (np.abs(drawn - LIGHT_BLUE).max(axis=2) < 60).T  # (column, row)
 
     seen = blue(ObjectState.SEEN)
@@ -221,14 +221,14 @@ def test_what_is_seen_has_a_whole_box_and_what_is_not_a_dashed_and_thinner_one()
 @pytest.mark.parametrize("grey", [0, 130, 255])
 def test_a_box_stands_out_from_any_picture(grey: int, state: ObjectState) -> None:
     for probability in (0.0, 1.0):
-        side = picture(objects=thing(state=state, probability=probability), grey=grey)[SIDE].astype(int)
+        side = panels_of(objects=thing(state=state, probability=probability), grey=grey)[SIDE].astype(int)
         brightness = side.mean(axis=2)
         assert np.ptp(brightness[brightness.max(axis=1).argmax()]) > 100  # light beside dark
 
 
 def test_class_contact_and_its_sigma_stand_beside_the_box() -> None:
-    def drawn(kind: ObjectClass, ttc: float, sigma: float) -> Picture:
-        return picture(objects=thing(class_id=kind, ttc=ttc, ttc_sigma=sigma))
+    def drawn(kind: ObjectClass, ttc: float, sigma: float) -> Image:
+        return panels_of(objects=thing(class_id=kind, ttc=ttc, ttc_sigma=sigma))
 
     known = drawn(ObjectClass.CROSSING, 2.1, 0.2)
     for other in (
@@ -248,8 +248,8 @@ def test_in_a_crowd_what_passes_gives_up_its_label_and_what_is_met_does_not() ->
     place = {"x": 160, "y": 110, "width": 20, "height": 20}
     crowd = np.concatenate([thing(**place, class_id=ObjectClass.STANDING, probability=1.0)] * 8)
 
-    def drawn(kind: ObjectClass, probability: float) -> Picture:
-        return picture(objects=np.concatenate([crowd, thing(**place, class_id=kind, probability=probability)]))
+    def drawn(kind: ObjectClass, probability: float) -> Image:
+        return panels_of(objects=np.concatenate([crowd, thing(**place, class_id=kind, probability=probability)]))
 
     for probability, is_labelled in ((0.1, False), (0.9, True)):
         changed = text_pixels(drawn(ObjectClass.CROSSING, probability), drawn(ObjectClass.CUTTING_IN, probability))
@@ -258,17 +258,17 @@ def test_in_a_crowd_what_passes_gives_up_its_label_and_what_is_met_does_not() ->
 
 def test_a_circle_of_an_object_leaves_the_telling_to_it() -> None:
     rebels = np.concatenate([circle(kind=Kind.REBEL, x=x, y=200, radius=10, ttc=1.0) for x in (60, 250)])
-    with_labels, own, none = (picture(circles=rebels, circle_objects=of) for of in ((0, 0), (0, 7), (7, 7)))
+    with_labels, own, none = (panels_of(circles=rebels, circle_objects=of) for of in ((0, 0), (0, 7), (7, 7)))
     left, right = np.s_[172:187, WIDTH : WIDTH + 160], np.s_[172:187, WIDTH + 160 :]
     assert (with_labels[left] == own[left]).all()
     assert text_pixels(own[right], none[right]).size == 0
     assert text_pixels(own[left], none[left]).size > 20
     assert text_pixels(with_labels[right], own[right]).size > 20
-    assert (picture(circles=rebels) == with_labels).all(), "nobody said which circle is of which object"
+    assert (panels_of(circles=rebels) == with_labels).all(), "nobody said which circle is of which object"
 
 
 def test_the_caption_counts_objects() -> None:
-    changed = text_pixels(picture(objects=thing(x=np.nan)), picture())
+    changed = text_pixels(panels_of(objects=thing(x=np.nan)), panels_of())
     assert len(changed) > 10
     assert changed[:, 0].min() >= HEIGHT - 20
 
@@ -279,7 +279,7 @@ def test_a_label_never_leaves_its_panel(x: float, y: float) -> None:
 
     def letters(x: float, y: float) -> int:
         rebel = {"kind": Kind.REBEL, "x": x, "y": y, "radius": 1}
-        one, other = (picture(circles=circle(**rebel, cause=Cause.CROSSING, ttc=ttc)) for ttc in (1.1, 8.8))
+        one, other = (panels_of(circles=circle(**rebel, cause=Cause.CROSSING, ttc=ttc)) for ttc in (1.1, 8.8))
         changed = text_pixels(one, other)
         assert (changed[:, 1] >= WIDTH).all(), "spilled into the left panel"
         return len(changed)
@@ -289,15 +289,15 @@ def test_a_label_never_leaves_its_panel(x: float, y: float) -> None:
 
 def test_labels_of_neighbours_do_not_cover_each_other() -> None:
     rebel = {"kind": Kind.REBEL, "cause": Cause.CROSSING, "y": 100, "radius": 15}
-    alone = [picture(circles=circle(**rebel, x=x, ttc=1)) for x in (100, 110)]
-    both = picture(circles=np.concatenate([circle(**rebel, x=x, ttc=1) for x in (100, 110)]))
-    empty = picture()
+    alone = [panels_of(circles=circle(**rebel, x=x, ttc=1)) for x in (100, 110)]
+    both = panels_of(circles=np.concatenate([circle(**rebel, x=x, ttc=1) for x in (100, 110)]))
+    empty = panels_of()
     above = np.s_[60:82, WIDTH:]
     assert (text_pixels(both[above], empty[above]).size) < 1.2 * text_pixels(alone[0][above], empty[above]).size
 
 
 def test_notes_stand_in_the_caption() -> None:
-    changed = text_pixels(picture(notes=("no imu",)), picture())
+    changed = text_pixels(panels_of(notes=("no imu",)), panels_of())
     assert len(changed) > 10
     assert changed[:, 0].min() >= HEIGHT - 20
 
@@ -315,7 +315,7 @@ def test_no_value_breaks_the_drawing(
     x: float, y: float, radius: float, ttc: float, state: ObjectState, size: tuple[int, int]
 ) -> None:
     circles = np.concatenate([circle(kind=kind, x=x, y=y, radius=radius, ttc=ttc) for kind in Kind])
-    panels = picture(
+    panels = panels_of(
         circles=circles,
         psi=np.concatenate([region(shape, x, y, radius, radius) for shape in Shape]),
         objects=thing(

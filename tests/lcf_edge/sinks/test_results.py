@@ -184,7 +184,7 @@ def test_an_object_names_its_circles_and_no_others() -> None:
     assert [thing["circles"] for thing in written] == [[9], [7, 10], []]
 
 
-def test_the_circles_of_an_object_that_came_over_the_wire_are_not_told() -> None:
+def test_the_circles_of_an_object_that_came_over_the_wire_are_not_reported() -> None:
     received = decode_scene(encode_scene(scene(), "camera"))
     (written,) = json.loads(msgspec.json.encode(scene_fields(received)))["objects"]
     (whole,) = json.loads(encode_line(scene()))["objects"]

@@ -31,10 +31,10 @@ def filled(path: Path, frames: int) -> SizePlot:
 def test_the_picture_shows_a_curve_in_the_colour_of_each_table(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     filled(path, 60).close()
-    picture = cv2.imread(str(path))
-    assert picture is not None
-    assert picture.shape[1] == 1400
-    drawn = {tuple(colour) for colour in np.unique(picture.reshape(-1, 3), axis=0)}
+    image = cv2.imread(str(path))
+    assert image is not None
+    assert image.shape[1] == 1400
+    drawn = {tuple(colour) for colour in np.unique(image.reshape(-1, 3), axis=0)}
     curves = ("b8860b", "1f77b4", "d62728", "8c564b", "2ca02c", "17becf", "e377c2", "7f7f7f", "000000")
     assert {(int(c[4:], 16), int(c[2:4], 16), int(c[:2], 16)) for c in curves} <= drawn
 
@@ -70,7 +70,7 @@ def test_a_full_disk_is_one_error(tmp_path: Path) -> None:
         filled(path, 3).close()
 
 
-def test_without_matplotlib_the_remedy_is_told(tmp_path: Path) -> None:
+def test_without_matplotlib_the_remedy_is_reported(tmp_path: Path) -> None:
     """A second interpreter in which Matplotlib cannot be found."""
     code = (
         "import sys\n"

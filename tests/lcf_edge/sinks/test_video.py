@@ -29,10 +29,10 @@ def test_the_video_holds_every_frame(tmp_path: Path, suffix: str, odd: int) -> N
     path = filmed(tmp_path / f"overlay{suffix}", 48 + odd, 128 + odd)
     capture = cv2.VideoCapture(str(path))
     assert capture.get(cv2.CAP_PROP_FPS) == pytest.approx(29.97, abs=0.01)
-    pictures = [frame for got, frame in iter(capture.read, (False, None)) if got]
+    frames = [frame for got, frame in iter(capture.read, (False, None)) if got]
     capture.release()
-    assert [frame.shape for frame in pictures] == [(48, 128, 3)] * 12
-    assert [frame.mean() for frame in pictures] == pytest.approx(GREYS, abs=4)
+    assert [frame.shape for frame in frames] == [(48, 128, 3)] * 12
+    assert [frame.mean() for frame in frames] == pytest.approx(GREYS, abs=4)
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
@@ -55,7 +55,7 @@ def test_a_browser_plays_it(tmp_path: Path, suffix: str, browser: Any) -> None:
     assert rest == [128, 48, None]
 
 
-def test_what_it_begins_with_is_told_by_no_file(tmp_path: Path) -> None:
+def test_no_file_says_what_it_begins_with(tmp_path: Path) -> None:
     """A replay without one picture leaves nothing behind."""
     with VideoSink(tmp_path / "overlay.webm", 20):
         pass

@@ -47,9 +47,9 @@ def test_a_local_process_cannot_speak_for_the_rover(local: Callable[[], Any]) ->
         liar.ask("put_blindly", key=key, payload=b"fake".hex())
     assert liar.get("lcf/query/schema"), "what it has sent has arrived"
     assert planner.tokens("lcf/@alive/*") == ["lcf/@alive/rover"]
-    told = [one for key in keys for one in (*planner.receive(key, 3, SILENCE_S), *planner.get(key, SILENCE_S))]
-    assert told
-    assert b"fake" not in {one if isinstance(one, str) else one.payload for one in told}
+    received = [one for key in keys for one in (*planner.receive(key, 3, SILENCE_S), *planner.get(key, SILENCE_S))]
+    assert received
+    assert b"fake" not in {one if isinstance(one, str) else one.payload for one in received}
 
 
 def test_a_local_process_may_read_by_wildcards(local: Callable[[], Any]) -> None:

@@ -39,7 +39,7 @@ def local(start: Any, endpoint: str) -> Callable[[], Any]:
     return lambda: start(mode="client", listen__endpoints=[], connect__endpoints=[endpoint], **patient)
 
 
-def told_of_the_link(planner: Any) -> dict[str, int]:
+def link_status(planner: Any) -> dict[str, int]:
     """Its counts, in the next diagnostics."""
     (sample,) = planner.receive("lcf/diagnostics")
     values = next(dict(one.values) for one in decode_diagnostics(sample.payload).status if one.name == "link")
@@ -51,12 +51,12 @@ def test_who_declares_too_much_is_cut_and_a_planner_is_not(
 ) -> None:
     planner = local()
     planner.subscribe("lcf/diagnostics")
-    assert "connections cut" not in told_of_the_link(planner)
+    assert "connections cut" not in link_status(planner)
     for number in range(6):
         local().ask("announce_many", key=f"{KEYS}/{number}", count=MANY)
     last: dict[str, int] = {}
     for _ in range(PATIENCE):
-        before, last = last, told_of_the_link(planner)
+        before, last = last, link_status(planner)
         assert resident_mib(daemon) < BUDGET_MIB + ALLOWED_MIB
         assert last["diagnostics sent"] == before.get("diagnostics sent", last["diagnostics sent"] - 1) + 1
         if "connections cut" in last:
@@ -75,7 +75,7 @@ def test_what_stays_when_a_peer_goes_is_shed_with_the_session(
         peer.end()
     for _ in range(PATIENCE):
         assert resident_mib(daemon) < BUDGET_MIB + ALLOWED_MIB
-        last = told_of_the_link(planner)
+        last = link_status(planner)
         if "renewals" in last:
             break
     assert last["renewals"] >= 1
@@ -113,7 +113,7 @@ def test_a_link_without_a_session_loses_what_is_put_and_counts_it(endpoint: str,
     assert not link.renew()
     assert not link.renew()
     link.put_scene(scene())
-    assert not link.preview_wanted()
+    assert not link.has_preview_subscriber()
     assert link.take_speeds() == []
     assert link.counts == {"scene failed": 1, "renewals failed": 2}
     link.close()

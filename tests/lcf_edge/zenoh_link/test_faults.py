@@ -144,7 +144,7 @@ def test_a_router_comes_and_goes(
         link.close()
 
 
-def test_a_port_in_use_is_told_with_the_remedy(start: Any, endpoint: str) -> None:
+def test_a_port_in_use_is_reported_with_the_remedy(start: Any, endpoint: str) -> None:
     start(mode="peer", listen__endpoints=[endpoint]).tokens("**")
     with pytest.raises(PublishError) as caught:
         open_session(Zenoh(listen=[endpoint]))

@@ -97,9 +97,9 @@ def test_a_scene_is_as_large_as_the_document_says() -> None:
         scene = Scene(1, 1, 640, 480, 1.0, rows, psi, objects=np.zeros(objects, OBJECT))
         return len(encode_scene(scene, Publish().frame_id))
 
-    (told,) = re.findall(
+    (figures,) = re.findall(
         r"A scene has (\d+) bytes, plus (\d+) for each circle, (\d+) for each ψ region and (\d+) for each object",
         DOCUMENT,
     )
     more = [size(**{table: 1}) - size() for table in ("circles", "regions", "objects")]
-    assert [size(), *more] == [*map(int, told)]
+    assert [size(), *more] == [*map(int, figures)]

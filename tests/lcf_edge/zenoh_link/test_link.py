@@ -113,13 +113,13 @@ def test_a_preview_is_wanted_only_while_somebody_looks(session: zenoh.Session, p
 
     publisher = session.declare_publisher("lcf/preview/compressed")
     with publisher.declare_matching_listener(tell):
-        assert not link.preview_wanted()
+        assert not link.has_preview_subscriber()
         peer.subscribe("lcf/preview/*")
         assert looking.wait(PATIENCE_S)
-        assert link.preview_wanted()
+        assert link.has_preview_subscriber()
         peer.end()
         assert gone.wait(PATIENCE_S)
-        assert not link.preview_wanted()
+        assert not link.has_preview_subscriber()
     link.close()
 
 
@@ -139,7 +139,7 @@ def test_previews_keep_to_their_rate(
     until_matched(session, "lcf/preview/compressed")
     wanted = 0
     for _ in range(10):  # 18 ms
-        if link.preview_wanted():
+        if link.has_preview_subscriber():
             wanted += 1
             link.put_preview(JPEG, STAMP_NS)
         now_ns += 2_000_000
@@ -159,7 +159,7 @@ def test_queries_are_answered(link: Link, peer: Any, scene: Callable[..., Scene]
     assert link.counts["query refused"] == 1
 
 
-def test_the_effective_configuration_is_told(link: Link, peer: Any, tmp_path: Any) -> None:
+def test_the_effective_configuration_can_be_asked_for(link: Link, peer: Any, tmp_path: Any) -> None:
     path = tmp_path / "config.toml"
     for config in (Config(publish=Publish(frame_id="eye", robot="seven")), Config(vehicle=Vehicle(height_m=1.5))):
         link.show_config(config)
@@ -169,7 +169,7 @@ def test_the_effective_configuration_is_told(link: Link, peer: Any, tmp_path: An
         assert load(path) == config
 
 
-def test_the_message_definitions_are_told(link: Link, peer: Any, ros: Typestore) -> None:
+def test_the_message_definitions_can_be_asked_for(link: Link, peer: Any, ros: Typestore) -> None:
     assert link
     (answer,) = peer.get("lcf/query/schema")
     types = get_types_from_msg(answer.payload.decode(), "lcf_msgs/msg/Scene")
@@ -220,7 +220,7 @@ def test_after_the_end_nothing_is_raised_and_everything_counted(
     link.put_scene(scene())
     link.put_diagnostics(STATUS, STAMP_NS)
     link.put_preview(JPEG, STAMP_NS)
-    assert not link.preview_wanted()
+    assert not link.has_preview_subscriber()
     assert link.take_speeds() == []
     assert link.counts == {"scene sent": 1, "scene failed": 1, "diagnostics failed": 1, "preview failed": 1}
     link.close()

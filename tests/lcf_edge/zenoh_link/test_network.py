@@ -85,8 +85,8 @@ class Gate:
             text=True,
         )
         assert self.process.stdout
-        self.told = self.process.stdout.readline()
-        self.port = int(self.told.split()[0].rpartition(":")[2])
+        self.first_line = self.process.stdout.readline()
+        self.port = int(self.first_line.split()[0].rpartition(":")[2])
         self.endpoint = f"tls/localhost:{self.port}"
 
     @property

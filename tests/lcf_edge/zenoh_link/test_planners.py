@@ -174,14 +174,14 @@ def rule() -> Any:
 def test_it_cruises_where_nothing_is_met(rule: Any) -> None:
     objects = np.zeros(2, OBJECT)
     objects["probability"], objects["ttc"] = (0.0, 0.4), (1.0, np.inf)
-    assert rule["wanted_mps"](objects) == rule["wanted_mps"](objects[:0]) == rule["CRUISE_MPS"]
+    assert rule["target_mps"](objects) == rule["target_mps"](objects[:0]) == rule["CRUISE_MPS"]
 
 
 def test_it_stops_for_what_is_met_at_a_time_that_is_unknown_or_over(rule: Any) -> None:
     for ttc in (np.nan, 0.0, -1.0):
         objects = np.zeros(1, OBJECT)
         objects["probability"], objects["ttc"] = 0.9, ttc
-        assert rule["wanted_mps"](objects) == 0
+        assert rule["target_mps"](objects) == 0
 
 
 def test_what_is_written_into_the_configuration_is_understood() -> None:

@@ -37,9 +37,9 @@ def test_a_second_process_receives_every_scene_whole(session: zenoh.Session, end
         for seq in range(20):
             sizes.append(publisher.put(scene(seq)))
             threading.Event().wait(FRAME_S)  # a burst may be dropped, frames at their rate may not
-        told, _ = subscriber.communicate("20\n", timeout=PATIENCE_S)
+        output, _ = subscriber.communicate("20\n", timeout=PATIENCE_S)
     assert publisher.sent == 20
-    assert json.loads(told) == {"scenes": 20, "bytes": sum(sizes), "broken": 0, "circles": 60}
+    assert json.loads(output) == {"scenes": 20, "bytes": sum(sizes), "broken": 0, "circles": 60}
     assert subscriber.returncode == 0
 
 
@@ -53,8 +53,8 @@ def test_the_subscriber_ends_with_its_input(session: zenoh.Session, endpoint: st
     )
     with subscriber:
         assert publisher.wait_for_subscriber(PATIENCE_S)
-        told, _ = subscriber.communicate(timeout=PATIENCE_S)
-    assert json.loads(told)["scenes"] == 0
+        output, _ = subscriber.communicate(timeout=PATIENCE_S)
+    assert json.loads(output)["scenes"] == 0
     assert subscriber.returncode == 0
 
 
@@ -110,10 +110,10 @@ def test_a_prefix_that_is_no_key_is_refused(session: zenoh.Session, prefix: str)
 
 
 def test_a_liveliness_token_tells_that_the_publisher_is_there(session: zenoh.Session, endpoint: str) -> None:
-    alive, told = threading.Event(), []
+    alive, output = threading.Event(), []
 
     def tell(sample: zenoh.Sample) -> None:
-        told.append((str(sample.key_expr), sample.kind))
+        output.append((str(sample.key_expr), sample.kind))
         alive.set()
 
     with (
@@ -123,7 +123,7 @@ def test_a_liveliness_token_tells_that_the_publisher_is_there(session: zenoh.Ses
         publisher = ScenePublisher(session, Publish(prefix="fleet", robot="seven"))
         assert alive.wait(PATIENCE_S)
     assert publisher.sent == 0
-    assert told[0] == ("fleet/@alive/seven", zenoh.SampleKind.PUT)
+    assert output[0] == ("fleet/@alive/seven", zenoh.SampleKind.PUT)
 
 
 @pytest.mark.parametrize("publish", [Publish(prefix="a/*"), Publish(robot="r*"), Publish(robot="")])

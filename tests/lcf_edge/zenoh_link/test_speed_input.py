@@ -187,6 +187,6 @@ def test_who_does_not_use_speeds_does_not_listen(
     link.close()
 
 
-def test_every_reason_is_one_that_is_told() -> None:
+def test_every_reason_is_one_that_is_reported() -> None:
     with opened_session(Zenoh(listen=[])) as session:
         assert set(SpeedInput(session, Publish()).counts) == {"taken", "overtaken", *REFUSALS}

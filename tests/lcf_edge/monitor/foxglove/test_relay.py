@@ -45,9 +45,9 @@ async def channels_of(socket: aiohttp.ClientWebSocketResponse) -> dict[str, dict
     assert (info["op"], info["capabilities"]) == ("serverInfo", [])  # nothing can be sent to it
     channels: dict[str, dict[str, Any]] = {}
     while len(channels) < 11:
-        told = json.loads(await socket.receive_str())
-        if told["op"] == "advertise":
-            channels |= {channel["topic"]: channel for channel in told["channels"]}
+        message = json.loads(await socket.receive_str())
+        if message["op"] == "advertise":
+            channels |= {channel["topic"]: channel for channel in message["channels"]}
     return channels
 
 
@@ -112,7 +112,7 @@ def test_clients_that_take_nothing_do_not_fill_its_memory(endpoint: str) -> None
         )
         wanted_by_somebody = threading.Event()
         listener = publisher.declare_matching_listener(lambda _: wanted_by_somebody.set())
-        picture = encode_compressed_image(1, "camera", "jpeg", bytes(100_000))
+        preview = encode_compressed_image(1, "camera", "jpeg", bytes(100_000))
 
         async def look_away() -> float:
             async with aiohttp.ClientSession() as client:
@@ -123,7 +123,7 @@ def test_clients_that_take_nothing_do_not_fill_its_memory(endpoint: str) -> None
                     await socket.send_str(json.dumps(wanted))
                 assert await asyncio.to_thread(wanted_by_somebody.wait, PATIENCE_S)
                 before_mib = resident_mib(process.pid)
-                await asyncio.to_thread(lambda: [publisher.put(picture) for _ in range(1500)])
+                await asyncio.to_thread(lambda: [publisher.put(preview) for _ in range(1500)])
                 return resident_mib(process.pid) - before_mib
 
         assert (
@@ -147,18 +147,18 @@ def test_nonsense_of_clients_is_not_written_down(address: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [(("--prefix", "a//b"), "name another prefix"), (("--connect", "nowhere"), "nowhere")],
 )
-def test_a_source_that_is_none_is_told_in_one_line(
-    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], told: str
+def test_an_address_that_is_none_is_reported_in_one_line(
+    capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], message: str
 ) -> None:
     assert main(["foxglove", "--port", "0", *arguments]) == 1
     (line,) = capsys.readouterr().err.splitlines()
-    assert told in line
+    assert message in line
 
 
-def test_a_port_that_is_taken_is_told(capsys: pytest.CaptureFixture[str], address: str) -> None:
+def test_a_port_that_is_taken_is_reported(capsys: pytest.CaptureFixture[str], address: str) -> None:
     port = address.rpartition(":")[2]
     assert main(["foxglove", "--port", port]) == 1
     assert "--port" in capsys.readouterr().err

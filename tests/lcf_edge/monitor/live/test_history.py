@@ -3,24 +3,24 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.monitor.live.history import History, Message
+from lcf_edge.monitor.live.history import History, ReceivedMessage
 from lcf_edge.monitor.live.traces import Point, Traces
 
 SECOND_NS = 10**9
 
 arrivals = st.lists(
-    st.tuples(st.sampled_from(["scene", "picture"]), st.integers(0, 3 * SECOND_NS), st.integers(0, 60)), max_size=60
+    st.tuples(st.sampled_from(["scene", "preview"]), st.integers(0, 3 * SECOND_NS), st.integers(0, 60)), max_size=60
 )
 
 
 @given(arrivals)
 def test_it_holds_what_came_within_its_length_and_its_bytes(came: list[tuple[str, int, int]]) -> None:
-    limits = {"scene": 100, "picture": 200}
+    limits = {"scene": 100, "preview": 200}
     history = History(5.0, limits)
     now_ns, sent = 0, []
     for topic, pause_ns, size in came:
         now_ns += pause_ns
-        sent.append(Message(topic, now_ns, bytes(size)))
+        sent.append(ReceivedMessage(topic, now_ns, bytes(size)))
         history.add(sent[-1])
     kept = history.messages(now_ns)
     assert kept == sorted(kept, key=lambda message: message.received_ns)
@@ -35,7 +35,7 @@ def test_it_holds_what_came_within_its_length_and_its_bytes(came: list[tuple[str
 
 def test_what_is_old_goes_also_when_nothing_comes() -> None:
     history = History(5.0)
-    history.add(Message("scene", 0, b"x"))
+    history.add(ReceivedMessage("scene", 0, b"x"))
     assert history.messages(5 * SECOND_NS)
     assert not history.messages(5 * SECOND_NS + 1)
 

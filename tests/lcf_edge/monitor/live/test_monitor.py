@@ -15,9 +15,9 @@ from lcf_edge.cdr import encode_scene
 from lcf_edge.config import Config, Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.messages import CIRCLE, PSI_REGION, Scene
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import MAX_NAME, MAX_ROBOTS, Ahead, Monitor, Presence, Snapshot
-from lcf_edge.monitor.live.source import Source
 from lcf_edge.zenoh_link import opened_session
 
 PATIENCE_S = 20.0
@@ -30,7 +30,7 @@ class Watched:
     def __init__(self, endpoint: str) -> None:
         self._changed = threading.Condition()
         self.history = History()
-        self.monitor = Monitor(Source(endpoint), history=self.history, changed=self._notify)
+        self.monitor = Monitor(DaemonAddress(endpoint), history=self.history, changed=self._notify)
 
     def _notify(self) -> None:
         with self._changed:
@@ -109,15 +109,15 @@ def test_an_answer_that_is_no_configuration_leaves_it_unknown(endpoint: str, ans
 def test_pictures_come_only_while_they_are_wanted_and_with_their_scene(rover: Any, watched: Watched) -> None:
     watched.until(lambda known: known.scene)
     assert rover.previews == 0
-    watched.monitor.want_preview(True)
-    snapshot = watched.until(lambda known: known.picture and known.picture.scene)
-    assert snapshot.picture
-    assert bytes(snapshot.picture.image.data[:3]) == b"\xff\xd8\xff"  # JPEG
-    assert snapshot.picture.scene
-    assert snapshot.picture.scene.stamp_ns == snapshot.picture.image.header.stamp_ns
-    watched.monitor.want_preview(False)
+    watched.monitor.switch_preview(True)
+    snapshot = watched.until(lambda known: known.preview and known.preview.scene)
+    assert snapshot.preview
+    assert bytes(snapshot.preview.image.data[:3]) == b"\xff\xd8\xff"  # JPEG
+    assert snapshot.preview.scene
+    assert snapshot.preview.scene.stamp_ns == snapshot.preview.image.header.stamp_ns
+    watched.monitor.switch_preview(False)
     rover.wait_for(lambda: rover.unseen > 20)  # one in four would be due
-    assert watched.monitor.snapshot().picture is None
+    assert watched.monitor.snapshot().preview is None
 
 
 def test_who_claims_to_be_many_rovers_does_not_fill_its_memory(endpoint: str) -> None:
@@ -156,7 +156,7 @@ def test_nobody_there_yet(watched: Watched) -> None:
 def test_what_is_no_message_is_counted_and_not_kept(endpoint: str) -> None:
     with opened_session(Zenoh(listen=[endpoint])) as session, closing(Watched(endpoint).monitor) as monitor:
         watched_keys = ("lcf/scene", "lcf/diagnostics", "lcf/preview/compressed")
-        monitor.want_preview(True)
+        monitor.switch_preview(True)
         publishers = [session.declare_publisher(key) for key in watched_keys]
         deadline_s = time.monotonic() + PATIENCE_S
         while monitor.snapshot().broken < 3 and time.monotonic() < deadline_s:
@@ -200,16 +200,16 @@ def test_the_history_has_payloads_as_they_were_sent(watched: Watched) -> None:
 
 
 @pytest.mark.parametrize(
-    ("source", "part"),
+    ("address", "part"),
     [
-        (Source("nonsense"), "nonsense"),
-        (Source(NOBODY, prefix="a//b"), "a//b"),
-        (Source(NOBODY, config_file="/no/such.json5"), "/no/such.json5"),
+        (DaemonAddress("nonsense"), "nonsense"),
+        (DaemonAddress(NOBODY, prefix="a//b"), "a//b"),
+        (DaemonAddress(NOBODY, config_file="/no/such.json5"), "/no/such.json5"),
     ],
 )
-def test_a_source_that_is_none_is_refused(source: Source, part: str) -> None:
+def test_an_address_that_is_none_is_refused(address: DaemonAddress, part: str) -> None:
     with pytest.raises(PublishError, match=part):
-        Monitor(source)
+        Monitor(address)
 
 
 def test_tokens_of_another_prefix_are_not_ours(endpoint: str, watched: Watched) -> None:

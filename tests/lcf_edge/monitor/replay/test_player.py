@@ -113,14 +113,14 @@ def test_it_is_as_slow_as_it_is_told(playing: Any) -> None:
 @pytest.mark.parametrize("at_s", [0.0, 1.0, 2.45, LAST_S])
 def test_while_it_stands_a_place_that_is_sought_is_shown_at_once(playing: Any, at_s: float) -> None:
     it = playing()
-    it.player.want_preview(True)
+    it.player.switch_preview(True)
     it.searched()
     it.player.seek(at_s)
     it.at(at_s)
-    snapshot = it.shows(lambda _: it.player.snapshot().picture is not None)
+    snapshot = it.shows(lambda _: it.player.snapshot().preview is not None)
     assert snapshot.scene.seq == round(at_s / FRAME_S)
-    assert snapshot.picture.scene is snapshot.scene
-    assert bytes(snapshot.picture.image.data[:2]) == b"\xff\xd8"  # a JPEG
+    assert snapshot.preview.scene is snapshot.scene
+    assert bytes(snapshot.preview.image.data[:2]) == b"\xff\xd8"  # a JPEG
 
 
 def test_what_is_sought_outside_is_the_nearest_that_there_is(playing: Any) -> None:
@@ -176,7 +176,7 @@ def test_its_plots_go_by_the_time_of_the_recording(playing: Any) -> None:
 
 def test_nobody_looks_and_nothing_is_drawn(playing: Any) -> None:
     it = playing(Pace(speed=50.0))
-    assert it.shows(lambda replay: replay.position_s == pytest.approx(LAST_S)).picture is None
+    assert it.shows(lambda replay: replay.position_s == pytest.approx(LAST_S)).preview is None
 
 
 def test_a_start_beyond_the_end_is_refused_with_the_length(drive: Path) -> None:
@@ -189,7 +189,7 @@ def test_tables_beyond_the_budget_are_refused_before_anything_is_shown(drive: Pa
         Player(drive, Config(memory=Memory(budget_mib=0.01)), STILL)
 
 
-def test_a_recording_that_goes_away_is_told(drive: Path, tmp_path: Path) -> None:
+def test_a_recording_that_goes_away_is_reported(drive: Path, tmp_path: Path) -> None:
     gone = tmp_path / "gone"
     shutil.copytree(drive, gone)
     it = Playing(gone, STILL)

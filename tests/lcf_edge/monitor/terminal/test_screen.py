@@ -200,7 +200,7 @@ def test_only_a_terminal_has_a_key_to_press() -> None:
         assert ("q: end" in text.get()) == is_terminal
 
 
-def test_what_was_refused_is_told() -> None:
+def test_what_was_refused_is_reported() -> None:
     assert "3 payloads refused" in shown(replace(snapshot(), broken=3), width=120)[1]
 
 

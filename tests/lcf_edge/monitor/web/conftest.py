@@ -19,8 +19,8 @@ class View:
         command = (sys.executable, "-m", "lcf_edge", "view", "--connect", endpoint, "--port", "0", *more)
         self.process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         assert self.process.stdout
-        self.told = self.process.stdout.readline()
-        self.address = self.told.split()[1] if self.told else ""
+        self.first_line = self.process.stdout.readline()
+        self.address = self.first_line.split()[1] if self.first_line else ""
 
     def end(self, number: int = signal.SIGTERM) -> tuple[int, str]:
         """Exit status, and what it said on standard error."""

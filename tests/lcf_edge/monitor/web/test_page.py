@@ -21,7 +21,7 @@ from lcf_edge.zenoh_link.link import Link
 STATE = "document.getElementById('state').textContent"
 THREAT = "document.getElementById('threat').textContent"
 LIVE = f"{STATE}.startsWith('live: rover')"
-PICTURE_AT = "[...document.getElementById('picture').getContext('2d').getImageData({x}, {y}, 1, 1).data]"
+PIXEL_AT = "[...document.getElementById('picture').getContext('2d').getImageData({x}, {y}, 1, 1).data]"
 
 WRITTEN = """
   window.written = new Set();
@@ -98,7 +98,7 @@ def test_plots_have_axes_with_values_and_times_and_each_table_has_its_own(seen: 
 
 
 def test_a_label_has_an_outline(rover: Any, view: Callable[..., Any], reading: Any) -> None:
-    rover.link.preview_wanted = lambda: False
+    rover.link.has_preview_subscriber = lambda: False
     reading.open(view().address)
     reading.wait_for("window.written.has('outline of crossing 2.1 ±0.3 s')")
 
@@ -111,9 +111,9 @@ def test_the_picture_is_saved_as_a_png(seen: tuple[Any, Any], browser: Any, tmp_
     seen[0].wait_for(lambda: [file for file in tmp_path.iterdir() if file.suffix == ".png"])
     (file,) = tmp_path.iterdir()
     assert re.fullmatch(r"lcf-edge-picture-\d+\.png", file.name)
-    picture = cv2.imread(str(file))
-    assert picture is not None
-    assert picture.shape == (240, 320, 3)
+    preview = cv2.imread(str(file))
+    assert preview is not None
+    assert preview.shape == (240, 320, 3)
 
 
 def test_the_numbers_beside_a_picture_are_those_of_its_frame(
@@ -126,17 +126,17 @@ def test_the_numbers_beside_a_picture_are_those_of_its_frame(
     def contact_s(seq: int) -> float:
         return 2 + seq % 100 / 8 + 0.01
 
-    def told(jpeg: bytes, stamp_ns: int) -> None:
+    def put_preview(jpeg: bytes, stamp_ns: int) -> None:
         drawn_s.add(f"{contact_s(rover.seq):.1f}")
         put(jpeg, stamp_ns)
 
     def wanted() -> bool:
         rover.objects = rover.objects.copy()
         rover.objects["ttc"][1] = contact_s(rover.seq + 1)
-        return bool(rover.seq % 3 == 0 and Link.preview_wanted(rover.link))
+        return bool(rover.seq % 3 == 0 and Link.has_preview_subscriber(rover.link))
 
-    monkeypatch.setattr(rover.link, "put_preview", told)
-    monkeypatch.setattr(rover.link, "preview_wanted", wanted)
+    monkeypatch.setattr(rover.link, "put_preview", put_preview)
+    monkeypatch.setattr(rover.link, "has_preview_subscriber", wanted)
     browser.open(view().address)
     contact = "document.querySelector('#things td:nth-child(2)').textContent.split(' ')[0]"
     browser.wait_for(f"{LIVE} && document.getElementById('picture').width === 320 && {contact}")
@@ -160,7 +160,7 @@ def test_what_passes_is_no_threat_and_without_objects_the_circles_tell(
 
 def test_the_picture_is_one_panel_or_both(seen: tuple[Any, Any], browser: Any) -> None:
     browser.open(seen[1].address)
-    grey, blue = PICTURE_AT.format(x=5, y=5) + "[2] > 70", PICTURE_AT.format(x=5, y=5) + "[2] > 120"
+    grey, blue = PIXEL_AT.format(x=5, y=5) + "[2] > 70", PIXEL_AT.format(x=5, y=5) + "[2] > 120"
     size = "[document.getElementById('picture').width, document.getElementById('picture').height].join()"
 
     def choose(panel: str) -> None:
@@ -205,16 +205,16 @@ def test_without_a_rover_it_waits(view: Callable[..., Any], browser: Any, endpoi
     browser.wait_for(f"{STATE}.startsWith('waiting for a daemon at {endpoint} since ')")
 
 
-def test_without_pictures_the_scene_is_drawn_and_the_reason_told(
+def test_without_pictures_the_scene_is_drawn_and_the_reason_reported(
     rover: Any, view: Callable[..., Any], browser: Any
 ) -> None:
-    rover.link.preview_wanted = lambda: False
+    rover.link.has_preview_subscriber = lambda: False
     rover.status = (*rover.status[:3], replace(rover.status[3], level=Level.WARN, message="gave up the preview"))
     browser.open(view().address)
     browser.wait_for("document.getElementById('why').innerText.includes('gave up the preview to save memory')")
-    red = PICTURE_AT.format(x=150 + 30, y=110)  # on the rebel circle
+    red = PIXEL_AT.format(x=150 + 30, y=110)  # on the rebel circle
     assert browser.evaluate(f"((pixel) => pixel[0] > 150 && pixel[1] < 120)({red})")
-    orange = PICTURE_AT.format(x=150 - 35, y=110)  # on the box of what will be met
+    orange = PIXEL_AT.format(x=150 - 35, y=110)  # on the box of what will be met
     assert browser.evaluate(f"((pixel) => pixel[0] > 200 && pixel[1] > 120 && pixel[2] < 120)({orange})")
     side = "[...document.getElementById('picture').getContext('2d').getImageData(265, 90, 1, 80).data]"
     blue = f"{side}.filter((byte, at) => at % 4 === 2 && byte > 120).length"

@@ -25,7 +25,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from lcf_edge.cli.command_line import main
 from lcf_edge.daemon.log import AT_ONCE
 from lcf_edge.messages import CIRCLE
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.web import server
 from lcf_edge.monitor.web.doorkeeper import Doorkeeper
 from lcf_edge.monitor.web.guard import Guard
@@ -60,17 +60,17 @@ def updates(address: str, work: Callable[[aiohttp.ClientWebSocketResponse], Coro
 async def update(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
     """Ask for one, with its picture if there is one."""
     await socket.send_str("next")
-    told: dict[str, Any] = json.loads(await socket.receive_str())
-    if "picture" in told:
-        told["jpeg"] = await socket.receive_bytes()
-    return told
+    latest: dict[str, Any] = json.loads(await socket.receive_str())
+    if "picture" in latest:
+        latest["jpeg"] = await socket.receive_bytes()
+    return latest
 
 
 async def until(socket: aiohttp.ClientWebSocketResponse, known: Callable[[dict[str, Any]], object]) -> dict[str, Any]:
-    told = await update(socket)
-    while not known(told):
-        told = await update(socket)
-    return told
+    latest = await update(socket)
+    while not known(latest):
+        latest = await update(socket)
+    return latest
 
 
 @pytest.fixture(scope="module")
@@ -147,17 +147,17 @@ def test_updates_tell_all_and_pictures_are_drawn_only_meanwhile(seen: tuple[Any,
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
-        first = await until(socket, lambda told: told.get("status"))
+        first = await until(socket, lambda latest: latest.get("status"))
         assert [one["level"] for one in first["status"]] == ["ok", "error", "ok", "ok"]
-        return await until(socket, lambda told: told.get("picture", {}).get("scene"))
+        return await until(socket, lambda latest: latest.get("picture", {}).get("scene"))
 
     rover.wait_for(lambda: rover.unseen > 20)
-    told = updates(served.address, look)
-    assert told["connection"]["presence"] == "there"
-    assert told["connection"]["robots"] == ["rover"]
-    assert len(told["scene"]["circles"]) == 5
-    assert told["jpeg"].startswith(b"\xff\xd8\xff")
-    assert told["picture"]["scene"]["psi"][1]["shape"] == "rect"
+    latest = updates(served.address, look)
+    assert latest["connection"]["presence"] == "there"
+    assert latest["connection"]["robots"] == ["rover"]
+    assert len(latest["scene"]["circles"]) == 5
+    assert latest["jpeg"].startswith(b"\xff\xd8\xff")
+    assert latest["picture"]["scene"]["psi"][1]["shape"] == "rect"
     rover.wait_for(lambda: rover.unseen > 20)  # nobody looks any more
 
 
@@ -165,7 +165,7 @@ def test_a_browser_that_is_slow_gets_the_newest_not_all(seen: tuple[Any, Any]) -
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> None:
-        first = (await until(socket, lambda told: told["scene"]))["scene"]["seq"]
+        first = (await until(socket, lambda latest: latest["scene"]))["scene"]["seq"]
         await asyncio.to_thread(rover.wait_for, lambda: rover.seq > first + 20)
         assert (await update(socket))["scene"]["seq"] > first + 15
 
@@ -248,7 +248,7 @@ def test_the_last_seconds_are_saved_for_independent_readers(seen: tuple[Any, Any
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> None:
-        await until(socket, lambda told: "jpeg" in told and told["scene"]["seq"] > 10)
+        await until(socket, lambda latest: "jpeg" in latest and latest["scene"]["seq"] > 10)
 
     updates(served.address, look)
     answer: Any = ask(served.address, "/save")
@@ -305,7 +305,7 @@ def test_who_takes_nothing_is_let_go(rover: Any, monkeypatch: pytest.MonkeyPatch
     rover.circles = np.zeros(15_000, CIRCLE)
 
     async def look() -> None:
-        serving = server.Server(Source(rover.endpoint))
+        serving = server.Server(DaemonAddress(rover.endpoint))
         runner = web.AppRunner(serving.application(Guard("127.0.0.1"), Doorkeeper()))
         await runner.setup()
         await web.TCPSite(runner, "127.0.0.1", 0).start()
@@ -323,7 +323,7 @@ def test_a_signal_ends_it_while_somebody_looks(rover: Any, view: Callable[..., A
     served = view()
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> aiohttp.WSMsgType:
-        await until(socket, lambda told: told["scene"])
+        await until(socket, lambda latest: latest["scene"])
         served.process.send_signal(number)
         return (await socket.receive()).type
 
@@ -444,7 +444,7 @@ def test_a_request_that_ends_just_as_the_server_gives_it_up_is_no_error(
             loop.call_at(up_s - 0.1, time.sleep, 0.3)
             loop.call_at(up_s - 0.05, done.set)
 
-        serving = server.Server(Source(endpoint))
+        serving = server.Server(DaemonAddress(endpoint))
         application = serving.application(Guard("127.0.0.1"), Doorkeeper())
         application.router.add_get("/slow", slow)
         application.on_shutdown.append(stall)
@@ -477,7 +477,7 @@ def test_what_a_stranger_writes_into_the_log_is_short(endpoint: str, serving: An
 
 NOISY = """
 import asyncio, logging, os, signal, sys
-from lcf_edge.monitor.live.source import Source
+from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.web.server import serve
 
 def complain(_):
@@ -486,7 +486,7 @@ def complain(_):
             logging.getLogger(name).warning("socket.send() raised exception.")
     os.kill(os.getpid(), signal.SIGTERM)
 
-asyncio.run(serve(Source(sys.argv[1]), "127.0.0.1", 0, complain))
+asyncio.run(serve(DaemonAddress(sys.argv[1]), "127.0.0.1", 0, complain))
 """
 
 

@@ -61,7 +61,7 @@ class AslFolder:
             (self.path / "mav0" / sensor).mkdir(parents=True)
         frames = range(0, 250_000_000, 50_000_000)
         for index, stamp in enumerate(frames):
-            cv2.imwrite(str(self.picture(stamp)), texture(index))
+            cv2.imwrite(str(self.image_path(stamp)), texture(index))
         self.write("cam0", "#timestamp [ns],filename", (f"{t},{t}.png" for t in frames))
         samples = range(0, 260_000_000, 10_000_000)
         self.write("imu0", "#timestamp [ns],w_x,w_y,w_z,a_x,a_y,a_z", (f"{t},0.1,0.2,0.3,1,2,3" for t in samples))
@@ -72,7 +72,7 @@ class AslFolder:
     def csv(self, sensor: str) -> Path:
         return self.path / "mav0" / sensor / "data.csv"
 
-    def picture(self, stamp_ns: int) -> Path:
+    def image_path(self, stamp_ns: int) -> Path:
         return self.path / "mav0" / "cam0" / "data" / f"{stamp_ns}.png"
 
     def write(self, sensor: str, header: str, rows: Iterable[str]) -> None:

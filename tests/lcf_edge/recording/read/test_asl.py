@@ -52,12 +52,12 @@ def test_samples_come_before_the_frame_that_needs_them(asl: Any, read: Read) -> 
 
 
 def test_reading_again_gives_the_same(asl: Any) -> None:
-    asl.picture(FRAMES[2]).unlink()
+    asl.image_path(FRAMES[2]).unlink()
     recording = open_recording(asl.path, Config())
     first = [repr(item) for item in recording]
-    told = (list(recording.warnings), dict(recording.skipped))
+    warned = (list(recording.warnings), dict(recording.skipped))
     assert [repr(item) for item in recording] == first
-    assert (recording.warnings, dict(recording.skipped)) == told
+    assert (recording.warnings, dict(recording.skipped)) == warned
 
 
 def test_imu_is_turned_into_the_axes_of_the_camera(asl: Any, read: Read) -> None:
@@ -91,7 +91,7 @@ def test_without_imu_or_odometry(asl: Any, read: Read, sensor: str, missing: str
     assert (not recording.warnings) == (missing == "folder")
 
 
-def test_a_missing_calibration_is_told(asl: Any) -> None:
+def test_a_missing_calibration_is_reported(asl: Any) -> None:
     (asl.path / "mav0" / "cam0" / "sensor.yaml").unlink()
     recording = open_recording(asl.path, Config())
     assert recording.lens is None
@@ -100,7 +100,7 @@ def test_a_missing_calibration_is_told(asl: Any) -> None:
     assert known.warnings == []
 
 
-def test_a_missing_mounting_of_the_imu_is_told(asl: Any) -> None:
+def test_a_missing_mounting_of_the_imu_is_reported(asl: Any) -> None:
     (asl.path / "mav0" / "imu0" / "sensor.yaml").unlink()
     (warning,) = open_recording(asl.path, Config()).warnings
     assert "imu.axes" in warning
@@ -188,7 +188,7 @@ def test_rows_without_numbers_at_all_and_very_long_ones(asl: Any, read: Read) ->
 def test_a_bad_picture_is_skipped_and_the_rest_is_read(
     asl: Any, read: Read, capfd: pytest.CaptureFixture[str], fault: str, reason: str
 ) -> None:
-    path = asl.picture(FRAMES[2])
+    path = asl.image_path(FRAMES[2])
     data = path.read_bytes()
     path.unlink()
     if fault == "folder":
@@ -206,28 +206,28 @@ def test_a_bad_picture_is_skipped_and_the_rest_is_read(
 
 
 def test_pictures_of_another_size_are_skipped(asl: Any, read: Read) -> None:
-    cv2.imwrite(str(asl.picture(FRAMES[1])), np.zeros((24, 32), np.uint8))
+    cv2.imwrite(str(asl.image_path(FRAMES[1])), np.zeros((24, 32), np.uint8))
     recording, items = read(asl.path)
     assert frames(items) == FRAMES[:1] + FRAMES[2:]
     assert recording.skipped == {"picture of another size than the first": 1}
 
 
 def test_the_first_good_picture_tells_the_size(asl: Any, read: Read) -> None:
-    asl.picture(FRAMES[0]).write_bytes(b"")
+    asl.image_path(FRAMES[0]).write_bytes(b"")
     _, items = read(asl.path)
     assert frames(items) == FRAMES[1:]
 
 
 def test_no_good_picture_at_all_is_an_error(asl: Any, read: Read) -> None:
     for stamp in FRAMES:
-        asl.picture(stamp).write_bytes(b"")
+        asl.image_path(stamp).write_bytes(b"")
     with pytest.raises(RecordingError, match=r"not one picture could be read \(5 times: picture empty\)"):
         read(asl.path)
 
 
 def test_a_gap_of_seconds_is_passed_on(asl: Any, read: Read) -> None:
     late = 7_000_000_000
-    asl.picture(FRAMES[4]).rename(asl.picture(late))
+    asl.image_path(FRAMES[4]).rename(asl.image_path(late))
     asl.edit("cam0", 6, f"{late},{late}.png")
     recording, items = read(asl.path)
     assert frames(items) == [*FRAMES[:4], late]

@@ -13,23 +13,23 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.cdr import Header, Image
-from lcf_edge.picture_limit import MAX_PIXELS
-from lcf_edge.recording.read.decoding import PictureError, decode_picture, raw_picture
+from lcf_edge.image_limit import MAX_PIXELS
+from lcf_edge.recording.read.decoding import ImageDecodeError, image_from_bytes, image_from_message
 
-PICTURE = np.random.default_rng(3).integers(0, 256, (30, 41), np.uint8)
+IMAGE = np.random.default_rng(3).integers(0, 256, (30, 41), np.uint8)
 SUFFIXES = [".png", ".jpg", ".bmp", ".pgm", ".tif"]
 
 
-def encoded(suffix: str, picture: np.ndarray[tuple[int, ...], np.dtype[np.uint8]] = PICTURE) -> bytes:
-    return cv2.imencode(suffix, picture)[1].tobytes()
+def encoded(suffix: str, image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]] = IMAGE) -> bytes:
+    return cv2.imencode(suffix, image)[1].tobytes()
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_formats(suffix: str) -> None:
-    got = decode_picture(encoded(suffix))
-    assert (got.shape, got.dtype) == (PICTURE.shape, np.uint8)
+    got = image_from_bytes(encoded(suffix))
+    assert (got.shape, got.dtype) == (IMAGE.shape, np.uint8)
     if suffix != ".jpg":
-        np.testing.assert_array_equal(got, PICTURE)
+        np.testing.assert_array_equal(got, IMAGE)
 
 
 def _huge(suffix: str) -> bytes:
@@ -57,8 +57,8 @@ def _huge(suffix: str) -> bytes:
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 def test_an_absurd_size_is_refused_by_its_header(suffix: str) -> None:
-    with pytest.raises(PictureError, match="too large"):
-        decode_picture(_huge(suffix))
+    with pytest.raises(ImageDecodeError, match="too large"):
+        image_from_bytes(_huge(suffix))
 
 
 # Headers that could be read in two ways: a small picture for the check, a large one for the decoder.
@@ -125,19 +125,19 @@ SMALL = ((WIDTH_TAG, 4, 1, 16), (HEIGHT_TAG, 4, 1, 16))
     ],
 )
 def test_the_size_is_that_which_the_decoder_will_see(content: bytes, reason: str) -> None:
-    with pytest.raises(PictureError, match=f"^{reason}$"):
-        decode_picture(content)
+    with pytest.raises(ImageDecodeError, match=f"^{reason}$"):
+        image_from_bytes(content)
 
 
 DECODED = """
 import resource, sys
-from lcf_edge.recording.read.decoding import PictureError, decode_picture
+from lcf_edge.recording.read.decoding import ImageDecodeError, image_from_bytes
 def peak_kib():
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
 data, before = sys.stdin.buffer.read(), peak_kib()
 try:
-    decode_picture(data)
-except PictureError as error:
+    image_from_bytes(data)
+except ImageDecodeError as error:
     print(f"{error},{(peak_kib() - before) // 1024}")
 """
 
@@ -168,17 +168,17 @@ def test_a_progressive_jpeg_is_refused_by_what_its_decoder_keeps() -> None:
         cv2.IMWRITE_JPEG_SAMPLING_FACTOR,
         cv2.IMWRITE_JPEG_SAMPLING_FACTOR_444,
     ]
-    assert decode_picture(cv2.imencode(".jpg", grey, progressive)[1].tobytes()).shape == (side, side)
-    with pytest.raises(PictureError, match=r"^too large$"):
-        decode_picture(cv2.imencode(".jpg", cv2.merge([grey] * 3), progressive)[1].tobytes())
+    assert image_from_bytes(cv2.imencode(".jpg", grey, progressive)[1].tobytes()).shape == (side, side)
+    with pytest.raises(ImageDecodeError, match=r"^too large$"):
+        image_from_bytes(cv2.imencode(".jpg", cv2.merge([grey] * 3), progressive)[1].tobytes())
 
 
 def test_a_jpeg_of_endless_scans_is_refused() -> None:
-    jpeg = cv2.imencode(".jpg", PICTURE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
-    assert decode_picture(jpeg).shape == PICTURE.shape
+    jpeg = cv2.imencode(".jpg", IMAGE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
+    assert image_from_bytes(jpeg).shape == IMAGE.shape
     at = jpeg.rindex(b"\xff\xda")
-    with pytest.raises(PictureError, match=r"^damaged$"):
-        decode_picture(jpeg[:at] + jpeg[at:-2] * 200 + jpeg[-2:])
+    with pytest.raises(ImageDecodeError, match=r"^damaged$"):
+        image_from_bytes(jpeg[:at] + jpeg[at:-2] * 200 + jpeg[-2:])
 
 
 def chunk(kind: bytes, data: bytes) -> bytes:
@@ -198,15 +198,15 @@ def chunk(kind: bytes, data: bytes) -> bytes:
 def test_of_a_png_only_the_picture_is_decoded(extra: bytes, capfd: pytest.CaptureFixture[str]) -> None:
     png = encoded(".png")
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    np.testing.assert_array_equal(decode_picture(png[:33] + extra + png[33:]), PICTURE)
+    np.testing.assert_array_equal(image_from_bytes(png[:33] + extra + png[33:]), IMAGE)
     assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kib < 8 * 1024
     assert capfd.readouterr() == ("", "")
 
 
 def test_a_png_whose_header_comes_twice_is_damaged() -> None:
     png = encoded(".png")
-    with pytest.raises(PictureError, match=r"^damaged$"):
-        decode_picture(png[:33] + chunk(b"IHDR", struct.pack(">II5B", SIDE, SIDE, 8, 0, 0, 0, 0)) + png[33:])
+    with pytest.raises(ImageDecodeError, match=r"^damaged$"):
+        image_from_bytes(png[:33] + chunk(b"IHDR", struct.pack(">II5B", SIDE, SIDE, 8, 0, 0, 0, 0)) + png[33:])
 
 
 def test_the_decoder_has_the_limit_too_in_the_whole_program() -> None:
@@ -228,8 +228,8 @@ def test_the_decoder_has_the_limit_too_in_the_whole_program() -> None:
 def test_a_cut_picture_is_damaged(suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
     data = encoded(suffix)
     for end in (1, 9, len(data) // 2, len(data) - 5):
-        with pytest.raises(PictureError):
-            decode_picture(data[:end])
+        with pytest.raises(ImageDecodeError):
+            image_from_bytes(data[:end])
     assert capfd.readouterr() == ("", "")
 
 
@@ -241,8 +241,8 @@ def test_any_damage_gives_a_picture_or_a_picture_error(suffix: str, data: st.Dat
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
     said = "a picture"
     try:
-        got = decode_picture(bytes(content[: data.draw(st.integers(0, len(content)))]))
-    except PictureError as error:
+        got = image_from_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
+    except ImageDecodeError as error:
         said = str(error)
     else:
         assert (got.dtype, got.ndim) == (np.uint8, 2)
@@ -251,8 +251,8 @@ def test_any_damage_gives_a_picture_or_a_picture_error(suffix: str, data: st.Dat
 
 @given(st.binary(max_size=200))
 def test_any_bytes_give_a_picture_error(content: bytes) -> None:
-    with pytest.raises(PictureError):
-        decode_picture(content)
+    with pytest.raises(ImageDecodeError):
+        image_from_bytes(content)
 
 
 def image(encoding: str, step: int, data: bytes | bytearray, width: int = 4, height: int = 2) -> Image:
@@ -273,7 +273,7 @@ def test_raw_pictures_with_and_without_padded_rows(encoding: str, padding: int) 
     rows = layout["u" if encoding == "yuv422" else encoding[0]]
     rows = np.pad(rows, ((0, 0), (0, padding)), constant_values=255)
     payload = bytearray(rows.tobytes())
-    got = raw_picture(image(encoding, rows.shape[1], payload))
+    got = image_from_message(image(encoding, rows.shape[1], payload))
     payload[:] = bytes(len(payload))  # a frame does not keep its message
     np.testing.assert_array_equal(got, LEVELS)
     assert got.flags.c_contiguous
@@ -281,7 +281,7 @@ def test_raw_pictures_with_and_without_padded_rows(encoding: str, padding: int) 
 
 @pytest.mark.parametrize(("encoding", "grey"), [("rgb8", 76), ("bgr8", 29)])
 def test_order_of_colours(encoding: str, grey: int) -> None:
-    assert raw_picture(image(encoding, 12, bytes((255, 0, 0)) * 8))[0, 0] == grey
+    assert image_from_message(image(encoding, 12, bytes((255, 0, 0)) * 8))[0, 0] == grey
 
 
 @pytest.mark.parametrize(
@@ -301,5 +301,5 @@ def test_raw_pictures_that_are_refused(
     encoding: str, size: tuple[int, int], step: int, length: int, reason: str
 ) -> None:
     assert MAX_PIXELS < 8001**2
-    with pytest.raises(PictureError, match=f"^{reason}$"):
-        raw_picture(image(encoding, step, bytes(length), *size))
+    with pytest.raises(ImageDecodeError, match=f"^{reason}$"):
+        image_from_message(image(encoding, step, bytes(length), *size))

@@ -53,10 +53,10 @@ class Messages:
         header = self.ros.types["std_msgs/msg/Header"](stamp=stamp, frame_id=frame_id)
         return kind, bytes(self.ros.serialize_cdr(self.ros.types[kind](header=header, **fields), kind))
 
-    def image(self, stamp_ns: int, picture: Any, encoding: str = "mono8", **changed: Any) -> tuple[str, bytes]:
-        height, width = picture.shape[:2]
+    def image(self, stamp_ns: int, pixels: Any, encoding: str = "mono8", **changed: Any) -> tuple[str, bytes]:
+        height, width = pixels.shape[:2]
         fields = {"height": height, "width": width, "encoding": encoding, "is_bigendian": 0}
-        fields |= {"step": picture.strides[0], "data": picture.reshape(-1)}
+        fields |= {"step": pixels.strides[0], "data": pixels.reshape(-1)}
         return self._make("sensor_msgs/msg/Image", stamp_ns, "camera_optical_frame", **(fields | changed))
 
     def compressed(self, stamp_ns: int, data: bytes, image_format: str = "jpeg") -> tuple[str, bytes]:
@@ -165,7 +165,7 @@ def bag(tmp_path: Path) -> Bag:
     return Bag(tmp_path / "drive.mcap")
 
 
-def picture(index: int) -> Any:
+def pixels(index: int) -> Any:
     return np.full((48, 64), 5 * index, np.uint8)
 
 
@@ -175,7 +175,7 @@ def drive(bag: Bag, make: Messages) -> Bag:
     arrivals: list[tuple[int, str, tuple[str, bytes]]] = []
     for index in range(20):
         stamp = START_NS + index * STEP_NS
-        arrivals.append((stamp + 30_000_000, "/camera/image_raw", make.image(stamp, picture(index))))
+        arrivals.append((stamp + 30_000_000, "/camera/image_raw", make.image(stamp, pixels(index))))
         arrivals.append((stamp + 30_000_001, "/camera/camera_info", make.camera_info(d=(0.1, 0.2, 0.3, 0.4, 0.0))))
     end = START_NS + 20 * STEP_NS
     arrivals += [(stamp + 1, "/imu/data", make.imu(stamp)) for stamp in range(START_NS, end, 10_000_000)]
@@ -238,7 +238,7 @@ def test_a_folder_of_another_writer(tmp_path: Path, ros: Typestore, make: Messag
         }
         for index in range(5):
             stamp = START_NS + index * STEP_NS
-            for kind, payload in (make.imu(stamp), make.image(stamp, picture(index))):
+            for kind, payload in (make.imu(stamp), make.image(stamp, pixels(index))):
                 writer.write(connections[kind], stamp, payload)
     recording, items = read(tmp_path / "bag")
     assert (len(of(Frame, items)), len(of(ImuSample, items)), recording.frame_count) == (5, 5, 5)
@@ -247,7 +247,7 @@ def test_a_folder_of_another_writer(tmp_path: Path, ros: Typestore, make: Messag
 def test_files_of_a_split_bag_are_one_recording(tmp_path: Path, make: Messages, read: Read) -> None:
     for number in (0, 1, 2, 10):
         part = Bag(tmp_path / f"bag_{number}.mcap")
-        part.add("/image", make.image(START_NS + number * STEP_NS, picture(number)))
+        part.add("/image", make.image(START_NS + number * STEP_NS, pixels(number)))
         part.write()
     recording, items = read(tmp_path)
     assert [int(frame.image.mean()) for frame in items] == [0, 5, 10, 50]
@@ -256,7 +256,7 @@ def test_files_of_a_split_bag_are_one_recording(tmp_path: Path, make: Messages, 
 
 def test_an_empty_last_file_of_a_bag_is_passed_over(tmp_path: Path, make: Messages, read: Read) -> None:
     part = Bag(tmp_path / "bag_0.mcap")
-    part.add("/image", make.image(START_NS, picture(1)))
+    part.add("/image", make.image(START_NS, pixels(1)))
     part.write()
     (tmp_path / "bag_1.mcap").write_bytes(b"")
     recording, items = read(tmp_path)
@@ -266,7 +266,7 @@ def test_an_empty_last_file_of_a_bag_is_passed_over(tmp_path: Path, make: Messag
 
 @pytest.mark.parametrize("suffix", [".jpg", ".png"])
 def test_compressed_pictures(bag: Bag, make: Messages, read: Read, suffix: str) -> None:
-    good = cv2.imencode(suffix, picture(20))[1].tobytes()
+    good = cv2.imencode(suffix, pixels(20))[1].tobytes()
     for index, data in enumerate((good, good[:-20], b"", good)):
         bag.add("/image/compressed", make.compressed(START_NS + index, data))
     recording, items = read(bag.write())
@@ -282,21 +282,21 @@ def test_colour(bag: Bag, make: Messages, read: Read) -> None:
 
 def test_twist_is_speed_where_there_is_no_odometry(bag: Bag, make: Messages, read: Read) -> None:
     bag.add("/twist", make.twist(START_NS, 0.75))
-    bag.add("/image", make.image(START_NS, picture(1)))
+    bag.add("/image", make.image(START_NS, pixels(1)))
     _, items = read(bag.write())
     assert of(SpeedSample, items)[0] == SpeedSample(START_NS, 0.75, 0.25)
 
 
 def test_a_header_without_time_has_the_time_of_recording(bag: Bag, make: Messages, read: Read) -> None:
-    bag.add("/image", make.image(0, picture(1)), log_time_ns=START_NS + 5)
+    bag.add("/image", make.image(0, pixels(1)), log_time_ns=START_NS + 5)
     _, (frame,) = read(bag.write())
     assert frame.stamp_ns == START_NS + 5
 
 
 def test_the_first_of_several_topics_is_read(bag: Bag, make: Messages, read: Read) -> None:
     for index in range(3):
-        bag.add("/left/image", make.image(START_NS + index, picture(1)))
-        bag.add("/right/image", make.image(START_NS + index, picture(2)))
+        bag.add("/left/image", make.image(START_NS + index, pixels(1)))
+        bag.add("/right/image", make.image(START_NS + index, pixels(2)))
     bag.add("/right/camera_info", make.camera_info())
     recording, items = read(bag.write())
     assert {int(frame.image.mean()) for frame in items} == {5}
@@ -309,24 +309,24 @@ def test_topics_that_cannot_be_used_are_not_chosen(bag: Bag, make: Messages, rea
     bag.add("/depth", make.image(START_NS, np.zeros((4, 8), np.uint8), "16UC1", width=4))
     bag.add("/depth/compressed", make.compressed(START_NS, b"", "16UC1; compressedDepth png"))
     bag.add("/gyro", make.imu(START_NS, unknown=-1))
-    bag.add("/image", make.image(START_NS, picture(1)))
+    bag.add("/image", make.image(START_NS, pixels(1)))
     recording, items = read(bag.write())
     assert [int(frame.image.mean()) for frame in items] == [5]
     assert not recording.has_imu
 
 
 @pytest.mark.parametrize(
-    ("frame_id", "told"),
+    ("frame_id", "is_warned_of"),
     [("imu_optical_frame", False), ("camera_optical_frame", False), ("imu_link", True), ("", True)],
 )
-def test_axes_of_an_imu_that_may_not_be_the_cameras_are_told(
-    bag: Bag, make: Messages, frame_id: str, told: bool
+def test_axes_of_an_imu_that_may_not_be_the_cameras_are_reported(
+    bag: Bag, make: Messages, frame_id: str, is_warned_of: bool
 ) -> None:
     bag.add("/camera/camera_info", make.camera_info())
-    bag.add("/camera/image", make.image(START_NS, picture(1)))
+    bag.add("/camera/image", make.image(START_NS, pixels(1)))
     bag.add("/imu", make.imu(START_NS, frame_id=frame_id))
     bag.write()
-    assert any("imu.axes" in warning for warning in open_recording(bag.path, Config()).warnings) == told
+    assert any("imu.axes" in warning for warning in open_recording(bag.path, Config()).warnings) == is_warned_of
     turn = Imu(axes=[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     assert open_recording(bag.path, Config(imu=turn)).warnings == []
 
@@ -350,7 +350,7 @@ def test_axes_of_an_imu_that_may_not_be_the_cameras_are_told(
 )
 def test_lens(bag: Bag, make: Messages, model: str, d: tuple[float, ...], expected: tuple[str, Any] | None) -> None:
     bag.add("/camera/camera_info", make.camera_info(model, d))
-    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    bag.add("/camera/image_raw", make.image(START_NS, pixels(1)))
     recording = open_recording(bag.write(), Config())
     if expected is None:
         assert recording.lens is None
@@ -380,11 +380,11 @@ def test_lens(bag: Bag, make: Messages, model: str, d: tuple[float, ...], expect
     ],
     ids=lambda info: str(info)[:40],
 )
-def test_a_lens_that_cannot_be_is_told_in_one_line_and_not_used(
+def test_a_lens_that_cannot_be_is_reported_in_one_line_and_not_used(
     bag: Bag, make: Messages, read: Read, info: dict[str, Any]
 ) -> None:
     bag.add("/camera/camera_info", make.camera_info(**info))
-    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    bag.add("/camera/image_raw", make.image(START_NS, pixels(1)))
     recording, frames = read(bag.write())
     assert recording.lens is None
     assert len(frames) == 1
@@ -404,7 +404,7 @@ def test_a_lens_that_cannot_be_is_told_in_one_line_and_not_used(
 )
 def test_an_odd_lens_is_used_without_a_failure(bag: Bag, make: Messages, info: dict[str, Any]) -> None:
     bag.add("/camera/camera_info", make.camera_info(**info))
-    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    bag.add("/camera/image_raw", make.image(START_NS, pixels(1)))
     recording = open_recording(bag.write(), Config())
     assert recording.lens
     assert len(list(run(recording, Config()))) == 1
@@ -412,7 +412,7 @@ def test_an_odd_lens_is_used_without_a_failure(bag: Bag, make: Messages, info: d
 
 def test_an_uncalibrated_camera_has_no_lens(bag: Bag, make: Messages) -> None:
     bag.add("/camera/camera_info", make.camera_info(focal=0.0))
-    bag.add("/camera/image_raw", make.image(START_NS, picture(1)))
+    bag.add("/camera/image_raw", make.image(START_NS, pixels(1)))
     recording = open_recording(bag.write(), Config())
     assert recording.lens is None
     assert "camera.intrinsics" in recording.warnings[0]
@@ -426,15 +426,15 @@ def test_what_is_wrong_with_single_messages_is_counted(bag: Bag, make: Messages,
         return message[0], message[1][:-30]
 
     for index in range(4):
-        add("/image", make.image(START_NS + index * STEP_NS, picture(index)))
+        add("/image", make.image(START_NS + index * STEP_NS, pixels(index)))
         add("/imu", make.imu(START_NS + index * STEP_NS))
         add("/odom", make.odometry(START_NS + index * STEP_NS))
     stamp = START_NS + 4 * STEP_NS
-    add("/image", make.image(stamp, picture(1), data=np.zeros(100, np.uint8)))
-    add("/image", make.image(stamp + 1, picture(1), width=2**31, height=2**31))
+    add("/image", make.image(stamp, pixels(1), data=np.zeros(100, np.uint8)))
+    add("/image", make.image(stamp + 1, pixels(1), width=2**31, height=2**31))
     add("/image", make.image(stamp + 2, np.zeros((8, 8), np.uint8)))
-    add("/image", cut(make.image(stamp + 3, picture(1))))
-    add("/image", make.image(START_NS, picture(1)))
+    add("/image", cut(make.image(stamp + 3, pixels(1))))
+    add("/image", make.image(START_NS, pixels(1)))
     add("/imu", make.imu(stamp, (0.0, float("nan"), 0.0)))
     add("/imu", make.imu(stamp + 1, unknown=-1))
     add("/imu", cut(make.imu(stamp + 2)))
@@ -457,7 +457,7 @@ def test_what_is_wrong_with_single_messages_is_counted(bag: Bag, make: Messages,
 
 def test_names_in_a_file_cannot_write_to_the_terminal(bag: Bag, make: Messages, read: Read) -> None:
     for index in range(2):
-        bag.add(f"/image{index}\x1b[2J\n", make.image(START_NS, picture(1)))
+        bag.add(f"/image{index}\x1b[2J\n", make.image(START_NS, pixels(1)))
     recording, _ = read(bag.write())
     assert all(warning.isprintable() for warning in recording.warnings)
 
@@ -469,9 +469,9 @@ def test_a_cut_file_is_read_up_to_the_cut(drive: Bag, read: Read, form: dict[str
     end_of_data = next(start for opcode, start, _ in _records(data) if opcode == DATA_END)
     drive.path.write_bytes(data[: int(share * end_of_data)])
     recording, items = read(drive.path)
-    pictures = len(of(Frame, items))
-    assert [frame.seq for frame in of(Frame, items)] == list(range(pictures))
-    assert len(of(ImuSample, items)) >= 5 * (pictures - 1)
+    frames = len(of(Frame, items))
+    assert [frame.seq for frame in of(Frame, items)] == list(range(frames))
+    assert len(of(ImuSample, items)) >= 5 * (frames - 1)
     damage = [warning for warning in recording.warnings if "damaged at byte" in warning]
     assert len(damage) == 1
     assert damage[0].endswith("read up to there")
@@ -553,7 +553,7 @@ def test_a_chunk_that_unpacks_to_much_takes_little_memory(tmp_path: Path, compre
 
 def test_names_of_topics_are_kept_only_as_far_as_topics_are_called(bag: Bag, make: Messages) -> None:
     for number in range(400):
-        bag.add(f"/{number}{'x' * 50_000}", make.image(START_NS, picture(1)))
+        bag.add(f"/{number}{'x' * 50_000}", make.image(START_NS, pixels(1)))
     bag.write(chunk_size=1)
     tracemalloc.start()
     try:
@@ -698,9 +698,9 @@ def test_garbage_is_refused_in_one_line(bag: Bag, content: bytes) -> None:
 def test_a_file_without_pictures_is_refused(bag: Bag, make: Messages, fault: str) -> None:
     bag.add("/imu", make.imu(START_NS))
     if fault == "only depth":
-        bag.add("/depth", make.image(START_NS, picture(1), "16UC1", width=32))
+        bag.add("/depth", make.image(START_NS, pixels(1), "16UC1", width=32))
     elif fault == "ros1":
-        bag.add("/image", make.image(START_NS, picture(1)))
+        bag.add("/image", make.image(START_NS, pixels(1)))
     bag.write(encoding="ros1" if fault == "ros1" else "cdr")
     with pytest.raises(RecordingError, match=r"no picture that can be read in it.*record a camera topic"):
         open_recording(bag.path, Config())

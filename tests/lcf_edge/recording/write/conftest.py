@@ -16,7 +16,7 @@ from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
-from lcf_edge.recording.write.messages import Encoder, Message, Seen, Statuses
+from lcf_edge.recording.write.messages import Encoder, FrameAndScene, RecordedMessage, Statuses
 
 STEP_NS = 50_000_000
 
@@ -38,7 +38,7 @@ def scene(stamp_ns: int, seq: int, circles: int = 3) -> Scene:
     return Scene(stamp_ns, seq, 32, 24, 1.5, rows, np.zeros(1, PSI_REGION), objects=np.ones(2, OBJECT))
 
 
-def recorded(count: int, start_ns: int = 10**9, encoder: Encoder | None = None) -> Iterator[Message]:
+def recorded(count: int, start_ns: int = 10**9, encoder: Encoder | None = None) -> Iterator[RecordedMessage]:
     """``count`` pictures of 32×24 with all that comes with them."""
     encoder = encoder or Encoder(Config(), lambda *_: None)
     for seq in range(count):
@@ -46,7 +46,7 @@ def recorded(count: int, start_ns: int = 10**9, encoder: Encoder | None = None) 
         image = np.full((24, 32), 10 * seq % 256, np.uint8)
         yield from encoder.encode(ImuSample(stamp_ns, (0.1, 0.2, 0.3), (0.0, -9.81, 0.0)))
         yield from encoder.encode(SpeedSample(stamp_ns, 1.5, float("nan")))
-        yield from encoder.encode(Seen(Frame(stamp_ns, seq, image), scene(stamp_ns, seq)))
+        yield from encoder.encode(FrameAndScene(Frame(stamp_ns, seq, image), scene(stamp_ns, seq)))
     statuses = [DeviceStatus("camera", Level.OK, "delivers", {"rate_hz": "20"})]
     yield from encoder.encode(Statuses(start_ns + count * STEP_NS, statuses))
 

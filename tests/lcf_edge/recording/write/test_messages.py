@@ -16,13 +16,13 @@ from lcf_edge.config import Config, Imu, Publish, Record
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.lens import Lens
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
-from lcf_edge.recording.write.messages import CAMERA_INFO, PICTURES, SCENE, TOPICS, Encoder, Seen, Statuses
+from lcf_edge.recording.write.messages import CAMERA_INFO, IMAGES, SCENE, TOPICS, Encoder, FrameAndScene, Statuses
 from lcf_edge.recording.write.schemas import schema
 
 DEFAULT = Config()
-PICTURE = np.random.default_rng(1).integers(0, 256, (24, 32), np.uint8)
+IMAGE = np.random.default_rng(1).integers(0, 256, (24, 32), np.uint8)
 TABLES = np.ones(2, CIRCLE), np.ones(1, PSI_REGION)
-SEEN = Seen(Frame(5, 7, PICTURE), Scene(5, 7, 32, 24, 1.5, *TABLES, objects=np.ones(3, OBJECT)))
+SEEN = FrameAndScene(Frame(5, 7, IMAGE), Scene(5, 7, 32, 24, 1.5, *TABLES, objects=np.ones(3, OBJECT)))
 
 
 def decoded(ros: Any, record: Any, config: Config = DEFAULT, lens: Lens | None = None) -> dict[str, Any]:
@@ -65,11 +65,11 @@ def test_speeds(ros: Any) -> None:
 def test_pictures_lossless_or_nearly(ros: Any) -> None:
     for kind, most in (("png", 0), ("jpeg", 40)):
         config = Config(record=Record(format=kind, jpeg_quality=95))  # type: ignore[arg-type]
-        message = decoded(ros, SEEN, config)[PICTURES.name]
+        message = decoded(ros, SEEN, config)[IMAGES.name]
         assert message.format == kind
-        picture = np.asarray(cv2.imdecode(message.data, cv2.IMREAD_UNCHANGED), int)
-        assert picture.shape == PICTURE.shape
-        assert np.abs(picture - PICTURE).max() <= most
+        image = np.asarray(cv2.imdecode(message.data, cv2.IMREAD_UNCHANGED), int)
+        assert image.shape == IMAGE.shape
+        assert np.abs(image - IMAGE).max() <= most
 
 
 def test_the_scene_of_the_picture(ros: Any) -> None:

@@ -3,7 +3,7 @@
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.recording.write.messages import SCENE, Message
+from lcf_edge.recording.write.messages import SCENE, RecordedMessage
 from lcf_edge.recording.write.ring import Ring, size_bytes
 
 
@@ -12,7 +12,7 @@ def test_it_keeps_the_newest_that_fit_and_are_young_enough(steps: list[tuple[int
     ring, added, now_ns = Ring(2.0), [], 0
     for step_ns, size, limit_bytes in steps:
         now_ns += step_ns
-        added.append(Message(SCENE, now_ns, bytes(size)))
+        added.append(RecordedMessage(SCENE, now_ns, bytes(size)))
         ring.add(added[-1], limit_bytes)
         assert ring.bytes <= limit_bytes
     kept_bytes = ring.bytes
@@ -27,5 +27,5 @@ def test_it_keeps_the_newest_that_fit_and_are_young_enough(steps: list[tuple[int
 def test_with_room_enough_nothing_young_leaves() -> None:
     ring = Ring(2.0)
     for index in range(100):
-        ring.add(Message(SCENE, index * 10**8, b"x"), 10**6)
+        ring.add(RecordedMessage(SCENE, index * 10**8, b"x"), 10**6)
     assert [message.stamp_ns for message in ring.take()] == [index * 10**8 for index in range(79, 100)]

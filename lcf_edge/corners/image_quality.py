@@ -15,11 +15,11 @@ GREY_STEP_PX, LINE_STEP_PX = 8, 32  # of the samples
 Grey = npt.NDArray[np.uint8]
 
 
-class PictureQuality:
+class ImageQuality:
     """Follows the pictures of one camera: what is sharp for one lens is soft for another."""
 
     def __init__(self) -> None:
-        self._usual: float | None = None  # sharpness
+        self._typical: float | None = None  # sharpness
 
     def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
         """What degrades this (height, width) picture, in which so many corners were found; most often nothing."""
@@ -34,10 +34,10 @@ class PictureQuality:
         if np.count_nonzero(grey >= BURNT_OUT) > GLARE_SHARE * grey.size:
             notes.append("glare")
         sharp = sharpness(image)
-        usual = sharp if self._usual is None else self._usual
-        if sharp < BLURRED * usual:
+        typical = sharp if self._typical is None else self._typical
+        if sharp < BLURRED * typical:
             notes.append("blurred")
-        self._usual = usual + MEMORY * (sharp - usual)
+        self._typical = typical + MEMORY * (sharp - typical)
         return tuple(notes)
 
 

@@ -17,7 +17,7 @@ from drivers.samples import Frame
 from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
 from lcf_edge.recording.read import open_recording
-from lcf_edge.recording.read.pictures import natural_order
+from lcf_edge.recording.read.images import natural_order
 
 Read = Callable[..., tuple[Any, list[Any]]]
 MAX_MIB = 110

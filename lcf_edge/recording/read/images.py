@@ -11,11 +11,11 @@ import numpy as np
 
 from lcf_edge.config import Camera, Config
 from lcf_edge.errors import RecordingError
-from lcf_edge.recording.read.decoding import Grey, PictureError, check_size, read_picture
+from lcf_edge.recording.read.decoding import Grey, ImageDecodeError, check_size, read_image
 from lcf_edge.recording.read.memory_allowance import MemoryAllowance
-from lcf_edge.recording.read.recording import Picture, Recording, Sample
+from lcf_edge.recording.read.recording import Recording, Sample, UndecodedFrame
 
-PICTURE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".tif", ".tiff"))
+IMAGE_SUFFIXES = frozenset((".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".tif", ".tiff"))
 VIDEO_SUFFIXES = frozenset(
     (
         ".mp4",
@@ -41,7 +41,7 @@ _GRABS_BEYOND = 2  # a picture that the decoder could not take is one or two cal
 FASTEST_FPS = 10_000.0  # a container that claims more does not know
 
 
-class PictureFolder(Recording):
+class ImageFolder(Recording):
     """A folder of pictures, sorted by name as a person would (2 before 10), at ``camera.fps``.
 
     Raises ``RecordingError`` and ``OSError``.
@@ -50,7 +50,7 @@ class PictureFolder(Recording):
     def __init__(self, path: Path, config: Config) -> None:
         super().__init__(path)
         entries = list(path.iterdir())
-        self._paths = sorted((p for p in entries if is_picture(p)), key=lambda p: natural_order(p.name))
+        self._paths = sorted((p for p in entries if is_image(p)), key=lambda p: natural_order(p.name))
         if not self._paths:
             raise RecordingError(
                 f"{path}: {'no pictures in it' if entries else 'empty folder'}; "
@@ -60,9 +60,9 @@ class PictureFolder(Recording):
         self._fps = config.camera.fps
         self._warn_without_lens(config)
 
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         for index, path in enumerate(self._paths):
-            yield Picture(_stamp_ns(index, self._fps), str(path), partial(read_picture, path))
+            yield UndecodedFrame(_stamp_ns(index, self._fps), str(path), partial(read_image, path))
 
 
 class VideoFile(Recording):
@@ -82,25 +82,25 @@ class VideoFile(Recording):
             capture.release()
         try:
             check_size(*size)
-        except PictureError as error:
+        except ImageDecodeError as error:
             raise RecordingError(f"{path}: pictures are {error} ({size[0]}x{size[1]} px); scale the video") from error
         self._decoder_bytes = _DECODER_BYTES + _BYTES_A_PIXEL * size[0] * size[1]
-        wanted_fps = config.camera.fps
-        tells_fps = math.isfinite(own_fps) and 0 < own_fps < FASTEST_FPS
-        self._fps = own_fps if tells_fps and wanted_fps == Camera().fps else wanted_fps
-        if not tells_fps:
+        configured_fps = config.camera.fps
+        has_fps = math.isfinite(own_fps) and 0 < own_fps < FASTEST_FPS
+        self._fps = own_fps if has_fps and configured_fps == Camera().fps else configured_fps
+        if not has_fps:
             self._warn(f"{path}: tells no frame rate, taken is camera.fps = {self._fps:g}")
         self.frame_count = int(count) if 0 < count < 1e9 else None
         self._warn_without_lens(config)
 
-    def _items(self) -> Iterator[Picture | Sample]:
+    def _items(self) -> Iterator[UndecodedFrame | Sample]:
         capture = self._open()
         allowance = MemoryAllowance(self._decoder_bytes)
         index = 0
         try:
             while _grab(capture, allowance):
                 read = partial(_retrieve, capture, allowance)
-                yield Picture(_stamp_ns(index, self._fps), f"{self.path}: picture {index}", read)
+                yield UndecodedFrame(_stamp_ns(index, self._fps), f"{self.path}: picture {index}", read)
                 index += 1
             if any(_grab(capture, allowance) for _ in range(_GRABS_BEYOND)):
                 self._warn(f"{self.path}: picture {index} is damaged, or larger than the first; the video ends there")
@@ -136,16 +136,16 @@ def _retrieve(capture: cv2.VideoCapture, allowance: MemoryAllowance) -> Grey:
         with allowance.limited():
             good, image = capture.retrieve()
     except cv2.error as error:  # it gets no memory
-        raise PictureError("too large") from error
+        raise ImageDecodeError("too large") from error
     if not good or image is None:
-        raise PictureError("damaged")
+        raise ImageDecodeError("damaged")
     check_size(*image.shape[1::-1])
     return np.asarray(image if image.ndim == 2 else cv2.cvtColor(image, cv2.COLOR_BGR2GRAY), np.uint8)
 
 
-def is_picture(path: Path) -> bool:
+def is_image(path: Path) -> bool:
     """Whether a file is one, by its name."""
-    return path.suffix.lower() in PICTURE_SUFFIXES and not path.name.startswith(".") and path.is_file()
+    return path.suffix.lower() in IMAGE_SUFFIXES and not path.name.startswith(".") and path.is_file()
 
 
 def _stamp_ns(index: int, fps: float) -> int:

@@ -17,21 +17,21 @@ _RED, _YELLOW, _GREY, _WHITE, _BLACK = (60, 60, 255), (0, 230, 255), (190, 190, 
 Colours = npt.NDArray[np.uint8]
 
 
-def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], told: Sequence[Rebel], caption: str) -> Colours:
+def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], reported: Sequence[Rebel], caption: str) -> Colours:
     """A frame (h, w), grey, as a small picture (h, ``WIDTH_PX``, 3): threats yellow, other things grey, rebels red."""
     scale = WIDTH_PX / image.shape[1]
     kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    picture = cv2.cvtColor(cv2.resize(image, None, fx=scale, fy=scale, interpolation=kind), cv2.COLOR_GRAY2BGR)
+    canvas = cv2.cvtColor(cv2.resize(image, None, fx=scale, fy=scale, interpolation=kind), cv2.COLOR_GRAY2BGR)
     for each in known:
         x0, y0, x1, y1 = (round(scale * value) for value in each.box)
-        cv2.rectangle(picture, (x0, y0), (x1, y1), _YELLOW if each.threat else _GREY, 1, cv2.LINE_AA)
-    for rebel in told:
+        cv2.rectangle(canvas, (x0, y0), (x1, y1), _YELLOW if each.threat else _GREY, 1, cv2.LINE_AA)
+    for rebel in reported:
         place = round(scale * rebel.x), round(scale * rebel.y)
-        cv2.circle(picture, place, max(round(scale * rebel.r), 3), _RED, 2, cv2.LINE_AA)
+        cv2.circle(canvas, place, max(round(scale * rebel.r), 3), _RED, 2, cv2.LINE_AA)
         if rebel.ttc_s is not None and 0 < rebel.ttc_s < CLOSE_S:
-            _write(picture, f"{rebel.ttc_s:.1f} s", place)
-    _write(picture, caption, (5, 16))
-    return np.asarray(picture, np.uint8)
+            _write(canvas, f"{rebel.ttc_s:.1f} s", place)
+    _write(canvas, caption, (5, 16))
+    return np.asarray(canvas, np.uint8)
 
 
 def beside(left: Colours, right: Colours) -> Colours:
@@ -40,12 +40,12 @@ def beside(left: Colours, right: Colours) -> Colours:
     return np.concatenate([left, gap, right], axis=1)
 
 
-def encode(picture: Colours) -> bytes:
+def encode(canvas: Colours) -> bytes:
     """As JPEG."""
-    _, data = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    _, data = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return data.tobytes()
 
 
-def _write(picture: cv2.typing.MatLike, text: str, place: tuple[int, int]) -> None:
+def _write(canvas: cv2.typing.MatLike, text: str, place: tuple[int, int]) -> None:
     for colour, thickness in ((_BLACK, 3), (_WHITE, 1)):
-        cv2.putText(picture, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, thickness, cv2.LINE_AA)
+        cv2.putText(canvas, text, place, cv2.FONT_HERSHEY_SIMPLEX, 0.42, colour, thickness, cv2.LINE_AA)

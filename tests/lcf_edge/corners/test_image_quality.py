@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.corners.picture_quality import PictureQuality, sharpness
+from lcf_edge.corners.image_quality import ImageQuality, sharpness
 from lcf_edge.rendered import scenes
 
 Grey = npt.NDArray[np.uint8]
@@ -25,13 +25,13 @@ def moved(image: Grey, length_px: int) -> Grey:
 
 
 def test_usual_pictures_have_no_notes() -> None:
-    quality = PictureQuality()
+    quality = ImageQuality()
     assert {quality.notes(image, 700) for image in drive()} == {()}
 
 
 @pytest.mark.parametrize("turned", [False, True], ids=["sideways", "up and down"])
-def test_motion_blur_is_told_while_it_lasts(turned: bool) -> None:
-    quality = PictureQuality()
+def test_motion_blur_is_reported_while_it_lasts(turned: bool) -> None:
+    quality = ImageQuality()
     *before, last = drive()
     for image in before:
         quality.notes(image, 700)
@@ -41,22 +41,22 @@ def test_motion_blur_is_told_while_it_lasts(turned: bool) -> None:
 
 
 def test_a_lens_that_is_always_soft_is_as_usual() -> None:
-    quality = PictureQuality()
+    quality = ImageQuality()
     soft = [np.asarray(cv2.GaussianBlur(image, (0, 0), 2.0), np.uint8) for image in drive()]
     assert {quality.notes(image, 700) for image in soft} == {()}
 
 
-@pytest.mark.parametrize(("corners", "told"), [(0, ("no corners",)), (39, ("few corners",)), (40, ())])
-def test_how_many_corners_there_are(corners: int, told: tuple[str, ...]) -> None:
-    assert PictureQuality().notes(drive(0.1)[0], corners) == told
+@pytest.mark.parametrize(("corners", "notes"), [(0, ("no corners",)), (39, ("few corners",)), (40, ())])
+def test_how_many_corners_there_are(corners: int, notes: tuple[str, ...]) -> None:
+    assert ImageQuality().notes(drive(0.1)[0], corners) == notes
 
 
-def test_darkness_and_glare_are_told() -> None:
+def test_darkness_and_glare_are_reported() -> None:
     (image,) = drive(0.1)
-    assert "dark" in PictureQuality().notes(image // 8, 700)
+    assert "dark" in ImageQuality().notes(image // 8, 700)
     dazzled = image.copy()
     dazzled[:160] = 255
-    assert PictureQuality().notes(dazzled, 700) == ("glare",)
+    assert ImageQuality().notes(dazzled, 700) == ("glare",)
 
 
 def test_a_drive_with_long_exposures_while_shaken_is_less_sharp() -> None:

@@ -7,7 +7,7 @@ from lcf_edge.zenoh_link.subscription import reading_from
 
 
 @dataclass(frozen=True, slots=True)
-class Source:
+class DaemonAddress:
     """Where a daemon or a router listens, and the prefix of the daemon's keys."""
 
     endpoint: str  # tcp/127.0.0.1:7447
