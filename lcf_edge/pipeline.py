@@ -16,6 +16,7 @@ from lcf_edge.config import Config
 from lcf_edge.corners import own_parts
 from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.corners.image_quality import ImageQuality
+from lcf_edge.corners.repeats import Repeats
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.ego_motion.image_rotation import ImageRotation
@@ -40,7 +41,10 @@ Rows = np.ndarray[Any, np.dtype[np.void]]
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What pictures show without samples: the corners, what is wrong with the last one, whether they stand still."""
+    """What pictures show without samples: the corners, what is wrong with the last one, whether they stand still.
+
+    ``repeats``: the scene before, if the frame is that scene's image once more.
+    """
 
     frame: Frame
     corners: Corners
@@ -49,6 +53,7 @@ class Look:
     still: bool | None  # whether the picture has stood still for half a second; None: it does not tell
     detect_ns: int  # that the corners took
     took_ns: int  # that all of it took
+    repeats: PipelineScene | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,6 +77,8 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
         self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
         self._quality = ImageQuality()
+        self._repeats = Repeats()
+        self._scene: PipelineScene | None = None  # of the last new image
         self._speed_mps = math.nan  # of the last frame
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._image_rotation = ImageRotation(lens)
@@ -129,6 +136,9 @@ class Pipeline:
     def look(self, frame: Frame) -> Look:
         """The part of ``process`` that needs no samples; ``follow`` is the rest, and comes next."""
         started = time.perf_counter_ns()
+        if self._repeats.is_repeat(frame.stamp_ns, frame.image):
+            took_ns = time.perf_counter_ns() - started
+            return Look(frame, NO_CORNERS, 0, (), None, 0, took_ns, self._scene)
         corners, cut = self._detector.detect(frame.image, self._highest_row())
         detect_ns = time.perf_counter_ns() - started
         notes = self._quality.notes(frame.image, len(corners))
@@ -137,6 +147,8 @@ class Pipeline:
 
     def follow(self, look: Look) -> PipelineScene:
         """The scene of the frame that was looked at, with the samples that have been added."""
+        if look.repeats is not None:
+            return _repeated(look.repeats, look)
         started = time.perf_counter_ns()
         frame, corners = look.frame, look.corners
         ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, look.still))
@@ -155,7 +167,7 @@ class Pipeline:
         done = time.perf_counter_ns()
         self._last_corners = corners, step.omitted
         self._speed_mps = ego.speed_mps
-        return PipelineScene(
+        self._scene = PipelineScene(
             stamp_ns=frame.stamp_ns,
             seq=frame.seq,
             image_width=self._lens.width,
@@ -173,6 +185,7 @@ class Pipeline:
             objects=objects,
             circle_objects=circle_objects,
         )
+        return self._scene
 
     def _highest_row(self) -> float:
         """Row, px, above which all that could be met within the horizon is higher than the vehicle; NaN: unknown."""
@@ -236,6 +249,27 @@ class Pipeline:
             focus=focus,
             own_parts=self._own_parts,
         )
+
+
+def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
+    """The scene of an image that comes once more: as it was, with contacts nearer by the time that has passed."""
+    passed_s = (look.frame.stamp_ns - scene.stamp_ns) / 1e9
+    return replace(
+        scene,
+        stamp_ns=look.frame.stamp_ns,
+        seq=look.frame.seq,
+        circles=_nearer(scene.circles, passed_s),
+        objects=_nearer(scene.objects, passed_s),
+        timing=Timing(detect=0, filter=0, total=look.took_ns // 1000),
+        notes=(*scene.notes, "repeated picture"),
+    )
+
+
+def _nearer(rows: Rows, passed_s: float) -> Rows:
+    """The same circles or objects, so much later."""
+    rows = rows.copy()
+    rows["ttc"] = np.maximum(rows["ttc"] - np.float32(passed_s), 0)
+    return rows
 
 
 def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:

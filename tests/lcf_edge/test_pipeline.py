@@ -396,6 +396,28 @@ def test_repeated_and_earlier_stamps_do_no_harm(approach: Approach) -> None:
     assert len(seen) == 13
 
 
+def test_an_image_that_comes_once_more_is_its_scene_once_more_with_contacts_nearer(approach: Approach) -> None:
+    config = Config(vehicle=Vehicle(speed_mps=2.0))
+    items = at_times(approach, [number * 60_000_000 for number in range(20)])
+    twice: list[Item] = []
+    for item in items:
+        twice.append(item)
+        if isinstance(item, Frame) and item.seq >= 5:  # by then it is known how much images change
+            twice.append(replace(item, stamp_ns=item.stamp_ns + 30_000_000))
+    seen = outcomes(twice, config)
+    new = [each for each in seen if "repeated picture" not in each.scene.notes]
+    assert [comparable(each.scene) for each in new] == [comparable(each.scene) for each in outcomes(items, config)]
+    approaching = 0
+    for before, again in zip(seen[5::2], seen[6::2], strict=True):
+        assert again.scene.stamp_ns == before.scene.stamp_ns + 30_000_000
+        assert "repeated picture" in again.scene.notes
+        for rows, later in ((before.scene.circles, again.scene.circles), (before.scene.objects, again.scene.objects)):
+            assert np.array_equal(rows["id"], later["id"])
+            np.testing.assert_allclose(later["ttc"], np.maximum(rows["ttc"] - 0.03, 0), rtol=1e-5)
+            approaching += int(np.isfinite(rows["ttc"]).sum())
+    assert approaching > 10
+
+
 IMAGE_KINDS = st.sampled_from(("wall", "noise", "black", "half"))
 STEPS_NS = st.sampled_from((0, 1, 10**6, 33 * 10**6, 5 * 10**7, 10**9, 10**11, -(10**8)))
 

@@ -1,0 +1,39 @@
+"""Whether an image is the one before once more, as slow cameras and recorders at a fixed rate deliver them."""
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+
+STEP_PX = 4  # of the samples, along rows and columns
+MAX_CHANGE = 0.25  # mean grey levels; what a coder adds to a copy is less, the noise of a camera more
+MAX_SHARE = 0.05  # of the change that is usual
+MEMORY = 0.2  # share by which each new picture changes what is usual
+MAX_REPEAT_S = 0.25  # an image that stays longer shows a scene that stands still
+
+Grey = npt.NDArray[np.uint8]
+
+
+class Repeats:
+    """Follows the images of one camera. Keeps samples of the last new one."""
+
+    def __init__(self) -> None:
+        self._last: Grey | None = None
+        self._last_ns = 0
+        self._usual = 0.0  # mean change from one new image to the next, grey levels
+
+    def is_repeat(self, stamp_ns: int, image: Grey) -> bool:
+        """Take an image, uint8 (height, width). Return whether it shows nothing since the last new one.
+
+        Only where the images change: of a scene that stands still before a camera without noise, all are new.
+        """
+        samples = np.ascontiguousarray(image[::STEP_PX, ::STEP_PX])
+        if self._last is None or self._last.shape != samples.shape:
+            self._last, self._last_ns = samples, stamp_ns
+            return False
+        change = cv2.norm(samples, self._last, cv2.NORM_L1) / samples.size
+        same = change < min(MAX_CHANGE, MAX_SHARE * self._usual)
+        if same and 0 <= stamp_ns - self._last_ns <= MAX_REPEAT_S * 1e9:
+            return True
+        self._usual = change if same else self._usual + MEMORY * (change - self._usual)
+        self._last, self._last_ns = samples, stamp_ns
+        return False
