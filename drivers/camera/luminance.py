@@ -123,7 +123,7 @@ class FrameError(DriverError):
 
 
 def least_stride(pixel_format: str, width: int) -> int:
-    """Bytes from one row to the next where the device does not tell; 0 for MJPG."""
+    """Bytes from one row to the next where the device does not say; 0 for MJPG."""
     return _LAYOUTS[pixel_format].row(width) if pixel_format in _LAYOUTS else 0
 
 

@@ -36,7 +36,7 @@ class Endpoint:
                     self.wfile.write(endpoint.text)
 
             def log_message(self, *_: object) -> None:
-                """Nothing: whoever asks may ask often."""
+                """Nothing: clients may ask often."""
 
         try:
             self._server = _Server((HOST, port), Handler)

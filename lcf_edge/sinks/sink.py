@@ -29,7 +29,7 @@ class Sink(ABC):
 
         ``view`` makes what an overlay shows of the frame; it takes about a millisecond, and may be called only before
         ``put`` returns. In the daemon, ``scene`` is stamped by the system clock and ``frame`` by the monotonic one.
-        Raises ``SinkError``; the daemon goes on without the sink and tells why in its diagnostics.
+        Raises ``SinkError``; the daemon goes on without the sink and says why in its diagnostics.
         """
 
     @abstractmethod

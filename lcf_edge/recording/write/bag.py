@@ -1,4 +1,4 @@
-"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which tells what is in the files together.
+"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which says what is in the files together.
 
 Of version 5, which Humble and all later read. Values are written as JSON, which is YAML as well.
 """
