@@ -1,4 +1,4 @@
-"""Which node is meant: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's own name."""
+"""Which node a name means: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's name."""
 
 import contextlib
 import errno

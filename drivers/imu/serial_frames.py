@@ -1,4 +1,4 @@
-"""What the parsers of serial protocols have in common: cutting a stream of bytes into frames, and what they find."""
+"""What the parsers of serial protocols share: cutting a stream of bytes into frames, and what they find."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator

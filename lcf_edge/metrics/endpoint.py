@@ -64,7 +64,7 @@ class _Server(HTTPServer):
     _connection: socket.socket | None = None  # that is served
 
     def finish_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection; who sends or takes slowly is cut off."""
+        """Serve a connection; a client that sends or reads slowly is cut off."""
         timer = threading.Timer(_WITHIN_S, _cut, (request,))
         timer.daemon = True
         self._connection = request

@@ -1,4 +1,4 @@
-"""What every sink is: it takes frame after frame, each with the scene that was found in it."""
+"""The interface of every sink: it takes frame after frame, each with its scene."""
 # ruff: noqa: B027  # what a sink does not override does nothing
 
 from abc import ABC, abstractmethod
@@ -12,7 +12,7 @@ from lcf_edge.messages import PipelineScene, View
 
 
 class Sink(ABC):
-    """A place that scenes go to: a file, the network, somebody's screen. The same in ``replay`` and in the daemon.
+    """An output for scenes: a file, the network, a screen. The same in ``replay`` and in the daemon.
 
     A sink needs a ``name`` (for messages to the user), ``put`` and ``close``. All other methods concern the daemon,
     and do nothing unless a sink overrides them. ``put`` and ``put_sample`` are called in the pipeline's thread, the

@@ -1,4 +1,4 @@
-"""The link to the outside: what goes over Zenoh, and the session that carries it.
+"""Everything that goes over Zenoh, and the session that carries it.
 
 ``session`` opens and closes it; ``admission`` says what a daemon takes in; ``publisher`` puts messages, ``scene``,
 ``preview`` and ``diagnostics`` those of one key each; ``ros2`` shows them to nodes under rmw_zenoh; ``speed_input`` and

@@ -1,4 +1,4 @@
-"""Who is connected, and how much of the daemon's memory is laid to whom.
+"""Who is connected, and how much of the daemon's memory each is charged with.
 
 Zenoh keeps what peers declare, has no limit for it, and does not say who declared what. So whenever the memory of the
 process has grown, those connections over TCP are charged with it that have brought something meanwhile, each by its

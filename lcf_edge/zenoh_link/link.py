@@ -37,7 +37,7 @@ _COUNTED = (
 
 
 class Link:
-    """Publishes, listens and answers on one session, which it closes in the end.
+    """Publishes, listens and answers on one session, which it closes at the end.
 
     No method waits for a peer or raises because of one; what went wrong is in ``counts``. Each ``put`` may have a
     thread of its own. ``reopen``: opens another session like the first, for ``renew``. ``lens_for``: gives the lens of

@@ -1,4 +1,4 @@
-"""Questions that are answered when asked: ``<prefix>/query/<name>``."""
+"""Queries and their answers: ``<prefix>/query/<name>``."""
 
 import threading
 from collections import Counter, deque

@@ -1,4 +1,4 @@
-"""From the bytes of a picture to luminance, with its size known before memory is taken for it."""
+"""From encoded bytes to luminance; the size is checked before memory is taken for it."""
 
 import os
 import re
@@ -47,7 +47,7 @@ _set_log_level(0)
 
 
 class ImageDecodeError(LcfError):
-    """A picture that cannot be used; the text says why in two or three words, for counting."""
+    """An image that cannot be used; the text says why in two or three words, for counting."""
 
 
 def read_image(path: Path) -> Grey:

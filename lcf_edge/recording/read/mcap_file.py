@@ -54,7 +54,7 @@ class McapMessage:
 
 
 class _DamageError(Exception):
-    """Bytes that are not what the format wants; the text says what and where."""
+    """Bytes that break the format; the text says what and where."""
 
 
 class _Record(NamedTuple):

@@ -26,7 +26,7 @@ Sample = ImuSample | SpeedSample
 
 @dataclass(frozen=True, slots=True)
 class UndecodedFrame:
-    """A picture that is decoded when its turn comes, so that none wait in memory."""
+    """A frame whose image is decoded when its turn comes, so that none wait in memory."""
 
     stamp_ns: int
     name: str  # for warnings

@@ -22,7 +22,7 @@ _QOS = "offered_qos_profiles"
 
 @dataclass(frozen=True, slots=True)
 class _Content:
-    """What a file says of itself. ``topics``: each channel with the type of its messages."""
+    """A file as the bag lists it. ``topics``: each channel with the type of its messages."""
 
     topics: list[tuple[Channel, str]]
     statistics: Statistics

@@ -1,4 +1,4 @@
-"""One MCAP file (mcap.dev/spec) that grows by whole chunks: whatever ends it, it is readable up to the last of them."""
+"""One MCAP file (mcap.dev/spec) that grows by whole chunks: however it ends, it is readable up to the last of them."""
 
 import os
 from contextlib import suppress
