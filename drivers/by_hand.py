@@ -21,7 +21,7 @@ def watch(
 ) -> int:
     """Open a device, report on what it delivers for ``seconds``, and close it.
 
-    ``describe``: the values of a record in a few words. Answers with the exit status: 1, with one line on stderr,
+    ``describe``: the values of a record in a few words. Return the exit status: 1, with one line on stderr,
     when the device fails; an interrupt ends it well.
     """
     try:

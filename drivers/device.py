@@ -1,4 +1,4 @@
-"""What every driver looks like from outside, and how one is kept open for as long as a vehicle runs."""
+"""The interface of every driver, and how a device is kept open for as long as a vehicle runs."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence

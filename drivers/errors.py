@@ -10,21 +10,21 @@ class DriverError(Exception):
 
 
 class DeviceMissingError(DriverError):
-    """Nothing is there under that name or at that address; it may still be plugged in."""
+    """Nothing there by that name or at that address; it may still be plugged in."""
 
 
 class DeviceBusyError(DriverError):
-    """Somebody else has it open."""
+    """Another program has it open."""
 
 
 class DeviceForbiddenError(DriverError):
-    """No permission; waiting does not bring it."""
+    """No permission; waiting does not help."""
 
     retry = False
 
 
 class MissingSoftwareError(DriverError):
-    """What runs the device is not installed on this computer."""
+    """Software that the device needs is not installed on this computer."""
 
     retry = False
 

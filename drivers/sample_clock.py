@@ -1,4 +1,4 @@
-"""When samples were made, told from when they arrived: the device's own steady rate with the jitter removed.
+"""When samples were made, inferred from when they arrived: the device's own steady rate with the jitter removed.
 
 A device makes sample n at ``start + n * period`` of its own clock; the sample arrives later, by a serial adapter's
 latency timer, a poll or the scheduler, and never earlier. So the arrivals lie on or above a straight line, and the line

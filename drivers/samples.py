@@ -1,4 +1,4 @@
-"""What a source delivers: pictures, inertial samples, speeds.
+"""What a source delivers: frames, inertial samples, speeds.
 
 SI units. An IMU's samples come in its own axes; ``imu.axes`` turns them into the camera's: x right, y down,
 z forward.
@@ -14,7 +14,7 @@ STANDARD_GRAVITY_MPS2 = 9.80665  # the g of data sheets
 
 @dataclass(frozen=True, slots=True)
 class Frame:
-    """One picture."""
+    """One frame: an image with its stamp and number."""
 
     stamp_ns: int  # start of exposure
     seq: int  # counts pictures of the source, gaps tell drops

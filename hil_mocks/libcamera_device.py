@@ -46,7 +46,7 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     focuses: bool = False
     newer: bool = False  # has the controls of libcamera 0.5
     chooses_modes: bool = True
-    log_path: str = ""  # a file in which the mode and the controls are told at every start
+    log_path: str = ""  # a file that gets the mode and the controls at every start
 
     installed: bool = True
     busy: bool = False
@@ -58,7 +58,7 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     crash: int = -1  # the picture at which libcamera crashes
     silent: int = -1  # the picture from which on nothing comes
     stamp_offset_s: float = 0.0
-    stamped: bool = True  # SensorTimestamp is told
+    stamped: bool = True  # SensorTimestamp is there
 
 
 def command(world: World) -> tuple[str, ...]:
@@ -120,7 +120,7 @@ class Formats:
         self._sizes = sizes
 
     def sizes(self, _pixel_format: str) -> list[Size]:
-        """Those that are told; none: a range."""
+        """Those that are listed; none: a range."""
         return [Size(*size) for size in self._sizes]
 
     def range(self, _pixel_format: str) -> str:

@@ -379,7 +379,7 @@ PACKED = {
 
 
 def _first_plane(buffer: v4l2.Buffer | v4l2.PlanesBuffer) -> v4l2.Buffer | v4l2.Plane:
-    """Where length and place of the first memory are told."""
+    """Where length and place of the first memory are written."""
     return v4l2.Plane.from_address(buffer.planes) if isinstance(buffer, v4l2.PlanesBuffer) else buffer
 
 

@@ -180,7 +180,7 @@ def decode_diagnostics(payload: bytes | memoryview) -> DiagnosticArray:
 def decode_velocity(payload: bytes | memoryview) -> tuple[str, Twist]:
     """``geometry_msgs/msg/TwistStamped`` or ``nav_msgs/msg/Odometry``: which, and its twist.
 
-    Told apart by their lengths, which must be exact. Raises ``CdrError``.
+    Distinguished by their lengths, which must be exact. Raises ``CdrError``.
     """
     reader = _Reader(payload)
     header = reader.header()

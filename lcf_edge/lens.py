@@ -75,7 +75,7 @@ class Lens:
     def from_config(cls, camera: Camera, width: int, height: int) -> "Lens":
         """The lens of ``camera`` for pictures of ``width`` × ``height`` px.
 
-        Without intrinsics the field of view tells the focal length, and the axis meets the middle. Raises
+        Without intrinsics the field of view gives the focal length, and the axis meets the middle. Raises
         ``ConfigError``.
         """
         model, coefficients = camera.distortion_model, tuple(camera.distortion)

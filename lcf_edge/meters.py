@@ -55,7 +55,7 @@ class IntervalMeter:
 
 
 class DurationHistogram:
-    """Durations from 10 µs to 10 s, told apart by 3 %; counts of the last one or two ``turn``s."""
+    """Durations from 10 µs to 10 s, in steps of 3 %; counts of the last one or two ``turn``s."""
 
     def __init__(self) -> None:
         self._counts = np.zeros((2, _BINS), np.int64)

@@ -50,7 +50,7 @@ class Look:
     corners: Corners
     cut: int  # corners that were left out because the budget was full
     notes: tuple[str, ...]
-    still: bool | None  # whether the picture has stood still for half a second; None: it does not tell
+    still: bool | None  # whether the picture has stood still for half a second; None: unknown
     detect_ns: int  # that the corners took
     took_ns: int  # that all of it took
     repeats: PipelineScene | None = None
@@ -194,7 +194,7 @@ class Pipeline:
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
     def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
-        """The motion, with the rotation that the picture tells where it is not known well."""
+        """The motion, with the rotation by the image where it is not known well."""
         if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego

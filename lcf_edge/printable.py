@@ -1,4 +1,4 @@
-"""Text of others, for a terminal."""
+"""Text from outside, made safe for a terminal."""
 
 
 def printable(text: str, most: int = 500) -> str:

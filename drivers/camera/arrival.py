@@ -1,4 +1,4 @@
-"""Pictures as they arrive, whoever takes them: their numbers, whether their stamps can be true, when none come."""
+"""Frames as they arrive, from any kind of camera: their numbers, whether their stamps can be true, when none come."""
 
 from collections import Counter
 

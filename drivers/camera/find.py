@@ -1,4 +1,4 @@
-"""Which node is meant: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's own name."""
+"""Which node a name means: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's name."""
 
 import contextlib
 import errno
@@ -13,7 +13,7 @@ def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
     """The capture node that is meant by ``device``: a path, or a name such as "HD Pro Webcam C920".
 
     A name may be a part of the camera's, in any case; whole names go first. Raises ``DriverError``, among them
-    ``DeviceMissingError`` that tells which cameras there are, and ``WrongDeviceError`` for a node that gives no
+    ``DeviceMissingError`` that names the cameras there are, and ``WrongDeviceError`` for a node that gives no
     pictures, or only through libcamera, and for a name that two cameras have.
     """
     return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)

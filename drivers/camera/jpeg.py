@@ -29,7 +29,7 @@ class JpegHeader:
 
 
 def jpeg_header(jpeg: bytes) -> JpegHeader | None:
-    """The header of ``jpeg``; None: it is none, is cut off, or could be read in two ways."""
+    """The header of ``jpeg``; None: it is not one, is cut off, or could be read in two ways."""
     if not jpeg.startswith(b"\xff\xd8"):
         return None
     frame: tuple[int, bytes] | None = None

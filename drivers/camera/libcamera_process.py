@@ -234,7 +234,7 @@ def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: 
 
 
 def _modes(libcamera: Any, camera: Any) -> Iterator[Any]:
-    """The sensor's modes, where the pipeline tells what they see and lets them be chosen."""
+    """The sensor's modes, where the pipeline reports what they see and lets them be chosen."""
     if _property(camera, "ScalerCropMaximum", None) is None or not hasattr(libcamera, "SensorConfiguration"):
         return
     raw = camera.generate_configuration([libcamera.StreamRole.Raw])
@@ -261,7 +261,7 @@ def _check_rate(camera: Any, fps: float) -> None:
 
 
 def _limits(camera: Any) -> tuple[int, int]:
-    """Shortest and longest time of a frame in µs; 0, 0: the camera does not tell."""
+    """Shortest and longest time of a frame in µs; 0, 0: unknown."""
     info = _known(camera).get("FrameDurationLimits")
     return (int(_first(info[1].min)), int(_first(info[1].max))) if info else (0, 0)
 

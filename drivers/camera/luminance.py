@@ -1,4 +1,4 @@
-"""From the bytes of a buffer to grey, without a way through colours where the format allows.
+"""From the bytes of a buffer to grey, not by way of colours where the format allows.
 
 GREY is grey already; NV12, YU12 and their like begin with a plane of it (Y); YUYV and UYVY carry it in every second
 byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw pictures of a sensor with
@@ -123,7 +123,7 @@ class FrameError(DriverError):
 
 
 def least_stride(pixel_format: str, width: int) -> int:
-    """Bytes from one row to the next where the device does not tell; 0 for MJPG."""
+    """Bytes from one row to the next where the device does not say; 0 for MJPG."""
     return _LAYOUTS[pixel_format].row(width) if pixel_format in _LAYOUTS else 0
 
 

@@ -207,7 +207,7 @@ def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, heigh
 
 
 def _set_rate(node: Node, fps: float) -> float:
-    """The rate that the camera will have; the one that was asked for where it cannot be told anything."""
+    """The rate that the camera will have; the one asked for where none can be set."""
     parameters = StreamParm(type=node.buffer_type, numerator=1000, denominator=round(1000 * fps))
     try:
         granted = node.ask(S_PARM, parameters)
@@ -244,7 +244,7 @@ def _list() -> int:
                 sys.stdout.write(f"  not read: {', '.join(others)}\n")
     if not listed:
         ribbon = "those at a ribbon cable: python -m drivers.camera.libcamera --list"
-        sys.stderr.write(f"no camera that can be opened; lcf-edge doctor tells why; {ribbon}\n")
+        sys.stderr.write(f"no camera can be opened; lcf-edge doctor says why; {ribbon}\n")
     return 0 if listed else 1
 
 

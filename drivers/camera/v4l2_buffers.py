@@ -32,7 +32,7 @@ from drivers.camera.v4l2_ioctl import (
 
 @dataclass(frozen=True, slots=True)
 class Granted:
-    """The format that the device will deliver; ``stride`` 0: it does not tell."""
+    """The format that the device will deliver; ``stride`` 0: unknown."""
 
     pixel_format: str
     width: int

@@ -39,7 +39,7 @@ _MEANINGS: dict[int, tuple[type[DriverError], str]] = {
 
 
 def driver_error(name: str, error: OSError) -> DriverError:
-    """The error that tells the user what to do about ``error`` of the camera ``name``."""
+    """The error, with its remedy, for ``error`` of the camera ``name``."""
     known = _MEANINGS.get(error.errno or 0)
     if known is None:
         return DeviceLostError(f"{name}: fails ({error.strerror}); check cable and power")

@@ -25,7 +25,7 @@ CAP_VIDEO_CAPTURE = 0x0000_0001
 CAP_VIDEO_CAPTURE_MPLANE = 0x0000_1000
 CAP_STREAMING = 0x0400_0000
 CAP_IO_MC = 0x2000_0000  # a part of a pipeline that somebody must set up through the media controller
-CAP_DEVICE_CAPS = 0x8000_0000  # the node's own capabilities are told apart from those of the whole device
+CAP_DEVICE_CAPS = 0x8000_0000  # the node's own capabilities are listed apart from those of the whole device
 CAP_TIMEPERFRAME = 0x1000  # of StreamParm: the rate can be set
 
 _SIGNAL_PROCESSORS = frozenset({"bcm2835-isp", "pispbe"})  # of a Raspberry Pi 4 and 5

@@ -61,7 +61,7 @@ ACCEL_RANGES = {2: Range(0, 16384), 4: Range(1, 8192), 8: Range(2, 4096), 16: Ra
 
 
 class FirmwareError(DriverError):
-    """The vendor's configuration file cannot be read, or is none."""
+    """The vendor's configuration file cannot be read, or is not one."""
 
     retry = False
 

@@ -1,4 +1,4 @@
-"""CEVA BNO080, BNO085 and BNO086 over I2C, with the rates of its gyro (UART-RVC tells angles only).
+"""CEVA BNO080, BNO085 and BNO086 over I2C, with the rates of its gyro (UART-RVC gives angles only).
 
 What is said is in ``shtp``; sources there, and Adafruit's CircuitPython driver for the reading: first the header of the
 next packet, then the packet whole, with its header again. The chip stretches the clock, which some masters do not wait
@@ -140,7 +140,7 @@ class Bno08x:
 
     def _say(self) -> None:
         for packet in self._hub.to_say(self._clock.monotonic_ns(), heard=self._heard):
-            with suppress(TransferError):  # it boots: it is told again
+            with suppress(TransferError):  # it is booting: this is sent again
                 self._bus.send(self.address, packet, tries=2)
         self._heard = False
 
@@ -154,7 +154,7 @@ class Bno08x:
         return readings
 
     def _packet(self) -> bytes | None:
-        """The next one; None: there is none, or what came is none. Raises ``TransferError``."""
+        """The next one; None: there is none, or it is malformed. Raises ``TransferError``."""
         header = self._bus.receive(self.address, HEADER.size)
         length = HEADER.unpack(header)[0] & ~CONTINUED
         if length == 0:

@@ -10,7 +10,7 @@ the steps cancel when the rates are integrated, which is what they are for: a tu
 
 The angles are ``Rz(-yaw) Rx(pitch) Ry(roll)``: yaw grows clockwise, pitch is about x, roll about y. The data sheet's
 text swaps the two axes, but its own example frame does not (pitch -1.10°, roll 20.85°, acceleration -0.371, -0.020,
-0.977 g); the way of yaw it does not tell, those who use the chip as a compass do.
+0.977 g); the way of yaw is not in it, those who use the chip as a compass do.
 """
 
 import math

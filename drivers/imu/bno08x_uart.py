@@ -3,7 +3,7 @@
 "BNO08X Data Sheet" (1000-3927), section 1.2.3; Adafruit's CircuitPython driver (uart.py) agrees. A packet of ``shtp``
 is put between two bytes 0x7E, after a byte 0x01; 0x7E and 0x7D in it become 0x7D and the byte with bit 5 inverted.
 Frames of the other kind, 0x00, tell how much the hub can take, and are passed over. There is no checksum: a packet is
-told by its length, a report by its range. The hub wants 100 µs between the bytes that it is sent.
+recognised by its length, a report by its range. The hub wants 100 µs between the bytes that it is sent.
 """
 
 import sys

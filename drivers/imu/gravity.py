@@ -1,4 +1,4 @@
-"""Whether an accelerometer measures gravity at rest: tells apart chips that say the same of themselves."""
+"""Whether an accelerometer measures gravity at rest: distinguishes chips with the same identity."""
 
 import math
 from collections.abc import Iterable, Sequence
@@ -19,7 +19,7 @@ class Gravity:
         self._known = False
 
     def measured_g(self, samples: Iterable[ImuSample]) -> float | None:
-        """What gravity is, once, when the vehicle has rested; None: not known yet, or told already. Units of g."""
+        """What gravity is, once, when the vehicle has rested; None: not known yet, or returned before. Units of g."""
         if self._known:
             return None
         for sample in samples:

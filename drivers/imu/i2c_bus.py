@@ -169,7 +169,7 @@ def _open(path: Path) -> Smbus:
         smbus.open(str(path))
     except FileNotFoundError as error:
         there = ", ".join(sorted(map(str, path.parent.glob("i2c-*"))))
-        remedy = f"there is {there}; set imu.bus" if there else "there is none at all; enable I2C and load i2c-dev"
+        remedy = f"there is {there}; set imu.bus" if there else "this computer has none; enable I2C and load i2c-dev"
         raise DeviceMissingError(f"{path}: no such bus; {remedy}") from error
     except PermissionError as error:
         raise DeviceForbiddenError(f"{path}: no permission; add the user to the group i2c") from error

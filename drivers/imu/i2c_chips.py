@@ -18,7 +18,7 @@ from drivers.samples import ImuSample
 
 
 class I2cChip(Protocol):
-    """An open chip, and what its class tells without one."""
+    """An open chip, and what its class says without one."""
 
     chip: ClassVar[str]
     addresses: ClassVar[tuple[int, ...]]  # the usual one first

@@ -125,7 +125,7 @@ class I2cImu(ABC):
 
     @classmethod
     def recognised(cls, bus: I2cBus, address: int) -> str | None:
-        """The model that is there, told by its identity alone; None: no such chip. Writes nothing."""
+        """The model that is there, by its identity alone; None: no such chip. Writes nothing."""
         return cls.identities.get(bus.read(address, cls.identity_register, 1, tries=2)[0])
 
     def read(self) -> Sequence[ImuSample]:

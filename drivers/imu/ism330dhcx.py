@@ -1,4 +1,4 @@
-"""ST ISM330DHCX and LSM6DSR (and LSM6DSRX), which say the same of themselves: an LSM6DSO of the same ranges.
+"""ST ISM330DHCX and LSM6DSR (and LSM6DSRX), which have the same identity: an LSM6DSO of the same ranges.
 
 ISM330DHCX data sheet DS13012 revision 7, LSM6DSR data sheet DS12569; Linux (st_lsm6dsx_core.c) has all of them in one
 table with the LSM6DSO, and PX4's registers of the LSM6DSR (ST_LSM6DSR_Registers.hpp) agree. What is I3C_disable in an

@@ -1,4 +1,4 @@
-"""ST LSM6DSO32 and LSM6DSO32X: an LSM6DSO of twice the acceleration, which says the same of itself.
+"""ST LSM6DSO32 and LSM6DSO32X: an LSM6DSO of twice the acceleration, with the same identity.
 
 LSM6DSO32 data sheet DS13159; the codes and weights of its ranges as in ST's and in Adafruit's driver.
 """

@@ -1,4 +1,4 @@
-"""What the parsers of serial protocols have in common: cutting a stream of bytes into frames, and what they find."""
+"""What the parsers of serial protocols share: cutting a stream of bytes into frames, and what they find."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -10,13 +10,13 @@ Vector = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Reading:
-    """One inertial sample as a protocol tells it, in the chip's axes."""
+    """One inertial sample of a protocol, in the chip's axes."""
 
     gyro: Vector  # rad/s
     accel: Vector  # m/s²
     saturated: bool = False
     lost: int = 0  # samples known to be missing before this one
-    ticks: int | None = None  # of the device's own clock, where the protocol tells
+    ticks: int | None = None  # of the device's own clock, where the protocol has it
     spans: int = 0  # periods that the values are the mean of, up to now; 0: they are of now
 
 
@@ -51,7 +51,7 @@ class Talker(Parser, Protocol):
 class Framer:
     """Cuts frames out of a stream, and finds the next one after damage by looking for ``header`` byte by byte.
 
-    ``length`` tells the length of a frame from its first bytes: 0 when more are needed, -1 when no frame begins so.
+    ``length`` gives the length of a frame from its first bytes: 0 when more are needed, -1 when no frame begins so.
     ``is_whole`` checks it. Counts ``skipped_bytes`` and ``bad_frame``; ``frames`` are the good ones.
     """
 

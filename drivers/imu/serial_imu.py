@@ -26,7 +26,7 @@ MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started a
 
 @dataclass(frozen=True, slots=True)
 class SerialProtocol:
-    """How a family of IMUs speaks. ``bauds``: those in use, the one taken unless told otherwise first."""
+    """How a family of IMUs speaks. ``bauds``: those in use, the default first."""
 
     name: str
     bauds: tuple[int, ...]
@@ -116,7 +116,7 @@ class SerialImu:
         )
 
     def _stamps_ns(self, now_ns: int, readings: Sequence[Reading]) -> list[int]:
-        if self._stamps is None:  # the first reading says whether the device tells its own time
+        if self._stamps is None:  # the first reading says whether the device sends its own time
             self._unit_hz = (self._protocol.tick_hz if readings[0].ticks is not None else None) or self._rate_hz
             self._stamps = SampleClock(self._unit_hz)
         steps = [self._step(reading) for reading in readings]

@@ -81,7 +81,7 @@ def _explained(error: Exception, path: str, baud: int) -> DriverError:
         return UnsupportedSettingError(f"{path}: cannot do {baud} baud; set another imu.baud")
     if code in (errno.ENOENT, errno.ENODEV, errno.ENXIO):
         there = ", ".join(ports())
-        found = f"there are {there}; set imu.port" if there else "there is none at all; plug the IMU in"
+        found = f"there are {there}; set imu.port" if there else "there is no other; plug the IMU in"
         return DeviceMissingError(f"{path}: no such serial port; {found}")
     if code in (errno.EACCES, errno.EPERM):
         return DeviceForbiddenError(f"{path}: no permission; add the user to the group dialout and log in again")

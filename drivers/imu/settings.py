@@ -1,4 +1,4 @@
-"""What is asked of an IMU; the driver takes the closest rate that its chip has."""
+"""What is requested of an IMU; the driver takes the closest rate that its chip has."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -8,7 +8,7 @@ FIRMWARE = Path("/lib/firmware/bmi270-init-data.fw")
 
 @dataclass(frozen=True, slots=True)
 class ImuSettings:
-    """Rate and ranges, and what single chips need besides."""
+    """Rate and ranges, and what only some chips need."""
 
     rate_hz: float = 200.0
     gyro_range_dps: int = 500

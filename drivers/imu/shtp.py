@@ -1,4 +1,4 @@
-"""What a BNO08x says and is told, whatever wire it goes over: SHTP packets with the SH-2 messages in them.
+"""What a BNO08x sends and receives, over any wire: SHTP packets with the SH-2 messages in them.
 
 CEVA "Sensor Hub Transport Protocol" (1000-3535), "SH-2 Reference Manual" (1000-3625) and "BNO08X Data Sheet"
 (1000-3927); Adafruit's CircuitPython driver agrees. A packet is its length with these four bytes (little-endian, the

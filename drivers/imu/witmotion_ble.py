@@ -3,7 +3,7 @@
 Frames of 20 bytes: 0x55 0x61, then little-endian int16 of acceleration (16 g full scale), angular velocity (2000 °/s)
 and angle. 0x55 0x71 begins the reply to a question, as long, which is passed over. Sources: WitMotion's own SDK
 (WitBluetooth_BWT901BLE5_0, device_model.py) and ctroncozo's witmotion_ble (protocol.py), which agree. There is no
-checksum: a frame is told by the frames before and after it, and a wrong bit among its values is not noticed.
+checksum: a frame is recognised by those before and after it, and a wrong bit among its values is not noticed.
 """
 
 import struct

@@ -12,7 +12,7 @@ from lcf_edge.rendered.drives import Floats
 from lcf_edge.rendered.projection import Stage, View
 from lcf_edge.rendered.truth import MIN_BOX_PX, MIN_VISIBLE, MOVING_MPS, Bounds, passages_of, visible_shares
 
-REMEMBERED_S = 1.5  # what is out of sight no longer than this is still told of
+REMEMBERED_S = 1.5  # what is out of sight no longer than this is still reported
 _SIGMA = 0.05  # of every number
 _SLOW_MPS = 0.1  # a slower vehicle has no path
 _ASIDE_SHARE = 0.35  # of its speed: what goes ahead and more to the side than this does not lead

@@ -1,4 +1,4 @@
-"""How the vehicle moves when it is told a speed: delay, lag, limits of acceleration, and steering along its course."""
+"""How the vehicle moves when it is given a speed: delay, lag, limits of acceleration, and steering along its course."""
 
 import math
 from collections import deque

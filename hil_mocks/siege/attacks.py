@@ -1,4 +1,4 @@
-"""Who comes: each attack is a thread that repeats one thing, holds a bounded number of sockets, and ends when told."""
+"""The attacks: each is a thread that repeats one thing, holds a bounded number of sockets, and ends when stopped."""
 
 import os
 import signal
@@ -107,7 +107,7 @@ def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
 
 
 def flood(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
-    """A local process that asks and tells as fast as it can."""
+    """A local process that queries and publishes as fast as it can."""
 
     def wave() -> None:
         with opened_session(Zenoh(mode="client", connect=[endpoint], listen=[])) as session:

@@ -95,7 +95,7 @@ class Daemon:
             return self._diagnostics.get(timeout=SILENT_S)
         except queue.Empty:
             raise SoakError(
-                f"the daemon tells nothing for {SILENT_S:g} s; its log ends with: {self.last_line()}"
+                f"the daemon publishes nothing for {SILENT_S:g} s; its log ends with: {self.last_line()}"
             ) from None
 
     def last_line(self) -> str:
@@ -237,7 +237,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def keep_logs(temporary: Path, folder: Path) -> None:
-    """Copy what the daemon told, and its memory over its pictures."""
+    """Copy the daemon's log, and its memory over its frames."""
     for kept in ("log.txt", "memory.csv"):
         for file in temporary.glob(f"*/{kept}"):
             (folder / file.parent.name).mkdir(parents=True, exist_ok=True)

@@ -35,7 +35,7 @@ class Balance:
 
     @property
     def lost(self) -> int:
-        """Pictures of which nothing tells; while pictures come, one or two are on their way."""
+        """Frames that left no trace; while pictures come, one or two are on their way."""
         return self.delivered - self.put - self.overtaken
 
 

@@ -250,7 +250,7 @@ def _fetch(system: System, wheels: Path) -> None:
 
 
 def _for_guest(system: System) -> list[str]:
-    """What tells pip to take what fits there."""
+    """Options that make pip take what fits there."""
     return options_for(system.processor, system.python, OF_DEBIAN_12)
 
 

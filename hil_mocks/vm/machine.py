@@ -45,7 +45,7 @@ BOARDS = {
 
 
 class MachineError(LcfError):
-    """The machine does not do what it is told."""
+    """The machine does not do as asked."""
 
 
 class Machine:

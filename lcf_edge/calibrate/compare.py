@@ -20,7 +20,7 @@ _BRISK_RADPS = 0.15
 
 @dataclass
 class Watched:
-    """``guessed``: nobody knows the lens, it is taken from the field of view."""
+    """``guessed``: the lens is unknown, and taken from the field of view."""
 
     turns: list[Turn] = field(default_factory=list)
     samples: list[ImuSample] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""What the person at the terminal is told meanwhile, on standard error."""
+"""Prompts and progress for the person at the terminal, on standard error."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""The picture that tells whether to believe a calibration; needs Matplotlib."""
+"""A figure to judge a calibration by; needs Matplotlib."""
 
 import importlib.util
 from collections.abc import Sequence

@@ -47,7 +47,7 @@ class SensorSource(Protocol):
 
 
 class RecordedSource:
-    """A recording. Raises ``RecordingError`` when it is none, or has no IMU and ``imu`` is wanted."""
+    """A recording. Raises ``RecordingError`` if it cannot be read, or has no IMU and ``imu`` asks for one."""
 
     live = False
 
@@ -60,7 +60,7 @@ class RecordedSource:
             raise RecordingError(f"{path}: no inertial samples in it; name a recording with an IMU")
 
     def items(self) -> Iterator[Item]:
-        """In the recording's order of delivery; what was skipped is told at the end."""
+        """In the recording's order of delivery; what was skipped is reported at the end."""
         for item in self._recording:
             if isinstance(item, Frame | ImuSample):
                 yield item

@@ -177,8 +177,8 @@ def _add_evaluate(commands: "argparse._SubParsersAction[_Parser]", settings: _Pa
         allow_abbrev=False,
         parents=[settings],
         help="replay many recordings and report what was found, false, late and slow",
-        description="Replays recordings, holds what is told against what is known of them, and writes one report: a "
-        "page with pictures, and JSON. A recording that cannot be read is reported and left out.",
+        description="Replays recordings, compares what the filter reports with what is known of them, and writes one "
+        "report: a page with pictures, and JSON. A recording that cannot be read is reported and left out.",
     )
     evaluate.add_argument(
         "recordings", type=Path, nargs="+", metavar="RECORDING", help="a recording, or a folder with recordings in it"
@@ -228,7 +228,7 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
     task.add_argument(
         "--from", dest="recording", type=Path, metavar="RECORDING", help="a recording in place of the devices"
     )
-    task.add_argument("--report", type=Path, metavar="FILE.png", help="a picture that tells whether to believe it")
+    task.add_argument("--report", type=Path, metavar="FILE.png", help="a figure to judge it by")
     task.add_argument("--write", action="store_true", help="put the result into the configuration file")
 
     def add(name: str, text: str) -> _Parser:

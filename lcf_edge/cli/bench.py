@@ -139,7 +139,7 @@ class Computer:
 
 
 def _board() -> str:
-    """Model of the board, or of its processor where no device tree tells."""
+    """Model of the board, or of its processor where there is no device tree."""
     for name, pattern in (
         ("/sys/firmware/devicetree/base/model", r"([^\0]+)"),
         ("/proc/cpuinfo", r"^model name\s*: (.+)$"),

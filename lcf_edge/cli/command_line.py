@@ -122,7 +122,7 @@ def _watch(arguments: argparse.Namespace) -> None:
 
     if arguments.json:
         if arguments.recording is not None:
-            raise UsageError("watch: --json is for a daemon; lcf-edge replay RECORDING -o - tells a line a picture")
+            raise UsageError("watch: --json is for a daemon; lcf-edge replay RECORDING -o - writes a line a frame")
         watch_lines(_daemon_address(arguments), _tell)
     else:
         watch_table(_shown(arguments), _tell)

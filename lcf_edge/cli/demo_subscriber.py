@@ -1,4 +1,4 @@
-"""The demo's second process: subscribes to scenes and tells what came.
+"""The demo's second process: subscribes to scenes and counts them.
 
 ``python -m lcf_edge.cli.demo_subscriber ENDPOINT KEY``; a line on standard input tells how many scenes
 were sent, then one JSON line with a ``Received`` goes to standard output.

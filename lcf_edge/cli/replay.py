@@ -93,7 +93,7 @@ def _sinks(recording: Recording, config: Config, outputs: Outputs) -> Iterator[S
 
 
 def _terminal_columns() -> int:
-    """Width of the terminal behind standard error; 80 where it does not tell, as on a serial line."""
+    """Width of the terminal behind standard error; 80 where it is unknown, as on a serial line."""
     try:
         return os.get_terminal_size(sys.stderr.fileno()).columns or 80
     except OSError:

@@ -82,7 +82,7 @@ class Camera(Table, frozen=True):
     intrinsics: list[
         Annotated[float, msgspec.Meta(ge=-1e6, le=1e6)]
     ] = []  # fx, fy, cx, cy in px; empty: the recording's, else by the field of view
-    horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else tells
+    horizontal_fov_rad: Annotated[float, msgspec.Meta(gt=0.1, lt=3.1)] = 1.05  # used where nothing else is known
     distortion_model: Literal["none", "radial-tangential", "equidistant"] = "none"
     distortion: list[Annotated[float, msgspec.Meta(ge=-100, le=100)]] = []  # k1, k2, p1, p2[, k3] or k1, k2, k3, k4
     height_m: Annotated[float, msgspec.Meta(ge=0, le=10_000)] = 0.3  # above the ground; 0: unknown, no ground test
@@ -216,7 +216,7 @@ class Zenoh(Table, frozen=True):
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
     listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
-    gossip: bool = False  # connect to the peers that one is told of, as rmw_zenoh does
+    gossip: bool = False  # connect to the peers that another names, as rmw_zenoh does
     config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above go on top
 
 
@@ -266,7 +266,7 @@ class Metrics(Table, frozen=True):
 
 
 class Log(Table, frozen=True):
-    """What the daemon tells on standard error."""
+    """What the daemon writes to standard error."""
 
     level: Literal["error", "warning", "info", "debug"] = "info"
 

@@ -2,7 +2,7 @@
 
 FAST takes the steps of a slanting line for corners. They keep station while the line passes by, and so look like
 something that drives ahead. The structure tensor around a corner, the sum of g gᵀ over the gradients g of its
-surroundings, tells them apart: of its two eigenvalues the smaller is next to nothing along an edge (Harris and
+surroundings, distinguishes them: of its two eigenvalues the smaller is next to nothing along an edge (Harris and
 Stephens 1988; Shi and Tomasi 1994).
 """
 

@@ -22,7 +22,7 @@ def appearance(image: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> np
     """Grey samples around whole pixels; their mean is moved to 128, so that a change of light is no change.
 
     ``image``: uint8 (height, width). ``pixel``: int32 (n, 2), x and y, ``BORDER_PX`` or more from the border;
-    whoever calls makes sure of that. Return uint8 (n, 16).
+    the caller makes sure of that. Return uint8 (n, 16).
     """
     samples = np.empty((len(pixel), len(RING_PX)), np.uint8)
     width = image.shape[1]

@@ -1,4 +1,4 @@
-"""Temperature and throttling of the board, where the kernel tells."""
+"""Temperature and throttling of the board, as far as the kernel reports them."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,14 +14,14 @@ _CPU_COOLING = ("cpufreq", "processor", "cpu")  # how cooling devices that slow 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """``temperature_c``: of the hottest zone, None where none tells. ``slowed``: what holds the processor back."""
+    """``temperature_c``: of the hottest zone, None: unknown. ``slowed``: what holds the processor back."""
 
     temperature_c: float | None
     slowed: tuple[str, ...]
 
 
 def read_board(sys: Path = Path("/sys")) -> Board:
-    """What ``sys`` tells now; what cannot be read is left out."""
+    """Read ``sys``; what cannot be read is left out."""
     zones = (_number(zone / "temp") for zone in _found(sys, "class/thermal/thermal_zone*"))
     temperatures_c = [millidegrees / 1000 for millidegrees in zones if millidegrees is not None]
     slowed = [

@@ -16,7 +16,7 @@ _MAPPING = re.compile(
 def use_one_heap() -> bool:
     """For this process, before it has threads: glibc would give each its own, which keeps what it has once been given.
 
-    Return whether the C library can be told.
+    Return whether the C library has such a setting.
     """
     mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # not every C library has it
     return mallopt is not None and mallopt(_M_ARENA_MAX, 1) == 1

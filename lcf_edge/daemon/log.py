@@ -87,7 +87,7 @@ class _Line(logging.Formatter):
 
 
 class NoFlood(logging.Filter):
-    """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that tells how many were not written.
+    """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that says how many were not written.
 
     Lines are of one kind when they have one message before its arguments are put in.
     """

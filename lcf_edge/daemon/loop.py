@@ -87,7 +87,7 @@ class Loop(threading.Thread):
         self.latency, self.detect, self.filter = DurationHistogram(), DurationHistogram(), DurationHistogram()
         self.degradation = Degradation(config)
         self._config = config
-        self._pipeline: Pipeline | None = None  # the first picture tells its size
+        self._pipeline: Pipeline | None = None  # its size is that of the first frame
         self._shape: tuple[int, int] | None = None
         self._next: tuple[Config, Pipeline] | None = None
         self._refused_before: Counter[str] = Counter()  # by earlier pipelines

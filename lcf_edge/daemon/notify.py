@@ -1,4 +1,4 @@
-"""What systemd is told: datagrams to the socket in ``NOTIFY_SOCKET`` (sd_notify(3)); without one, nothing."""
+"""Messages to systemd: datagrams to the socket in ``NOTIFY_SOCKET`` (sd_notify(3)); without one, nothing."""
 
 import contextlib
 import os

@@ -48,7 +48,7 @@ class InternalError(LcfError):
 class Service:
     """One run of the daemon. ``path`` and ``settings`` are read again at a reload.
 
-    ``config`` is one that ``check_budget`` let pass; ``notifier`` is told how it goes. ``destination``: of what
+    ``config`` is one that ``check_budget`` let pass; ``notifier`` tells systemd how it goes. ``destination``: of what
     ``config.record`` wants recorded; None: its folder. ``seconds``: end so long after the start is over; None: never.
     ``sinks``: where its scenes go.
     """
@@ -197,7 +197,7 @@ class Service:
             LOGGER.warning("link: connections use up all file descriptors but the reserved; docs/network.md: Strangers")
 
     def _check_ready(self) -> None:
-        """Frames flow, or it has been told why not."""
+        """Frames flow, or the reason why not has been reported."""
         if not self._ready and (self._loop.frames or self._readers[0].error):
             self._ready = True
             leave_start()

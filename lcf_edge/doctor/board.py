@@ -21,7 +21,7 @@ def check(context: Context) -> Iterator[Finding]:
 def _heat(context: Context) -> Iterator[Finding]:
     board = read_board(context.sys)
     model = _text(context, "firmware/devicetree/base/model") or _text(context, "class/dmi/id/product_name")
-    heat = "tells no temperature" if board.temperature_c is None else f"{board.temperature_c:.0f} °C"
+    heat = "no temperature reported" if board.temperature_c is None else f"{board.temperature_c:.0f} °C"
     name = model or "this board"
     if "under-voltage" in board.slowed:
         yield warn("board", f"{name}: under-voltage", "vcgencmd get_throttled  # 0x0 with a supply of 5 V and 3 A")

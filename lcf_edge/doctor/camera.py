@@ -155,7 +155,7 @@ def _nearest(context: Context, path: Path) -> tuple[str, ...]:
 
 
 def judged(context: Context, measured: Measured[Frame], exposure_s: float | None = None) -> Iterator[Finding]:
-    """What is said of pictures; ``exposure_s``: as the camera tells, None where it does not."""
+    """What is said of pictures; ``exposure_s``: as the camera reports it, None: unknown."""
     if not measured.records:
         yield fail("camera", f"{measured.name}: opens, but gives no picture that can be used ({_counts(measured)})")
         return
@@ -202,7 +202,7 @@ def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Confi
 
 
 def _exposure_s(context: Context, path: Path) -> float | None:
-    """As the camera tells; some tell an old one while they expose by themselves."""
+    """As the camera reports it; some report an old one while they expose by themselves."""
     try:
         with contextlib.closing(Node(str(path), str(path), context.kernel)) as node:
             return float(node.ask(G_CTRL, Control(id=CID_EXPOSURE_ABSOLUTE)).value * EXPOSURE_UNIT_S)

@@ -51,7 +51,7 @@ def reachable_here(endpoint: str) -> str:
 
 
 def is_open(endpoint: str) -> bool:
-    """Whether somebody accepts there; what is on top of UDP cannot be told so, and is taken for open."""
+    """Whether somebody accepts there; what is on top of UDP cannot be tried so, and is taken for open."""
     parts = parsed(endpoint)
     if parts is None or parts.datagrams:
         return True

@@ -44,7 +44,7 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def daemon_having(context: Context, name: str, path: Path) -> Process | None:
-    """The daemon that has a device open, or may have it, as far as it tells and this user may know."""
+    """The daemon that has a device open, or may have it, as far as it reports that and this user may know."""
     process = daemon_with(path.resolve(), context.proc)
     if process is not None and process.files is None and context.daemon and name not in context.daemon.statuses:
         return None  # it uses none of that kind
@@ -56,7 +56,7 @@ def of_device(context: Context, name: str, daemon: Process) -> Finding:
     status = context.daemon.statuses.get(name) if context.daemon else None
     if status is not None:
         return _of_status(name, "the daemon has it", status)
-    text = f"not opened, since {daemon} may have it, which tells nothing of it"
+    text = f"not opened, since {daemon} may have it and does not say"
     return warn(name, text, "sudo systemctl stop lcf-edge  # then look again")
 
 

@@ -1,4 +1,4 @@
-"""The IMU: there, allowed, the one that is configured, and telling what an IMU at rest tells."""
+"""The IMU: there, allowed, the one that is configured, and measuring what an IMU at rest should."""
 
 import os
 from collections.abc import Iterator
@@ -125,7 +125,7 @@ def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
 
 
 def _none(context: Context) -> Finding:
-    text = "imu.driver is none: its own turns cannot be told from the motion of others, and flow lines are widened"
+    text = "imu.driver is none: the vehicle's turns look like motion of others, and flow lines are widened"
     shared = daemon_having(context, "imu", context.dev / f"i2c-{context.config.imu.bus}") is not None
     found = [] if shared else _chips(context)  # a look could take a byte out of the FIFO that the daemon reads
     if found:
@@ -152,7 +152,7 @@ def _daemon(context: Context) -> Process | None:
     if has_interface(imu.driver, "iio"):  # its files are open only for moments
         return next((process for process in processes(context.proc) if process.is_daemon), None)
     if not os.access(_node(context), os.R_OK | os.W_OK):
-        return None  # opening it tells why
+        return None  # opening it says why
     return daemon_having(context, "imu", _node(context))
 
 

@@ -25,7 +25,7 @@ def check(context: Context) -> Iterator[Finding]:
         try:
             same = collisions(context.config, load(path))
         except ConfigError:
-            continue  # doctor -c tells of that one
+            continue  # doctor -c reports that one
         if same:
             yield fail("instances", f"{unit} and {other} both have {', '.join(same)}", edit(context.path))
         else:

@@ -71,7 +71,7 @@ def keys(options: Zenoh) -> Iterator[Finding]:
     for path, forbidden in [(Path(name), 0o077) for name in named if name] + [(Path(options.config_file), 0o022)]:
         try:
             mode = path.stat().st_mode
-        except OSError:  # what is missing is told where it is opened
+        except OSError:  # what is missing is reported where it is opened
             continue
         if stat.S_ISREG(mode) and mode & forbidden:
             what = "read" if forbidden == 0o077 else "write"

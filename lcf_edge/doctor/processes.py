@@ -16,7 +16,7 @@ _DAEMON = [(name, command) for name in ("lcf-edge", "lcf_edge") for command in (
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """``files``: what it has open; None: it is another user's, and only root is told."""
+    """``files``: what it has open; None: it is another user's, and only root may know."""
 
     pid: int
     name: str

@@ -64,7 +64,7 @@ def properties_of(context: Context, unit: str) -> Mapping[str, str]:
 
 
 def judged(properties: Mapping[str, str], budget_mib: float, unit: str = UNIT) -> Iterator[Finding]:
-    """What is said of the unit's properties, as ``systemctl show`` tells them."""
+    """What is said of the unit's properties, as ``systemctl show`` lists them."""
     if properties.get("LoadState") == "not-found":
         yield ok("service", "not installed: nothing starts lcf-edge at boot (sudo make install, in the source)")
         return

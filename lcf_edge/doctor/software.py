@@ -40,7 +40,7 @@ def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
         numbers = tuple(map(int, re.findall(r"\d+", installed[name])[:2]))
         if numbers and not least <= numbers < below:
             supported = f">={least[0]}.{least[1]},<{below[0]}"
-            text = f"{name} {installed[name]} was never tried, wanted is {supported}"
+            text = f"{name} {installed[name]} was never tried; supported is {supported}"
             yield (fail if numbers < least else warn)("software", text, f"pip install '{name}{supported}'")
     versions = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
     yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {versions}")

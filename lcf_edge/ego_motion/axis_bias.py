@@ -47,7 +47,7 @@ class AxisBias:
         self.bias_flow = self.bias_noise = 0.0
 
     def set_noise(self, sigma: float) -> None:
-        """1 sigma of w, of which nothing else tells."""
+        """1 sigma of w, which nothing else measures."""
         self.noise_noise = sigma * sigma
         self.bias_noise = self.flow_noise = 0.0
 

@@ -37,9 +37,9 @@ _FRESH_S = 0.5  # older odometry is stale
 
 # Standing still, for this long.
 _REST_NS = 500_000_000
-_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when nothing but a quiet IMU tells it
+_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when nothing but a quiet IMU shows it
 _REST_GYRO_RADPS = 0.1  # then, the largest bias that is believed
-_SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # when odometry or the picture tells it: motors shake it
+_SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # when odometry or the image shows it: motors shake it
 _REST_GRAVITY_ERROR_MPS2 = 0.8
 _REST_SPEED_MPS = 0.02
 _REST_YAW_RADPS = 0.02
@@ -150,7 +150,7 @@ class EgoMotionEstimator:
     def advance(self, stamp_ns: int, still: bool | None = None) -> EgoMotion:
         """The motion over (previous stamp, ``stamp_ns``], from the samples taken so far.
 
-        ``still``: whether the picture has stood still for half a second, None: it does not tell. The first frame has
+        ``still``: whether the picture has stood still for half a second, None: unknown. The first frame has
         no interval; neither has one whose stamp goes back, which is counted.
 
         ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
@@ -230,7 +230,7 @@ class EgoMotionEstimator:
         self._guessed.hold(interval.span.dt_s, interval.mean_radps)
 
     def needs_image_rotation(self, sigma_rad: float) -> bool:
-        """Whether a picture that tells the rotation to ``sigma_rad`` would help in the present interval."""
+        """Whether an image that gives the rotation to ``sigma_rad`` would help in the present interval."""
         interval = self._interval
         if not interval.measured or interval.span.dt_s == 0:
             return True
@@ -288,7 +288,7 @@ class EgoMotionEstimator:
     def see_ground(self, ground: GroundSpeed) -> None:
         """Take the speed that the ground shows in the present interval, where nothing measures it.
 
-        Windows overlap: each tells only what is new in it.
+        Windows overlap: each counts only with what is new in it.
         """
         interval = self._interval
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:

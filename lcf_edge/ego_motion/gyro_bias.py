@@ -6,7 +6,7 @@ A Kalman filter, each axis by itself, with the states, all rad/s,
 - s: by how much the flow is mistaken about the rate, slowly changing (O and lens are not known exactly);
 - w: what else the gyro is mistaken over the present interval, forgotten with it.
 
-The gyro's mean rate over an interval is ω + b + w. Whatever else tells the rate ω of that interval is an observation
+The gyro's mean rate over an interval is ω + b + w. Whatever else gives the rate ω of that interval is an observation
 of the difference: b + w when corners of the whole picture tell it, b + w + s when the flow does, and b alone, over a
 longer time, at rest. No clock, no I/O.
 """

@@ -39,7 +39,7 @@ class Turn:
 
 
 class ImageRotation:
-    """For pictures of one size and ``lens``. ``sigma_rad``: how well it tells pitch and yaw at best."""
+    """For pictures of one size and ``lens``. ``sigma_rad``: of pitch and yaw at best."""
 
     def __init__(self, lens: Lens) -> None:
         self._before: npt.NDArray[np.float32] | None = None

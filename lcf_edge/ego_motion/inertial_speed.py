@@ -73,7 +73,7 @@ class InertialSpeed:
         self.sigma_mps = min(self.sigma_mps, _SIGMA_ODOMETRY_MPS)
 
     def see_ground(self, error_mps: float, sigma_mps: float) -> None:
-        """The ground tells by how much the speed is too low, with 1 sigma."""
+        """Take by how much the speed is too low, as the ground shows it, with 1 sigma."""
         if self._up is None or not self.sigma_mps < inf:
             return
         variance = self.sigma_mps**2

@@ -17,7 +17,7 @@ MAX_SETTINGS = 2**16  # characters
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A recording. ``name``: as short as tells it from the others."""
+    """A recording. ``name``: as short as is unique."""
 
     name: str
     path: Path
@@ -33,7 +33,7 @@ class Entry:
 
     @property
     def truth(self) -> Path | None:
-        """The file that tells what is in the pictures."""
+        """The file that says what is in the pictures."""
         path = self._beside("truth.jsonl")
         return path if path.is_file() else None
 
@@ -44,7 +44,7 @@ class Entry:
 
 
 def find(places: Sequence[Path]) -> list[Entry]:
-    """The recordings that are named; a folder that is none stands for all below it. Raises ``UsageError``."""
+    """The recordings that are named; a folder that is not one stands for all below it. Raises ``UsageError``."""
     paths: list[Path] = []
     for place in places:
         found = [place] if not place.is_dir() else list(_below(place))

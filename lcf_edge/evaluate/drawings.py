@@ -1,4 +1,4 @@
-"""Pictures of a report: what is known of a frame, and what was told."""
+"""Pictures of a report: what is known of a frame, and what was reported."""
 
 from collections.abc import Sequence
 

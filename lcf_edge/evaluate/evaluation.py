@@ -49,7 +49,7 @@ class Written:
 
 def evaluate(question: Question, folder: Path, work: Work) -> Written:
     """Evaluate recordings and write the report into a folder. Raises ``UsageError``, ``ConfigError``, ``SinkError``."""
-    load(question.config, question.settings)  # what is wrong for all of them is told before work begins
+    load(question.config, question.settings)  # what is wrong for all of them is reported before work begins
     entries = find(question.places)
     before, before_folder = report.read(question.against) if question.against else (None, Path())
     if question.truth is not None and not question.truth.is_dir() and len(entries) > 1:

@@ -63,7 +63,7 @@ class Done:
 
 
 def evaluate(task: Task, frames_before: bytes | None = None) -> Done:
-    """Replay a recording and score it. What cannot be read is told in the row's ``error``."""
+    """Replay a recording and score it. What cannot be read is named in the row's ``error``."""
     limit_opencv()
     cv2.setNumThreads(1)
     row = RecordingRow(task.name, str(task.path), settings=list(task.settings))

@@ -77,7 +77,7 @@ def _head(result: Report, before: Report | None) -> str:
 
 
 def _totals(result: Report, known: dict[str, RecordingRow]) -> str:
-    """The sums, apart for recordings with truth, and for those in which all that was told counts as false."""
+    """The sums, apart for recordings with truth, and for those in which all that was reported counts as false."""
     parts = []
     for has_truth, title in ((True, "With truth"), (False, "Without truth: as if nothing moved and nothing were met")):
         rows = [row for row in result.read if row.has_truth == has_truth]
@@ -125,7 +125,7 @@ def _table(result: Report, known: dict[str, RecordingRow]) -> str:
 
 def _row(row: RecordingRow, number: int, before: RecordingRow | None, *, differing: bool) -> str:
     then = before.numbers if before else None
-    star = "" if row.has_truth else '<abbr title="no truth: all that was told counts as on nothing">*</abbr>'
+    star = "" if row.has_truth else '<abbr title="no truth: every rebel counts as on nothing">*</abbr>'
     cells = "".join(
         f"<td{_mark(measure, row.numbers, then)}>{measure.text(row.numbers)}"
         + (f'<span class="was">{measure.text(then)}</span>' if then else "")
@@ -164,7 +164,7 @@ def _section(row: RecordingRow, number: int) -> str:
 
 
 def _strip(row: RecordingRow) -> str:
-    """When what was told, as a picture: a line of each kind, from the first frame to the last."""
+    """What was reported when, as a drawing: a line of each kind, from the first frame to the last."""
     kinds = [kind for kind in KINDS if any(event.what == kind for event in row.events)]
     if not kinds:
         return ""

@@ -27,7 +27,7 @@ class Rebel(msgspec.Struct, frozen=True, array_like=True):
 
 
 class FrameLine(msgspec.Struct, frozen=True):
-    """One frame: what was told, and the verdict on it where it was scored."""
+    """One frame: what was reported, and the verdict on it where it was scored."""
 
     stamp_ns: int
     seq: int
@@ -144,7 +144,7 @@ def line_of(frame: Frame, reported: Circles) -> FrameLine:
 
 
 def numbers(score: Score) -> Numbers:
-    """What a score tells."""
+    """The numbers of a score."""
     times = sorted(score.step_ms)
     return Numbers(
         pictures=len(times),

@@ -1,4 +1,4 @@
-"""What was told of a recording, held against what is known of it."""
+"""What was reported of a recording, compared with what is known of it."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ def rebels(circles: Circles) -> Circles:
 
 
 def is_close(circle: np.void) -> bool:
-    """Whether a contact below a second is told, with a miss that is small or unknown."""
+    """Whether a contact below a second is reported, with a miss that is small or unknown."""
     return bool(0 < circle["ttc"] < CLOSE_S and not abs(circle["lateral"]) > BESIDE_M)
 
 
@@ -32,7 +32,7 @@ def is_close(circle: np.void) -> bool:
 class Verdict:
     """On one picture. ``found``, ``missed``: names of the threats that were due. ``false``: rebels on nothing.
 
-    ``contact``: a contact below a second was told where there is no threat.
+    ``contact``: a contact below a second was reported where there is no threat.
     """
 
     found: tuple[str, ...]

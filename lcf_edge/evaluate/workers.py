@@ -28,7 +28,7 @@ Say = Callable[[str], None]
 def by_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Outcome]:
     """Have it done by processes on this computer; yield in the order in which they end.
 
-    A recording that ends its process, by a fault in a decoder say, is told as failed, and no other one with it.
+    A recording that ends its process, by a fault in a decoder say, is reported as failed, and no other one with it.
     """
     waiting = deque(tasks)
     while waiting:

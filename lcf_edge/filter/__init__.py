@@ -14,9 +14,11 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``path``             its path over the ground: how far beside it something lies, and how long the way to it is
 ``image_plane``      where a position of the ideal pinhole is seen through the lens
 ``least_squares``    of a few unknowns
+``rounding``         to whole numbers, as C does
 ``derotation``       step 0: the camera's rotation is taken out of all that is stored
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one
+``leaps``            where whole parts of the image lost their corners: a leap that they share
 ``edge_equations``   the Circle expert's equations for edges: prediction, the five classes λ*, updates, trust
 ``edge_expert``      applies them to the table
 ``baselines``        what the displacement since each key frame implies for this picture
@@ -29,6 +31,8 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``normal_circles``   C_n from E_n
 ``rebel_circles``    C_r from E_r, with cause and time to contact
 ``group_motion``     how edges that go together move: mean velocity and rate of expansion
+``patches``          pieces of the image near the path, followed for seconds
+``patch_circles``    C_r from patches that grow
 ``range_belief``     what an object's motion says about its range and its motion over ground
 ``square_expert``    S: circles that belong to one thing are an object
 ``feedback``         trusted normal circles become ψ, and ψ gives way

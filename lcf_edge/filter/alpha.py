@@ -27,7 +27,7 @@ def is_still(edges: EdgeColumns, over_s: float, motion_px: float) -> bool:
 
 
 def key_is_due(edges: EdgeColumns, keys: KeyFrames, dt_s: float, settings: Settings) -> bool:
-    """Whether there is motion enough to be told from corner noise since the last key frame, or time is up."""
+    """Whether there is motion enough to stand out from corner noise since the last key frame, or time is up."""
     waited_s = keys.since_s + 0.5 * dt_s
     if keys.number == 0:
         return True

@@ -18,7 +18,7 @@ class Baselines:
 
     ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
     ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: what is uncertain of the rotation since, of this key
-    frame by itself: what the gyro leaves, or, once the flow told it, what that leaves. ``is_fitted``,
+    frame by itself: what the gyro leaves, or, once the flow measured it, what that leaves. ``is_fitted``,
     ``rate_covariance`` (3, 3), (rad/s)²: of the error of the rotation's rate that stays of a fit, which all share.
     """
 

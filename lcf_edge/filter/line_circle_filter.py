@@ -175,7 +175,7 @@ class LineCircleFilter:
 
     @property
     def stands(self) -> bool:
-        """Whether the picture says that the vehicle stands, although a speed is told."""
+        """Whether the image says that the vehicle stands, although a speed is measured."""
         return bool(self._rest.stands)
 
     def step(self, corners: Corners, motion: Motion, image: Grey | None = None) -> Step:
@@ -209,7 +209,7 @@ class LineCircleFilter:
         )
 
     def _rested(self, motion: Motion) -> Motion:
-        """The motion as the picture knows it: where it says that the vehicle stands, no told speed is believed."""
+        """The motion, at speed 0 where the image says that the vehicle stands, whatever speed was measured."""
         self._rest.measured_mps = motion.speed_mps
         if not self._rest.stands:
             return motion

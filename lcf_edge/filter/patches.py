@@ -110,7 +110,7 @@ def derotate(patches: Patches, h: Homography) -> None:
 
 
 def predict(patches: Patches, around: Situation) -> None:
-    """Each patch grows from O as what stands still does; without a speed nothing can be told, and they end."""
+    """Each patch grows from O as what stands still does; without a speed nothing follows from that, and they end."""
     for p in range(patches.capacity):
         if not math.isfinite(around.speed_mps):
             patches.active[p] = 0

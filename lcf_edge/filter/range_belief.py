@@ -5,7 +5,7 @@ motion to the side when the looming is taken out; and the inverse range 1/Z of t
 is the vehicle's speed and (w_x, w_z) the object's velocity over ground, to the right and forward. One camera cannot
 tell a slow thing that is near from a fast one that is far; so the belief is kept over a grid of ranges, for two cases:
 it *stands* (w = 0: m = V/Z and q = 0), or it *moves* (w is normal with ``σ_w``). Each pair of case and range is
-weighed by how well it explains what was measured; all that is told of an object is a mean over the pairs, with its
+weighed by how well it explains what was measured; all that is reported of an object is a mean over the pairs, with its
 standard deviation. Somebody who walks away to the side does not loom: nothing that stands near explains him.
 """
 

@@ -29,7 +29,7 @@ MIN_SHOWN_PX = 12.0  # which is taken for no smaller than this
 LEADER_HEIGHT_SHARE = 0.3  # of the camera's height that a leader has at least; paint and reflections have less
 MIRROR_NOISE_PX = 0.6  # 1 sigma of how far an edge went
 MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group better than something upright
-SURE_REBELS = 5.0  # fewer tell less, and must be seen once more before their circle is told
+SURE_REBELS = 5.0  # fewer say less, and must be seen once more before their circle is reported
 MOVER_SHARE = 0.25  # of the edges in a circle that moves must be rebels: where things repeat, edges swap places
 LIKELY_OWN_S = 0.9  # what has not moved in the picture for so long may be of an own part;
 OWN_SHARE = 0.1  # so many of these, as a share of the rebels that they lie among, make them own parts too
@@ -385,7 +385,7 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
 
     What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height. Where the
-    ground itself does not flow, the vehicle is slower than is told, or its own parts are in view, and nothing leads
+    ground itself does not flow, the vehicle is slower than measured, or its own parts are in view, and nothing leads
     down there.
     """
     if groups.inwards[g] <= 0.5:

@@ -10,11 +10,11 @@ from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.situation import Situation
 
-MIN_BASELINE_S = 0.2  # motion over less than this is not told from noise
+MIN_BASELINE_S = 0.2  # motion over less than this is lost in noise
 MIN_STILL_S = 0.25  # a picture that comes twice is no rest
 MIN_EDGES = 25
 MIN_GROUND_EDGES = 8
-MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is told
+MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is measured
 STILL_PX = 0.5  # less than half of the edges go farther than this,
 STILL_GROUND_PX = 1.0  # and more than half of those on the ground no farther than this,
 STILL_SHARE = 0.3  # nor than this share of what they must

@@ -85,7 +85,7 @@ class Gate:
             self.tell_now()
 
     def tell_now(self) -> None:
-        """What has happened since it was last told."""
+        """What has happened since the last report."""
         news = self.counts - self._reported
         self._reported = self.counts.copy()
         if news:

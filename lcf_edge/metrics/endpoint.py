@@ -36,7 +36,7 @@ class Endpoint:
                     self.wfile.write(endpoint.text)
 
             def log_message(self, *_: object) -> None:
-                """Nothing: whoever asks may ask often."""
+                """Nothing: clients may ask often."""
 
         try:
             self._server = _Server((HOST, port), Handler)
@@ -64,7 +64,7 @@ class _Server(HTTPServer):
     _connection: socket.socket | None = None  # that is served
 
     def finish_request(self, request: Any, client_address: Any) -> None:
-        """Serve a connection; who sends or takes slowly is cut off."""
+        """Serve a connection; a client that sends or reads slowly is cut off."""
         timer = threading.Timer(_WITHIN_S, _cut, (request,))
         timer.daemon = True
         self._connection = request

@@ -8,7 +8,7 @@ SLOWEST, FASTEST = 0.01, 100.0  # times as fast as it was made
 
 @dataclass(frozen=True, slots=True)
 class Pace:
-    """As the options of a replay say it."""
+    """The options of a replay."""
 
     start_s: float = 0.0  # after the first picture
     duration_s: float = math.inf

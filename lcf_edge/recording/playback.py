@@ -32,7 +32,7 @@ _MAX_WAITING = {Frame: 4, ImuSample: 4096, SpeedSample: 4096}  # that wait for t
 
 @dataclass
 class Faults:
-    """What a device is made to suffer; may be changed at any time, also between two openings."""
+    """Faults to simulate; may be changed at any time, also between two openings."""
 
     drop: float = 0.0  # share of the records that get lost
     jitter_s: float = 0.0  # a record comes up to this much after its time; its stamp stays true

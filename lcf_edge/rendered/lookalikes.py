@@ -1,4 +1,4 @@
-"""Kinds of drive in which something looks like what it is not, or is hard to see at all."""
+"""Kinds of drive in which something looks like something else, or is hard to see."""
 
 import math
 from collections.abc import Callable

@@ -49,7 +49,7 @@ class ObjectTruth:
 
 @dataclass(frozen=True, slots=True)
 class Truth:
-    """One picture."""
+    """One frame: an image with its stamp and number."""
 
     stamp_ns: int
     seq: int

@@ -116,7 +116,7 @@ def _found(panel: Image, scene: PipelineScene, view: View) -> None:
         (
             (f"{count} object{'s' * (count > 1)}" if count else "", LIGHT_BLUE),
             (f"{met} to be met" if met else "", ORANGE),
-            (f"{len(is_rebel) - is_rebel.sum()} normal circles", GREEN),  # as many as are drawn, and told to others
+            (f"{len(is_rebel) - is_rebel.sum()} normal circles", GREEN),  # as many as are drawn and published
             (f"{is_rebel.sum()} rebel circles, {sizes.edges_rebel} edges", LIGHT_RED),
             (f"{sizes.chains} chains", WHITE),
             (", ".join(scene.notes), YELLOW),

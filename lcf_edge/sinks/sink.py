@@ -1,4 +1,4 @@
-"""What every sink is: it takes frame after frame, each with the scene that was found in it."""
+"""The interface of every sink: it takes frame after frame, each with its scene."""
 # ruff: noqa: B027  # what a sink does not override does nothing
 
 from abc import ABC, abstractmethod
@@ -12,7 +12,7 @@ from lcf_edge.messages import PipelineScene, View
 
 
 class Sink(ABC):
-    """A place that scenes go to: a file, the network, somebody's screen. The same in ``replay`` and in the daemon.
+    """An output for scenes: a file, the network, a screen. The same in ``replay`` and in the daemon.
 
     A sink needs a ``name`` (for messages to the user), ``put`` and ``close``. All other methods concern the daemon,
     and do nothing unless a sink overrides them. ``put`` and ``put_sample`` are called in the pipeline's thread, the
@@ -29,7 +29,7 @@ class Sink(ABC):
 
         ``view`` makes what an overlay shows of the frame; it takes about a millisecond, and may be called only before
         ``put`` returns. In the daemon, ``scene`` is stamped by the system clock and ``frame`` by the monotonic one.
-        Raises ``SinkError``; the daemon goes on without the sink and tells why in its diagnostics.
+        Raises ``SinkError``; the daemon goes on without the sink and says why in its diagnostics.
         """
 
     @abstractmethod

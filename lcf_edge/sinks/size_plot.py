@@ -30,7 +30,7 @@ _COLOURS = ("#b8860b", "#1f77b4", "#d62728", "#8c564b", "#2ca02c", "#17becf", "#
 
 
 class SizePlot(Sink):
-    """Collects the sizes of the tables and draws them in the end.
+    """Collects the sizes of the tables and draws them at the end.
 
     Raises ``UsageError`` when Matplotlib is missing or the name has no known suffix, ``SinkError`` when the
     file cannot be written: at once, not after a long replay.

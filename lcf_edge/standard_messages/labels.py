@@ -1,4 +1,4 @@
-"""What is said of an object or a circle in a few words, and the colours in which it is shown."""
+"""Short labels for objects and circles, and their colours."""
 
 import numpy as np
 

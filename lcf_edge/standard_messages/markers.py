@@ -22,7 +22,7 @@ _SLOWEST_MPS = 0.05  # that has an arrow
 
 
 class _Marker(NamedTuple):
-    """What differs between markers; m in the optical frame."""
+    """The fields in which markers differ; m in the optical frame."""
 
     space: str
     number: int

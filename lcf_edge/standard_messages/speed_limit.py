@@ -13,7 +13,7 @@ MESSAGE = "geometry_msgs/msg/TwistStamped"
 NAV2_MESSAGE = "nav2_msgs/msg/SpeedLimit"
 
 NAV2_STOP_MPS = 1e-3
-"""What Nav2 is told instead of 0, which would mean no limit."""
+"""What Nav2 gets instead of 0, which would mean no limit."""
 
 _EARLY_SIGMAS = 2.0
 

@@ -1,6 +1,6 @@
-"""The link to the outside: what goes over Zenoh, and the session that carries it.
+"""Everything that goes over Zenoh, and the session that carries it.
 
-``session`` opens and closes it; ``admission`` tells what a daemon takes in; ``publisher`` puts messages, ``scene``,
+``session`` opens and closes it; ``admission`` says what a daemon takes in; ``publisher`` puts messages, ``scene``,
 ``preview`` and ``diagnostics`` those of one key each; ``ros2`` shows them to nodes under rmw_zenoh; ``speed_input`` and
 ``queryables`` listen; ``subscription`` is the other end; ``link`` is all of it for the daemon. A process never forks
 while a session is open.

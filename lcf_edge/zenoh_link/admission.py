@@ -1,4 +1,4 @@
-"""What a daemon that listens on this machine alone takes in from others: what it needs, and nothing else.
+"""What a daemon that listens only on this machine accepts from others: what it needs, and nothing else.
 
 Every local process can connect. It may read all that the daemon publishes, ask it, and tell the speed; it cannot send
 scenes, answers or tokens to others through the daemon, nor fill its memory with large messages.

@@ -1,6 +1,6 @@
-"""Who is connected, and how much of the daemon's memory is laid to whom.
+"""Who is connected, and how much of the daemon's memory each is charged with.
 
-Zenoh keeps what peers declare, has no limit for it, and does not tell who declared what. So whenever the memory of the
+Zenoh keeps what peers declare, has no limit for it, and does not say who declared what. So whenever the memory of the
 process has grown, those connections over TCP are charged with it that have brought something meanwhile, each by its
 share, but none with more than its bytes can have caused. Unix sockets do not tell how much they brought: what TCP
 leaves unexplained is laid to all of them alike.
@@ -117,7 +117,7 @@ def _stream_socket(number: str) -> socket.socket | None:
 
 
 def _bytes_received(one: socket.socket) -> int | None:
-    """None: it does not tell."""
+    """None: unknown."""
     if one.family == socket.AF_UNIX:
         return None
     info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES)

@@ -37,10 +37,10 @@ _COUNTED = (
 
 
 class Link:
-    """Publishes, listens and answers on one session, which it closes in the end.
+    """Publishes, listens and answers on one session, which it closes at the end.
 
     No method waits for a peer or raises because of one; what went wrong is in ``counts``. Each ``put`` may have a
-    thread of its own. ``reopen``: opens another session like the first, for ``renew``. ``lens_for``: tells the lens of
+    thread of its own. ``reopen``: opens another session like the first, for ``renew``. ``lens_for``: gives the lens of
     the pictures. Raises ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """
 
@@ -217,7 +217,7 @@ class _Parts:
         try:
             if hasattr(info, "transports"):
                 return len(list(info.transports()))
-            return len([*info.peers_zid(), *info.routers_zid()])  # Zenoh before 1.8 does not tell of clients
+            return len([*info.peers_zid(), *info.routers_zid()])  # Zenoh before 1.8 does not list clients
         except zenoh.ZError:  # it is closed
             return 0
 

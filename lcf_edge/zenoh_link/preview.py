@@ -1,4 +1,4 @@
-"""Previews: pictures with the overlay drawn, only while somebody looks, after everything else."""
+"""Previews: frames with the overlay drawn, only while somebody watches, after everything else."""
 
 import time
 

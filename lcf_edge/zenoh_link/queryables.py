@@ -1,4 +1,4 @@
-"""Questions that are answered when asked: ``<prefix>/query/<name>``."""
+"""Queries and their answers: ``<prefix>/query/<name>``."""
 
 import threading
 from collections import Counter, deque
@@ -16,7 +16,7 @@ Answer = Callable[[], tuple[bytes, str] | str]
 
 
 class Queryables:
-    """Answers queries for each name, in a thread of its own: who asks and does not listen holds up nobody else.
+    """Answers queries for each name in a thread of its own: a client that asks and does not listen delays no other.
 
     ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``, ``overtaken`` (by newer ones while
     they waited), ``unknown`` (no name was meant).
@@ -49,7 +49,7 @@ class Queryables:
         with self._changed:
             if len(self._waiting) == CAPACITY:
                 self.counts["overtaken"] += 1
-                self._waiting.popleft()  # its end tells who asked that no answer comes
+                self._waiting.popleft()  # its end tells the client that no answer comes
             self._waiting.append(query)
             self._changed.notify()
 
@@ -64,7 +64,7 @@ class Queryables:
             del query  # or it ends with the next one
 
     def _answer(self, query: zenoh.Query) -> None:
-        """Its end, with that of the last name for it, tells who asked that no more answers come."""
+        """Its end, with that of the last name for it, tells the client that no more answers come."""
         meant = {key: answer for key, answer in self._answers.items() if query.key_expr.intersects(key)}
         for key, answer in meant.items():
             self.counts[_reply(query, key, answer())] += 1

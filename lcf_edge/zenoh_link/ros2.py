@@ -1,7 +1,7 @@
 """What makes a Zenoh session a ROS 2 node for those that speak rmw_zenoh: keys, and liveliness tokens.
 
 As in the design document of ros2/rmw_zenoh: samples of a topic go to ``<domain>/<topic>/<type>/<hash>``; each node
-and each of its publishers and subscriptions is told of by a token under ``@ros2_lv``.
+and each of its publishers and subscriptions is announced by a token under ``@ros2_lv``.
 """
 
 import re

@@ -23,7 +23,7 @@ def scene_key(prefix: str) -> str:
 class ScenePublisher:
     """Puts each scene on ``<prefix>/scene``, and with ``publish.ros2`` on its ROS 2 topic.
 
-    A liveliness token ``<prefix>/@alive/<robot>`` tells that it is there. It lives as long as its session. ``ros2``:
+    A liveliness token ``<prefix>/@alive/<robot>`` says that it is there. It lives as long as its session. ``ros2``:
     the node to which the topic belongs; None with ``publish.ros2`` on: its own. ``latest``: the last payload. Raises
     ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """

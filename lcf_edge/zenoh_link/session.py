@@ -1,7 +1,7 @@
 """A Zenoh session: opened so that nothing leaves the machine unasked, closed in bounded time.
 
-By default a session is a peer that listens on loopback only: nobody is scouted, nobody is told of others, no shared
-memory (which would cost 27 MB), few sessions, small messages.
+By default a session is a peer that listens on loopback only: no scouting, no gossip, no shared memory
+(which would cost 27 MB), few sessions, small messages.
 """
 
 import json
@@ -23,7 +23,7 @@ MAX_MESSAGE_BYTES = 2**20
 """What comes in larger is dropped before it is put together; nothing that is published is this large."""
 
 MAX_SESSIONS = 32
-"""With others; each takes some 160 kB. Zenoh tells nobody whom it refuses."""
+"""With others; each takes some 160 kB. Zenoh does not report whom it refuses."""
 
 _UNLESS_THE_FILE_SAYS = {
     "scouting/multicast/enabled": "false",

@@ -1,4 +1,4 @@
-"""The other end: scenes as they arrive."""
+"""The subscriber's end: scenes as they arrive."""
 
 import weakref
 from collections.abc import Iterator

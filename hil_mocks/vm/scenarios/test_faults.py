@@ -1,4 +1,4 @@
-"""What goes wrong around a running daemon: told as docs/operation.md says, and over by itself."""
+"""What goes wrong around a running daemon: reported as docs/operation.md says, and over by itself."""
 
 from collections.abc import Callable
 

@@ -34,7 +34,7 @@ class Relay(ServerListener):
     """Serves at ``host``:``port`` (0: any) until it is closed.
 
     ``broken`` counts payloads that were not what their key promises; they are not passed on. Raises ``PublishError``
-    for an address that is none, ``LcfError`` when the port cannot be listened to.
+    for an invalid address, ``LcfError`` when the port cannot be listened to.
     """
 
     def __init__(self, address: DaemonAddress, host: str, port: int) -> None:
@@ -101,7 +101,7 @@ class Relay(ServerListener):
 
 
 def _key(topic: ZenohTopic, address: DaemonAddress) -> str:
-    """Raises ``PublishError`` for a prefix that is none."""
+    """Raises ``PublishError`` for an invalid prefix."""
     try:
         return str(zenoh.KeyExpr(topic.key(address.prefix)))
     except zenoh.ZError as error:

@@ -34,7 +34,7 @@ from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 from lcf_edge.zenoh_link.topics import ZenohTopic
 
-MAX_ROBOTS = 32  # of one prefix that are told by name; where no rule forbids it, anybody can claim to be some
+MAX_ROBOTS = 32  # of one prefix that are listed by name; where no rule forbids it, anybody can claim to be some
 MAX_NAME = 64  # characters of one
 
 _JOINED = 64  # scenes among which that of a picture is looked for
@@ -204,7 +204,7 @@ class Monitor:
 
     @contextmanager
     def _unless_broken(self) -> Iterator[None]:
-        """Takes something in, and tells that it came."""
+        """Take something in, and say that it came."""
         with self._lock:
             self._version += 1
             try:
@@ -267,7 +267,7 @@ class Monitor:
 
 
 def _ahead(toml: bytes) -> Ahead | None:
-    """Out of a configuration; None: it does not tell."""
+    """Out of a configuration; None: not in it."""
     try:
         vehicle = tomllib.loads(toml.decode())["vehicle"]
         half_width_m, horizon_s = float(vehicle["half_width_m"]), float(vehicle["horizon_s"])

@@ -67,6 +67,6 @@ class Alarms:
                 if self._closing.wait(0):
                     return
         except LcfError:
-            return  # the player comes upon it too, and tells
+            return  # the player comes upon it too, and reports it
         finally:
             self.done = True

@@ -1,4 +1,4 @@
-"""Which recording is shown, and what somebody who looks can ask of it."""
+"""Which recording is shown, and what a viewer can ask of it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ import msgspec
 from lcf_edge.config import Config
 from lcf_edge.recording.pace import Pace
 
-if TYPE_CHECKING:  # who looks at a daemon needs no pipeline, which takes memory
+if TYPE_CHECKING:  # a viewer of a daemon needs no pipeline, which takes memory
     from lcf_edge.monitor.replay.player import Player
 
 

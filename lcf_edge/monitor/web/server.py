@@ -1,4 +1,4 @@
-"""Answers browsers: the page, the updates over a WebSocket, the file of the last seconds; of a replay what to play.
+"""Serves browsers: the page, the updates over a WebSocket, the file of the last seconds; of a replay what to play.
 
 A browser asks for each update when it has drawn the last one. So a slow one gets fewer, newer updates and nothing
 waits for it here; one that does not ask for ``SILENCE_S`` is let go. Pictures are subscribed to only while somebody
@@ -239,7 +239,7 @@ def _abort(request: web.Request) -> None:
 
 
 def _sent(name: str, kind: str) -> Callable[[web.Request], Awaitable[web.Response]]:
-    """Answers with a file of the page."""
+    """Send a file of the page."""
     body = (files("lcf_edge.monitor.web") / "page" / name).read_bytes()
 
     async def send(_: web.Request) -> web.Response:

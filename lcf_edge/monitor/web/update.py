@@ -1,4 +1,4 @@
-"""What the page is told: the newest of everything as JSON, and a picture behind it when there is a new one."""
+"""What the page receives: the newest of everything as JSON, and an image behind it when there is a new one."""
 
 import math
 import time

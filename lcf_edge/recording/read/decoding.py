@@ -1,4 +1,4 @@
-"""From the bytes of a picture to luminance, with its size known before memory is taken for it."""
+"""From encoded bytes to luminance; the size is checked before memory is taken for it."""
 
 import os
 import re
@@ -41,13 +41,13 @@ _TIFF_SIZES = frozenset(
 _TIFF_ALL_ROWS = 2**32 - 1
 _MAX_TIFF_STRIP = 128 * 2**20  # bytes
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # quiet: what went wrong is told once, by us
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # quiet: what went wrong is reported once, by us
 _set_log_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel  # moved in OpenCV 5
 _set_log_level(0)
 
 
 class ImageDecodeError(LcfError):
-    """A picture that cannot be used; the text says why in two or three words, for counting."""
+    """An image that cannot be used; the text says why in two or three words, for counting."""
 
 
 def read_image(path: Path) -> Grey:
@@ -113,7 +113,7 @@ def check_size(width: int, height: int) -> None:
 
 
 def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
-    """Width and height as the header tells them, and what of ``data`` the decoder needs."""
+    """Width and height by the header, and what of ``data`` the decoder needs."""
     if data.startswith(b"\x89PNG\r\n\x1a\n"):
         return _png(data)
     if data.startswith(b"\xff\xd8"):

@@ -89,7 +89,7 @@ class VideoFile(Recording):
         has_fps = math.isfinite(own_fps) and 0 < own_fps < FASTEST_FPS
         self._fps = own_fps if has_fps and configured_fps == Camera().fps else configured_fps
         if not has_fps:
-            self._warn(f"{path}: tells no frame rate, taken is camera.fps = {self._fps:g}")
+            self._warn(f"{path}: has no frame rate; camera.fps = {self._fps:g} is used")
         self.frame_count = int(count) if 0 < count < 1e9 else None
         self._warn_without_lens(config)
 

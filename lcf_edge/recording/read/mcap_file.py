@@ -54,7 +54,7 @@ class McapMessage:
 
 
 class _DamageError(Exception):
-    """Bytes that are not what the format wants; the text says what and where."""
+    """Bytes that break the format; the text says what and where."""
 
 
 class _Record(NamedTuple):
@@ -65,9 +65,9 @@ class _Record(NamedTuple):
 
 
 class McapFile:
-    """An MCAP file. Raises ``RecordingError`` when it is none, and ``OSError``.
+    """An MCAP file. Raises ``RecordingError`` for any other, and ``OSError``.
 
-    ``counts``: messages of each topic, as the summary at the end tells them; None when it does not.
+    ``counts``: messages of each topic, by the summary at the end; None: it has none.
     """
 
     def __init__(self, path: Path) -> None:
@@ -82,7 +82,7 @@ class McapFile:
     def messages(self, warn: Callable[[str], None], skip: Callable[[str, str], None]) -> Iterator[McapMessage]:
         """The messages in the order of the file.
 
-        ``warn`` is told where the file is damaged, ``skip`` why a chunk is passed over, and where it lies.
+        ``warn`` gets where the file is damaged, ``skip`` why a chunk is passed over, and where it lies.
         """
         try:
             with self._path.open("rb") as file:

@@ -1,4 +1,4 @@
-"""How much memory a library may take that sets itself no limit."""
+"""A limit for the memory of a library that has none."""
 
 import os
 import resource

@@ -26,7 +26,7 @@ Sample = ImuSample | SpeedSample
 
 @dataclass(frozen=True, slots=True)
 class UndecodedFrame:
-    """A picture that is decoded when its turn comes, so that none wait in memory."""
+    """A frame whose image is decoded when its turn comes, so that none wait in memory."""
 
     stamp_ns: int
     name: str  # for warnings
@@ -40,7 +40,7 @@ class Recording(ABC):
     including the first one at or after the frame's stamp are delivered, so that the interval between two
     exposures can be integrated exactly.
 
-    What cannot be used is skipped, counted in ``skipped`` by reason, and told in ``warnings``, which grow
+    What cannot be used is skipped, counted in ``skipped`` by reason, and reported in ``warnings``, which grow
     while reading; ``seq`` of the frames has a gap at each skipped picture. Iterating raises
     ``RecordingError`` at the end when not one picture could be read.
 
@@ -50,7 +50,7 @@ class Recording(ABC):
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self.lens: Lens | None = None  # as the recording tells it
+        self.lens: Lens | None = None  # the recording's own
         self.frame_count: int | None = None
         self.has_imu = False
         self.has_speed = False
@@ -113,7 +113,7 @@ class Recording(ABC):
 
     def _warn_without_lens(self, config: Config) -> None:
         if self.lens is None and not config.camera.intrinsics:
-            self._warn(f"{self.path}: tells no intrinsics, they are guessed; set camera.intrinsics")
+            self._warn(f"{self.path}: has no intrinsics, they are guessed; set camera.intrinsics")
 
 
 def interleave(

@@ -105,7 +105,7 @@ class RosBag(Recording):
         expected: set[McapTopic] | None = set()
         for file in self._files:
             if file.counts is None or expected is None:
-                expected = None  # no summary tells what is to come
+                expected = None  # no summary says what is to come
             else:
                 expected |= {topic for topic, count in file.counts.items() if count and _is_read(topic)}
         firsts: dict[McapTopic, bytes | None] = {}
@@ -148,7 +148,7 @@ class RosBag(Recording):
         try:
             own, camera = (cdr.decode_header(self._firsts[topic]).frame_id for topic in (imu, image))
         except cdr.CdrError:
-            return  # told and counted while reading
+            return  # reported and counted while reading
         if own != camera and not own.endswith("_optical_frame"):
             self._warn(
                 f"{self.path}: {imu.name} is in the axes of {own or 'no named frame'}, taken for the "
@@ -166,7 +166,7 @@ def _is_read(topic: McapTopic) -> bool:
 
 
 def _is_usable(topic: McapTopic, first: bytes) -> bool:
-    """Whether a topic tells what its type promises, by its first message: depth pictures and IMU topics
+    """Whether a topic has what its type promises, by its first message: depth pictures and IMU topics
     with half of the values do not.
     """
     try:

@@ -1,4 +1,4 @@
-"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which tells what is in the files together.
+"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which says what is in the files together.
 
 Of version 5, which Humble and all later read. Values are written as JSON, which is YAML as well.
 """
@@ -22,7 +22,7 @@ _QOS = "offered_qos_profiles"
 
 @dataclass(frozen=True, slots=True)
 class _Content:
-    """What a file says of itself. ``topics``: each channel with the type of its messages."""
+    """A file as the bag lists it. ``topics``: each channel with the type of its messages."""
 
     topics: list[tuple[Channel, str]]
     statistics: Statistics

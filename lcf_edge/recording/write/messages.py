@@ -66,7 +66,7 @@ class RecordedMessage:
 
 @dataclass(frozen=True, slots=True)
 class FrameAndScene:
-    """A picture and what was made of it."""
+    """A frame and its scene."""
 
     frame: Frame
     scene: PipelineScene
@@ -74,7 +74,7 @@ class FrameAndScene:
 
 @dataclass(frozen=True, slots=True)
 class Statuses:
-    """How each part of the program was."""
+    """The state of each part of the program."""
 
     stamp_ns: int  # monotonic
     statuses: Sequence[DeviceStatus]

@@ -1,4 +1,4 @@
-"""One MCAP file (mcap.dev/spec) that grows by whole chunks: whatever ends it, it is readable up to the last of them."""
+"""One MCAP file (mcap.dev/spec) that grows by whole chunks: however it ends, it is readable up to the last of them."""
 
 import os
 from contextlib import suppress
@@ -67,7 +67,7 @@ class RecordingFile:
         self._writer.add_attachment(stamp_ns, stamp_ns, IN_RECORDING, "application/toml", config_text.encode())
 
     def add(self, message: RecordedMessage) -> None:
-        """Append a message. Raises ``CdrError`` when its stamp is none."""
+        """Append a message. Raises ``CdrError`` for an invalid stamp."""
         stamp_ns = message.stamp_ns + self._offset_ns
         payload = restamped(message.payload, stamp_ns) if message.topic.is_stamped else message.payload
         self._writer.add_message(self._channels[message.topic], _written(stamp_ns), payload, _written(stamp_ns))

@@ -716,7 +716,7 @@ class TestByHand:
         assert main(["--list"]) == 1
         output = capsys.readouterr()
         assert output.out == ""
-        assert output.err.startswith("no camera that can be opened; lcf-edge doctor tells why; ")
+        assert output.err.startswith("no camera can be opened; lcf-edge doctor says why; ")
         assert output.err.count("\n") == 1
 
     def test_wrong_usage(self, capsys: pytest.CaptureFixture[str]) -> None:
