@@ -27,7 +27,6 @@ MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate
 MAX_LINE_SHARE = 1.25 / 10  # bytes a second for each baud, of lines that are faster
 MAX_SAMPLES_PER_S = 2500  # the fastest IMUs send 2000
 MAX_READS_PER_S = 1000  # then several pieces are read at once
-READ_PAUSE_S = 0.001
 EXCESS_PAUSE_S = 0.01  # meanwhile the kernel holds what comes, 4096 bytes and more
 
 
@@ -113,7 +112,8 @@ class SerialImu:
             self.counts["excess_bytes"] += len(data) - within
             self._clock.sleep_s(EXCESS_PAUSE_S)
         elif not self._reads.take(1, now_ns):
-            self._clock.sleep_s(READ_PAUSE_S)
+            self._clock.sleep_s(1 / MAX_READS_PER_S)
+            self._reads.take(1, self._clock.monotonic_ns())
         return data[:within]
 
     def _newest(self, readings: Sequence[Reading], now_ns: int) -> list[Reading]:
