@@ -23,7 +23,7 @@ MAX_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or an
 FRAMES_BY_CHANCE = 3  # that noise can look like
 TICKS = 2**32  # counters of most devices begin anew after so many
 MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
-MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate is set; 921600 baud carry 92,160
+MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate is set
 MAX_LINE_SHARE = 1.25 / 10  # bytes a second for each baud, of lines that are faster
 MAX_SAMPLES_PER_S = 2500  # the fastest IMUs send 2000
 MAX_READS_PER_S = 1000  # then several pieces are read at once
@@ -49,7 +49,8 @@ class SerialImu:
 
     Raises what ``SerialPort`` raises; ``read`` also ``DeviceStalledError``, and ``WrongDeviceError`` when there are
     bytes but no readings. Counts what the parser refuses, ``restarted`` when the device's clock began anew, and
-    ``excess_bytes`` and ``excess_samples``: dropped, since no IMU sends so much (``MAX_BYTES_PER_S``, ``MAX_SAMPLES_PER_S``).
+    ``excess_bytes`` and ``excess_samples``: dropped, since no IMU sends so much (``MAX_BYTES_PER_S``,
+    ``MAX_SAMPLES_PER_S``).
     """
 
     def __init__(

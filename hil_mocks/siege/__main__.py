@@ -190,7 +190,9 @@ def watched(
             for status in decode_diagnostics(DIAGNOSTICS.payload(sample)).status:
                 figures.excess_bytes = max(int(status.values.get("excess_bytes", "0")), figures.excess_bytes)
 
-        subscribers = [session.declare_subscriber("lcf/scene", count), session.declare_subscriber("lcf/diagnostics", look)]
+        subscribers = [
+            session.declare_subscriber(f"lcf/{key}", take) for key, take in (("scene", count), ("diagnostics", look))
+        ]
         while not received:
             time.sleep(0.01)
         del received[:]

@@ -89,7 +89,7 @@ class WildImu(Attack):
         link.symlink_to(os.ttyname(self._ends_of_line[1]))
         encoder, damage = CsvEncoder(), flipped_bits()
         whole = [encoder(sample) for sample in islice(still(1000.0), LINES)]
-        self._pieces = cycle([line if number % 2 else damage(line) for number, line in enumerate(whole)])
+        self._pieces = cycle([line if number % 2 else damage(line) or b"" for number, line in enumerate(whole)])
 
     def _write(self) -> None:
         if select.select([], [self._ends_of_line[0]], [], CONNECT_S)[1]:

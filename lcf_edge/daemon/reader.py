@@ -74,4 +74,6 @@ class Reader(threading.Thread, Generic[Record]):
         self.counts, self._counted_ns = self._device.counts, now_ns
         if not self._told_of_excess and any(self.counts[name] for name in EXCESS):
             self._told_of_excess = True
-            LOGGER.warning("%s: sends more than any such device; the excess is dropped and counted; check it", self.name)
+            LOGGER.warning(
+                "%s: sends more than any such device; the excess is dropped and counted; check it", self.name
+            )

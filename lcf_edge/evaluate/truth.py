@@ -80,7 +80,7 @@ def _pictures(path: Path) -> dict[int, list[Known]]:
     with path.open("rb") as file:
         while text := file.readline(MAX_LINE_BYTES):
             if len(text) == MAX_LINE_BYTES:
-                raise RecordingError(f"{path}: a line of more than {MAX_LINE_BYTES} bytes; one line a picture is enough")
+                raise RecordingError(f"{path}: a line of {MAX_LINE_BYTES} bytes or more; shorten it")
             if not text.strip():
                 continue
             line = decoder.decode(text)
