@@ -13,6 +13,7 @@ Delivered_co = TypeVar("Delivered_co", covariant=True)
 FIRST_PAUSE_S = 0.1
 MAX_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
 MAX_HOPELESS_PAUSE_S = 10.0  # what only the user can fix
+EXCESS = ("excess_bytes", "excess_samples")  # counts of what was dropped because no such device sends so much
 
 
 class Device(Protocol[Delivered_co]):

@@ -28,7 +28,7 @@ class Cause(IntEnum):
 
 
 class ObjectClass(IntEnum):
-    """What an object does, over ground."""
+    """What an object does, over ground. A number that is none of these, of a newer sender or a liar, is ``UNKNOWN``."""
 
     UNKNOWN = 0
     STANDING = 1
@@ -37,13 +37,21 @@ class ObjectClass(IntEnum):
     LEADING = 4  # goes ahead of it
     CUTTING_IN = 5  # goes ahead of it, and to the side into its path
 
+    @classmethod
+    def _missing_(cls, value: object) -> "ObjectClass":  # noqa: ARG003
+        return cls.UNKNOWN
+
 
 class ObjectState(IntEnum):
-    """How an object is known in this frame."""
+    """How an object is known in this frame. A number that is none of these is ``COASTING``, the least sure."""
 
     SEEN = 0
     HIDDEN = 1  # behind a nearer one
     COASTING = 2  # predicted, not seen
+
+    @classmethod
+    def _missing_(cls, value: object) -> "ObjectState":  # noqa: ARG003
+        return cls.COASTING
 
 
 class Shape(IntEnum):

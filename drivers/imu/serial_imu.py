@@ -3,8 +3,9 @@
 import argparse
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
+from drivers.allowance import Allowance
 from drivers.by_hand import describe_imu, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
@@ -22,6 +23,11 @@ MAX_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or an
 FRAMES_BY_CHANCE = 3  # that noise can look like
 TICKS = 2**32  # counters of most devices begin anew after so many
 MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
+MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate is set
+MAX_LINE_SHARE = 1.25 / 10  # bytes a second for each baud, of lines that are faster
+MAX_SAMPLES_PER_S = 2500  # the fastest IMUs send 2000
+MAX_READS_PER_S = 1000  # then several pieces are read at once
+EXCESS_PAUSE_S = 0.01  # meanwhile the kernel holds what comes, 4096 bytes and more
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +48,9 @@ class SerialImu:
     """A ``Device[ImuSample]``. Rate and ranges are those set in the IMU itself; nothing is written but to a ``Talker``.
 
     Raises what ``SerialPort`` raises; ``read`` also ``DeviceStalledError``, and ``WrongDeviceError`` when there are
-    bytes but no readings. Counts what the parser refuses, and ``restarted`` when the device's clock began anew.
+    bytes but no readings. Counts what the parser refuses, ``restarted`` when the device's clock began anew, and
+    ``excess_bytes`` and ``excess_samples``: dropped, since no IMU sends so much (``MAX_BYTES_PER_S``,
+    ``MAX_SAMPLES_PER_S``).
     """
 
     def __init__(
@@ -52,6 +60,7 @@ class SerialImu:
         self._protocol = protocol
         self._clock = clock
         self._parser = protocol.parser()
+        self._talker = self._parser if isinstance(self._parser, Talker) else None
         self.counts: Counter[str] = self._parser.counts
         self._rate_hz = protocol.rate_hz or rate_hz
         self._stamps: SampleClock | None = None
@@ -60,6 +69,10 @@ class SerialImu:
         self._noise_bytes = 0
         self._frames = 0  # when there last was a reading
         self._port = SerialPort(port, baud or protocol.bauds[0])
+        self._reads = Allowance(MAX_READS_PER_S)
+        self._bytes = Allowance(max(MAX_BYTES_PER_S, MAX_LINE_SHARE * self._port.baud))
+        self._samples = Allowance(MAX_SAMPLES_PER_S)
+        self._passed_over = 0  # samples since the last that was within the allowance
         self._heard_ns = clock.monotonic_ns()
         self._patience_s = FIRST_BYTE_S
         try:
@@ -78,12 +91,14 @@ class SerialImu:
             return []
         self._heard_ns = now_ns
         self._patience_s = STALLED_S
+        data = self._slowed(data, now_ns)
         readings = self._parser.feed(data)
         if not readings:
             self._complain_of_noise(len(data))
             return []
         self._noise_bytes = 0
         self._frames = self._parser.frames
+        readings = self._newest(readings, now_ns)
         stamps_ns = self._stamps_ns(now_ns, readings)
         return [self._sample(reading, stamp_ns) for reading, stamp_ns in zip(readings, stamps_ns, strict=True)]
 
@@ -91,9 +106,32 @@ class SerialImu:
         """See ``Device``."""
         self._port.close()
 
+    def _slowed(self, data: bytes, now_ns: int) -> bytes:
+        """What is within the allowance; pauses where there was more, so that the pipeline gets its turn."""
+        within = self._bytes.take(len(data), now_ns)
+        if within < len(data):
+            self.counts["excess_bytes"] += len(data) - within
+            self._clock.sleep_s(EXCESS_PAUSE_S)
+        elif not self._reads.take(1, now_ns):
+            self._clock.sleep_s(1 / MAX_READS_PER_S)
+            self._reads.take(1, self._clock.monotonic_ns())
+        return data[:within]
+
+    def _newest(self, readings: Sequence[Reading], now_ns: int) -> list[Reading]:
+        """As many as are within the allowance; the first of them tells how many were passed over."""
+        within = self._samples.take(len(readings), now_ns)
+        excess, kept = readings[: len(readings) - within], list(readings[len(readings) - within :])
+        if excess:
+            self.counts["excess_samples"] += len(excess)
+            self._passed_over += sum(reading.lost + 1 for reading in excess)
+        if kept and self._passed_over:
+            kept[0] = replace(kept[0], lost=kept[0].lost + self._passed_over)
+            self._passed_over = 0
+        return kept
+
     def _say(self) -> None:
-        if isinstance(self._parser, Talker):
-            for data in self._parser.to_say(self._rate_hz, self._clock.monotonic_ns()):
+        if self._talker is not None:
+            for data in self._talker.to_say(self._rate_hz, self._clock.monotonic_ns()):
                 self._port.write(data, self._protocol.byte_pause_s, self._clock)
 
     def _complain_of_silence(self, now_ns: int) -> None:
@@ -116,6 +154,8 @@ class SerialImu:
         )
 
     def _stamps_ns(self, now_ns: int, readings: Sequence[Reading]) -> list[int]:
+        if not readings:
+            return []
         if self._stamps is None:  # the first reading says whether the device sends its own time
             self._unit_hz = (self._protocol.tick_hz if readings[0].ticks is not None else None) or self._rate_hz
             self._stamps = SampleClock(self._unit_hz)

@@ -19,6 +19,7 @@ from hil_mocks.siege.attacks import (
     HTTP,
     Attack,
     Strangers,
+    WildImu,
     declarer,
     flood,
     frames,
@@ -28,10 +29,13 @@ from hil_mocks.siege.attacks import (
     reloads,
 )
 from hil_mocks.siege.place import Process, certificates, planner_settings, rover_settings
+from lcf_edge.cdr import decode_diagnostics, decode_scene
 from lcf_edge.config import Camera, Config, Imu, Memory, Metrics, Vehicle, Zenoh, to_toml
 from lcf_edge.errors import LcfError
 from lcf_edge.rendered import scenes
 from lcf_edge.zenoh_link import opened_session
+from lcf_edge.zenoh_link.diagnostics import DIAGNOSTICS
+from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.subscription import reading_from
 
 FPS = 15.0
@@ -54,7 +58,8 @@ class Figures:
     let_in_s: list[float] = field(default_factory=list)  # of planners
     descriptors: dict[str, int] = field(default_factory=dict)  # most
     memory_mib: float = 0.0  # of the daemon, most
-    frames_share: float = 0.0
+    frames_share: float = 0.0  # of the pictures that the camera made
+    excess_bytes: int = 0  # of the wild IMU, that the daemon dropped
     pages: int = 0
     complaints: list[str] = field(default_factory=list)
 
@@ -65,7 +70,8 @@ class Figures:
             f"planners: {len(self.let_in_s)} let in, the last after {max(self.let_in_s, default=0):.2f} s at most",
             "descriptors, most: " + ", ".join(f"{name} {number}" for name, number in self.descriptors.items()),
             f"memory of the daemon: {self.memory_mib:.0f} MiB at most, of a budget of {BUDGET_MIB:g}",
-            f"frames: {self.frames_share:.0%} of {FPS:g} a second; pages served: {self.pages}",
+            f"frames: {self.frames_share:.0%} of the camera's; pages served: {self.pages}",
+            f"the wild IMU: {self.excess_bytes / 1e6:.1f} MB dropped and counted",
         ]
 
     def judge(self, least_share: float) -> None:
@@ -77,6 +83,7 @@ class Figures:
             ),
             ("no planner was let in", not self.let_in_s),
             ("no page was served", not self.pages),
+            ("nothing of the wild IMU was dropped", not self.excess_bytes),
             (f"the daemon took {self.memory_mib:.0f} MiB", self.memory_mib > BUDGET_MIB + BEYOND_MIB),
             (f"only {self.frames_share:.0%} of the frames", self.frames_share < least_share),
         ):
@@ -107,7 +114,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
     )
     config = Config(
         camera=Camera(driver="recording", recording=str(drive), width=320, height=240, fps=FPS),
-        imu=Imu(driver="recording"),
+        imu=Imu(driver="csv", port=str(folder / "imu")),
         vehicle=Vehicle(speed_source="zenoh"),
         memory=Memory(budget_mib=BUDGET_MIB),
         metrics=Metrics(port=metrics_port),
@@ -118,6 +125,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
     )
     file = folder / "config.toml"
     file.write_text(to_toml(config), encoding="utf-8")
+    wild_imu = WildImu("wild IMU", folder / "imu")
     processes = [
         Process("daemon", folder, "run", "-c", str(file)),
         Process("gate", folder, "gate", "--tls", str(folder / "tls"), "--listen", "127.0.0.1", "--port", str(outer),
@@ -136,6 +144,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
         Attack("declarer", 1.0, declarer(f"tcp/127.0.0.1:{local}")),
         Attack("flood", 0.5, flood(f"tcp/127.0.0.1:{local}")),
         Attack("reload", 1.0, reloads(file, to_toml(config))),
+        wild_imu,
     ]
     figures = Figures()
     try:
@@ -172,16 +181,22 @@ def watched(
     for attack in attacks:
         attack.start()
     with opened_session(reading_from(f"tls/localhost:{outer}", planner)) as session:
-        received = 0
+        received: list[int] = []  # numbers of pictures
 
-        def count(_: zenoh.Sample) -> None:
-            nonlocal received
-            received += 1
+        def count(sample: zenoh.Sample) -> None:
+            received.append(decode_scene(SCENE.payload(sample)).seq)
 
-        subscriber = session.declare_subscriber("lcf/scene", count)
+        def look(sample: zenoh.Sample) -> None:
+            for status in decode_diagnostics(DIAGNOSTICS.payload(sample)).status:
+                figures.excess_bytes = max(int(status.values.get("excess_bytes", "0")), figures.excess_bytes)
+
+        subscribers = [
+            session.declare_subscriber(f"lcf/{key}", take) for key, take in (("scene", count), ("diagnostics", look))
+        ]
         while not received:
             time.sleep(0.01)
-        received, begin_s, paused_s = 0, time.monotonic(), 0.0
+        del received[:]
+        begin_s, paused_s = time.monotonic(), 0.0
         while time.monotonic() < begin_s + seconds:
             if not paused_s and time.monotonic() > begin_s + seconds / 2:
                 pause(daemon.pid, PAUSE_S)
@@ -196,8 +211,9 @@ def watched(
                 figures.descriptors[process.name] = most
             figures.memory_mib = max(figures.memory_mib, daemon.resident_mib)
             time.sleep(0.5)
-        figures.frames_share = received / FPS / (time.monotonic() - begin_s - paused_s)
-        subscriber.undeclare()  # type: ignore[no-untyped-call]
+        figures.frames_share = len(received) / (received[-1] - received[0] + 1 - FPS * paused_s)
+        for subscriber in subscribers:
+            subscriber.undeclare()  # type: ignore[no-untyped-call]
     figures.waves = {attack.name: attack.waves for attack in attacks}
 
 

@@ -1,18 +1,22 @@
 """The attacks: each is a thread that repeats one thing, holds a bounded number of sockets, and ends when stopped."""
 
 import os
+import select
 import signal
 import socket
 import threading
 import time
+import tty
 from collections import deque
 from collections.abc import Callable
 from contextlib import closing, suppress
+from itertools import cycle, islice
 from pathlib import Path
 from typing import Any
 
 import zenoh
 
+from hil_mocks.serial_imu import CsvEncoder, flipped_bits, still
 from lcf_edge.config import Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link import opened_session
@@ -20,6 +24,7 @@ from lcf_edge.zenoh_link import opened_session
 HELD = 150  # sockets of one attack
 CONNECT_S = 1.0
 DECLARED = 1000  # keys of a kind at a time
+LINES, LINES_AT_ONCE = 1000, 50  # of a serial IMU
 FLOOD = 500  # messages and questions at a time
 HTTP = b"GET / HTTP/1.0\r\n\r\n"
 HALF_A_REQUEST = b"GET / HTTP/1.1\r\nHost: 127.0.0.1\r\nX-Slow: "
@@ -71,6 +76,30 @@ class Strangers(Attack):
         super().end()
         for one in self._held:
             one.close()
+
+
+class WildImu(Attack):
+    """An IMU at the serial port ``link`` that writes whole and damaged lines as fast as they are read."""
+
+    def __init__(self, name: str, link: Path) -> None:
+        super().__init__(name, 0.0, self._write)
+        self._ends_of_line = os.openpty()
+        tty.setraw(self._ends_of_line[1])
+        os.set_blocking(self._ends_of_line[0], False)
+        link.symlink_to(os.ttyname(self._ends_of_line[1]))
+        encoder, damage = CsvEncoder(), flipped_bits()
+        whole = [encoder(sample) for sample in islice(still(1000.0), LINES)]
+        self._pieces = cycle([line if number % 2 else damage(line) or b"" for number, line in enumerate(whole)])
+
+    def _write(self) -> None:
+        if select.select([], [self._ends_of_line[0]], [], CONNECT_S)[1]:
+            os.write(self._ends_of_line[0], b"".join(islice(self._pieces, LINES_AT_ONCE)))
+
+    def end(self) -> None:
+        """And be pulled out."""
+        super().end()
+        for one in self._ends_of_line:
+            os.close(one)
 
 
 def liar(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:

@@ -5,6 +5,7 @@ import os
 import shlex
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 from lcf_edge.errors import LcfError
@@ -15,8 +16,12 @@ _KEY = "openssl req -x509 -newkey ec -pkeyopt ec_paramgen_curve:P-256 -noenc -da
 _PARTY = "-addext basicConstraints=critical,CA:FALSE -addext subjectAltName=DNS:localhost"
 
 
+DAEMON_NICE = -10
+"""As in its unit; who may not raise a priority leaves it."""
+
+
 class Process:
-    """``lcf-edge`` with a command, its output in ``log``."""
+    """``lcf-edge`` with a command, its output in ``log``; the daemon at the priority of its unit."""
 
     def __init__(self, name: str, folder: Path, *arguments: str) -> None:
         self.name = name
@@ -26,6 +31,9 @@ class Process:
                 (sys.executable, "-m", "lcf_edge", *arguments), stdin=subprocess.DEVNULL, stdout=log, stderr=log
             )
         self.pid = self._process.pid
+        if name == "daemon":
+            with suppress(PermissionError):
+                os.setpriority(os.PRIO_PROCESS, self.pid, DAEMON_NICE)
 
     @property
     def status(self) -> int | None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 from drivers.clock import Clock
-from drivers.device import Device, KeptOpen
+from drivers.device import EXCESS, Device, KeptOpen
 from drivers.errors import DriverError
 from lcf_edge.daemon.clock import StoppableClock
 from lcf_edge.daemon.log import LOGGER
@@ -42,6 +42,7 @@ class Reader(threading.Thread, Generic[Record]):
         self._deliver = deliver
         self._clock = clock
         self._counted_ns = 0
+        self._told_of_excess = False
 
     def run(self) -> None:
         """Read until stopped."""
@@ -71,3 +72,8 @@ class Reader(threading.Thread, Generic[Record]):
         elif now_ns - self._counted_ns < _COUNTS_EACH_NS:
             return
         self.counts, self._counted_ns = self._device.counts, now_ns
+        if not self._told_of_excess and any(self.counts[name] for name in EXCESS):
+            self._told_of_excess = True
+            LOGGER.warning(
+                "%s: sends more than any such device; the excess is dropped and counted; check it", self.name
+            )

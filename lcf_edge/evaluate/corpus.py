@@ -17,7 +17,7 @@ MAX_SETTINGS = 2**16  # characters
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A recording. ``name``: as short as is unique."""
+    """A recording. ``name``: as short as is unique, in characters that can be written anywhere."""
 
     name: str
     path: Path
@@ -52,7 +52,14 @@ def find(places: Sequence[Path]) -> list[Entry]:
             raise UsageError(f"{place}: no recording in it; name recordings, or a folder of them")
         paths += found
     paths = list({path.resolve(): path.absolute() for path in reversed(paths)}.values())[::-1]  # each once
-    return [Entry(name, path) for name, path in zip(_names(paths), paths, strict=True)]
+    return [Entry(printable_name(name), path) for name, path in zip(_names(paths), paths, strict=True)]
+
+
+def printable_name(name: str) -> str:
+    """A file's name in which what cannot be shown, or is no text at all, stands as its code."""
+    return "".join(
+        letter if letter.isprintable() else letter.encode("unicode_escape").decode("ascii") for letter in name
+    )
 
 
 def _below(folder: Path) -> Iterator[Path]:

@@ -11,6 +11,7 @@ from lcf_edge.evaluate.score import CLOSE_S
 from lcf_edge.evaluate.truth import Known
 
 WIDTH_PX = 420
+MAX_HEIGHT_PX = 1260  # of a picture that is higher than wide
 QUALITY = 82  # of the JPEGs
 _RED, _YELLOW, _GREY, _WHITE, _BLACK = (60, 60, 255), (0, 230, 255), (190, 190, 190), (255, 255, 255), (0, 0, 0)
 
@@ -18,10 +19,14 @@ Colours = npt.NDArray[np.uint8]
 
 
 def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], reported: Sequence[Rebel], caption: str) -> Colours:
-    """A frame (h, w), grey, as a small picture (h, ``WIDTH_PX``, 3): threats yellow, other things grey, rebels red."""
-    scale = WIDTH_PX / image.shape[1]
+    """A frame (h, w), grey, as a small picture (h, w, 3): threats yellow, other things grey, rebels red.
+
+    At most ``WIDTH_PX`` wide and ``MAX_HEIGHT_PX`` high.
+    """
+    scale = min(WIDTH_PX / image.shape[1], MAX_HEIGHT_PX / image.shape[0])
     kind = cv2.INTER_AREA if scale < 1 else cv2.INTER_LINEAR
-    canvas = cv2.cvtColor(cv2.resize(image, None, fx=scale, fy=scale, interpolation=kind), cv2.COLOR_GRAY2BGR)
+    height, width = (max(round(scale * side), 1) for side in image.shape)
+    canvas = cv2.cvtColor(cv2.resize(image, (width, height), interpolation=kind), cv2.COLOR_GRAY2BGR)
     for each in known:
         x0, y0, x1, y1 = (round(scale * value) for value in each.box)
         cv2.rectangle(canvas, (x0, y0), (x1, y1), _YELLOW if each.threat else _GREY, 1, cv2.LINE_AA)

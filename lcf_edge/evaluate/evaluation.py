@@ -1,6 +1,7 @@
 """The whole of it: hands the recordings of a corpus out, and writes what comes back into a folder."""
 
 import platform
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -14,15 +15,17 @@ from lcf_edge.config import Config, load
 from lcf_edge.config.attached import attached_configuration
 from lcf_edge.errors import ConfigError, LcfError, UsageError
 from lcf_edge.evaluate import report
-from lcf_edge.evaluate.corpus import Entry, find
+from lcf_edge.evaluate.corpus import Entry, find, printable_name
 from lcf_edge.evaluate.one_recording import Done, Task
 from lcf_edge.evaluate.page import page
 from lcf_edge.evaluate.report import RecordingRow, Report
 from lcf_edge.evaluate.workers import Outcome
+from lcf_edge.printable import printable
 from lcf_edge.recording.read.rosbag import bag_files
 from lcf_edge.sinks import cannot_write
 
 PAGE = "index.html"
+_FRAMES = re.compile(r"frames/\d{4,9}\.jsonl", re.ASCII)
 
 Work = Callable[[Sequence[Task]], Iterator[Outcome]]
 
@@ -62,11 +65,13 @@ def evaluate(question: Question, folder: Path, work: Work) -> Written:
         try:
             tasks.append(_task(entry, question, frames_before))
         except (LcfError, OSError, UnicodeDecodeError) as error:
-            rows[entry.name] = RecordingRow(entry.name, str(entry.path), error=str(error))
+            rows[entry.name] = RecordingRow(entry.name, printable_name(str(entry.path)), error=printable(str(error)))
     numbers = {entry.name: number for number, entry in enumerate(entries, 1)}
     for task, done in work(tasks):
         if isinstance(done, str):
-            rows[task.name] = RecordingRow(task.name, str(task.path), error=done, settings=list(task.settings))
+            rows[task.name] = RecordingRow(
+                task.name, printable_name(str(task.path)), error=printable(done), settings=list(task.settings)
+            )
         else:
             rows[task.name] = _keep(done, folder, numbers[task.name])
     result = Report(
@@ -115,7 +120,10 @@ def _holder(recording: Path) -> Path | None:
 
 
 def _frames(of: Report, folder: Path) -> dict[str, Path]:
-    """The files of a report's frames, by the names of the recordings."""
+    """The files of a report's frames, by the names of the recordings. Raises ``UsageError``."""
+    for row in of.read:
+        if row.frames and not _FRAMES.fullmatch(row.frames):  # another's report could name any file
+            raise UsageError(f"{folder}: {row.frames} is no file of frames of a report; evaluate again")
     return {row.name: folder / row.frames for row in of.read if row.frames}
 
 

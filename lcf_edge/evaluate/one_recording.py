@@ -14,17 +14,21 @@ from drivers.samples import Frame
 from lcf_edge.config import Config
 from lcf_edge.errors import LcfError, UsageError
 from lcf_edge.evaluate import report
+from lcf_edge.evaluate.corpus import printable_name
 from lcf_edge.evaluate.drawings import Colours, beside, draw, encode
 from lcf_edge.evaluate.report import FrameLine, ImageRow, RecordingRow
 from lcf_edge.evaluate.score import Score, rebels
 from lcf_edge.evaluate.truth import Known, read_truth
 from lcf_edge.image_limit import limit_opencv
 from lcf_edge.pipeline import run
+from lcf_edge.printable import printable
 from lcf_edge.recording.read import open_recording
 
 EVENTS = 8  # pictures of a recording, at most, of what went wrong or differs
 VIEWS = 3  # and of what it is like
 APART = 10  # frames between two pictures of the same kind of event
+
+MAX_FRAMES_BYTES = 2**30  # some 300 bytes a frame
 
 _GRAVITY = {"contact that does not come": 3, "missed": 2, "on nothing": 1}
 _DIFFERENCES = {"contact": 3, "found": 2, "on nothing": 1}
@@ -48,7 +52,13 @@ class Task:
     def frames_before(self) -> bytes | None:
         """What is in that file. Raises ``UsageError``."""
         try:
-            return None if self.before is None else self.before.read_bytes()
+            if self.before is None:
+                return None
+            if self.before.exists() and not self.before.is_file():
+                raise UsageError(f"{self.before}: no file; evaluate again")
+            if self.before.stat().st_size > MAX_FRAMES_BYTES:
+                raise UsageError(f"{self.before}: too large for the frames of a recording; evaluate again")
+            return self.before.read_bytes()
         except OSError as error:
             raise UsageError(f"{self.before}: cannot be read ({error.strerror}); evaluate again") from error
 
@@ -66,11 +76,11 @@ def evaluate(task: Task, frames_before: bytes | None = None) -> Done:
     """Replay a recording and score it. What cannot be read is named in the row's ``error``."""
     limit_opencv()
     cv2.setNumThreads(1)
-    row = RecordingRow(task.name, str(task.path), settings=list(task.settings))
+    row = RecordingRow(task.name, printable_name(str(task.path)), settings=list(task.settings))
     try:
         return _evaluate(task, None if frames_before is None else _by_stamp(frames_before), row)
     except LcfError as error:
-        return Done(msgspec.structs.replace(row, error=str(error)))
+        return Done(msgspec.structs.replace(row, error=printable(str(error))))
 
 
 def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: RecordingRow) -> Done:

@@ -1,5 +1,6 @@
 """The report as a page for a browser: one file that shows the pictures beside it, without scripts."""
 
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from html import escape
@@ -59,9 +60,8 @@ def page(result: Report, before: Report | None = None) -> str:
             _section(row, number) for number, row in enumerate(result.recordings, 1) if not row.error
         ),
     }
-    for mark, text in parts.items():
-        template = template.replace(mark, text)
-    return template
+    marks = re.compile("|".join(map(re.escape, parts)))
+    return marks.sub(lambda mark: parts[mark[0]], template)  # at once: a name may look like a mark
 
 
 def _head(result: Report, before: Report | None) -> str:

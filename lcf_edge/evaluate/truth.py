@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
@@ -10,13 +11,19 @@ from lcf_edge.errors import RecordingError
 MIN_BOX_PX = 12.0  # smaller threats need not be found yet
 GROWN_SHARE, GROWN_PX = 0.25, 8.0  # of a box, on each side, within which a circle is on it
 MAX_BYTES = 256 * 2**20
+MAX_LINE_BYTES = 2**20
+MAX_KNOWN = 2_000_000  # pictures and what is in them, some 200 bytes of memory each
+MAX_NAME = 200  # characters
+MAX_PX = 1e6  # of a box, from the picture's corner
+
+_Px = Annotated[float, msgspec.Meta(ge=-MAX_PX, le=MAX_PX)]
 
 
 class Known(msgspec.Struct, frozen=True):
     """Something in a picture. ``box``: x0, y0, x1, y1, px. ``threat``: it is in the way, straight ahead."""
 
-    name: str
-    box: tuple[float, float, float, float]
+    name: Annotated[str, msgspec.Meta(max_length=MAX_NAME)]
+    box: tuple[_Px, _Px, _Px, _Px]
     threat: bool = False
 
     @property
@@ -59,9 +66,26 @@ def read_truth(path: Path | None) -> Truth:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise RecordingError(f"{path}: too large for a file of truth; one line a picture is enough")
-        lines = msgspec.json.Decoder(_Line).decode_lines(path.read_bytes())
+        return Truth(_pictures(path))
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror}); name another file of truth") from error
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path}: {error}; docs/evaluate.md tells what a line of truth holds") from error
-    return Truth({line.stamp_ns: line.objects for line in lines})
+
+
+def _pictures(path: Path) -> dict[int, list[Known]]:
+    decoder = msgspec.json.Decoder(_Line)
+    pictures: dict[int, list[Known]] = {}
+    known = 0
+    with path.open("rb") as file:
+        while text := file.readline(MAX_LINE_BYTES):
+            if len(text) == MAX_LINE_BYTES:
+                raise RecordingError(f"{path}: a line of {MAX_LINE_BYTES} bytes or more; shorten it")
+            if not text.strip():
+                continue
+            line = decoder.decode(text)
+            pictures[line.stamp_ns] = line.objects
+            known += 1 + len(line.objects)
+            if known > MAX_KNOWN:
+                raise RecordingError(f"{path}: more than {MAX_KNOWN} pictures and things in them; cut the recording")
+    return pictures

@@ -3,6 +3,7 @@
 import re
 from pathlib import Path
 
+from drivers.imu import serial_imu
 from lcf_edge.daemon import memory, peers
 from lcf_edge.gate import gate
 from lcf_edge.monitor.web import doorkeeper, server
@@ -36,6 +37,12 @@ def test_what_is_done_about_memory_that_peers_fill() -> None:
     assert peers.CHECK_S == 1 / 20
     assert "twenty times a second" in DOCUMENT
     assert f"sessions beyond {MAX_SESSIONS}" in DOCUMENT
+
+
+def test_the_bounds_of_a_serial_imu() -> None:
+    kilobytes, samples = serial_imu.MAX_BYTES_PER_S // 1000, serial_imu.MAX_SAMPLES_PER_S
+    pieces = serial_imu.MAX_READS_PER_S
+    assert f"{kilobytes} kB, {samples} samples and {pieces} pieces a second; the excess is dropped" in DOCUMENT
 
 
 def test_the_bound_of_videos() -> None:

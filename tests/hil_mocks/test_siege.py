@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 
 from hil_mocks.siege.__main__ import BEYOND_MIB, BUDGET_MIB, MIN_SHARE, Figures, besiege
+from hil_mocks.siege.place import DAEMON_NICE
 
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl here")
@@ -13,11 +14,16 @@ def test_a_short_siege_is_withstood(tmp_path: Path) -> None:
     figures = besiege(4.0, tmp_path, least_share=0.0)  # this machine may be busy
     assert figures.complaints == []
     assert all(waves > 0 for waves in figures.waves.values())
-    assert len(figures.waves) == 11
+    assert len(figures.waves) == 12
+
+
+def test_the_daemons_priority_is_that_of_its_unit() -> None:
+    unit = (Path(__file__).parents[2] / "systemd/lcf-edge.service").read_text(encoding="utf-8")
+    assert f"\nNice={DAEMON_NICE}\n" in unit
 
 
 def test_what_must_not_be_is_complained_of() -> None:
-    figures = Figures(let_in_s=[0.1], descriptors={"daemon": 50}, frames_share=1.0, pages=3)
+    figures = Figures(let_in_s=[0.1], descriptors={"daemon": 50}, frames_share=1.0, pages=3, excess_bytes=1)
     figures.judge(MIN_SHARE)
     assert figures.complaints == []
     figures = Figures(
@@ -27,4 +33,4 @@ def test_what_must_not_be_is_complained_of() -> None:
         frames_share=MIN_SHARE - 0.1,
     )
     figures.judge(MIN_SHARE)
-    assert len(figures.complaints) == 5
+    assert len(figures.complaints) == 6

@@ -23,7 +23,14 @@ from drivers.errors import (
 )
 from drivers.imu import bno08x_rvc, bno08x_uart, csv_line, witmotion, witmotion_ble, xsens
 from drivers.imu.registry import protocols
-from drivers.imu.serial_imu import MAX_NOISE_BYTES, SerialImu, open_port
+from drivers.imu.serial_imu import (
+    MAX_BYTES_PER_S,
+    MAX_NOISE_BYTES,
+    MAX_READS_PER_S,
+    MAX_SAMPLES_PER_S,
+    SerialImu,
+    open_port,
+)
 from drivers.imu.serial_port import ports
 from drivers.imu.settings import ImuSettings
 from drivers.samples import ImuSample
@@ -347,6 +354,66 @@ def test_an_xsens_clock_goes_on_over_the_end_of_its_series(plug: Plug, wrap: int
 
     assert not +device.counts
     device.close()
+
+
+@pytest.mark.parametrize(("name", "encoder"), [("csv", CsvEncoder()), ("xsens", XsensEncoder())])
+def test_an_imu_with_2_khz_loses_nothing(plug: Plug, name: str, encoder: Encoder) -> None:
+    stand_in, clock = plug(encoder), TurnedClock()
+    device = opened(name, stand_in, clock)
+    received = 0
+    for _ in range(3 * 200):
+        stand_in.send(10)
+        clock.now_ns += 5_000_000
+        received += len(read(device, 10))
+    assert received == stand_in.sent
+    assert not +device.counts
+
+
+def test_a_line_that_is_faster_may_carry_more(plug: Plug) -> None:
+    stand_in, clock = plug(ENCODERS["bno08x_uart"]()), TurnedClock()
+    device = opened("bno08x_uart", stand_in, clock)
+    for _ in range(200):
+        stand_in.send(50)  # 320 kB a second
+        clock.now_ns += 5_000_000
+        read(device, 1)
+    assert not device.counts["excess_bytes"]
+
+
+def test_more_bytes_than_any_imu_sends_are_dropped_and_counted(plug: Plug) -> None:
+    stand_in, clock = plug(CsvEncoder()), TurnedClock()  # the clock stands still, but for pauses
+    device = opened("csv", stand_in, clock)
+    begun_ns, sent = clock.now_ns, 1
+    line = b"0,0,0,0,0,0" + b" " * 88 + b"\n"
+    while sent < 2 * MAX_BYTES_PER_S:
+        stand_in.send_bytes(line * 40)
+        sent += 40 * len(line)
+        device.read()
+    parsed, paused_s = sent - device.counts["excess_bytes"], (clock.now_ns - begun_ns) / 1e9
+    assert paused_s > 0.2
+    assert parsed == pytest.approx(MAX_BYTES_PER_S * (1 + paused_s), rel=0.02)
+
+
+def test_more_samples_than_any_imu_makes_are_dropped_and_counted(plug: Plug) -> None:
+    stand_in, clock = plug(CsvEncoder()), TurnedClock()
+    device = opened("csv", stand_in, clock)
+    samples: list[ImuSample] = []
+    for _ in range(200):
+        stand_in.send_bytes(b"0,0,0,0,0,0\n" * 20)
+        clock.now_ns += 2_000_000  # 10,000 a second
+        samples += device.read()
+    assert len(samples) == pytest.approx(1.4 * MAX_SAMPLES_PER_S, abs=20)
+    assert device.counts == {"excess_samples": 4000 - len(samples)}
+
+
+def test_small_pieces_are_read_together(plug: Plug) -> None:
+    stand_in, clock = plug(CsvEncoder()), TurnedClock()
+    device = opened("csv", stand_in, clock)
+    begun_ns = clock.now_ns
+    for byte in b"0,0,0,0,0,0\n" * 100:
+        stand_in.send_bytes(bytes([byte]))
+        device.read()
+    paused_s = (clock.now_ns - begun_ns) / 1e9
+    assert paused_s >= (1200 - 1) / MAX_READS_PER_S - 1
 
 
 def test_rates_of_angles_are_in_seconds_of_the_vehicle(plug: Plug) -> None:

@@ -12,7 +12,7 @@ import pytest
 from drivers.clock import Clock
 from drivers.device import Device
 from drivers.errors import DeviceForbiddenError
-from drivers.samples import Frame
+from drivers.samples import Frame, ImuSample
 from lcf_edge.config import Config
 from lcf_edge.daemon.clock import StoppableClock
 from lcf_edge.daemon.reader import Reader
@@ -135,3 +135,32 @@ def test_a_missing_device_is_reported_once(config: Config, caplog: pytest.LogCap
     with running(reader, clock):
         assert enough.wait(PATIENCE_S)
     assert [record.getMessage() for record in caplog.records] == ["camera: x: unplugged; plug it in again"]
+
+
+class TooMuch:
+    """A device that drops what it cannot take."""
+
+    name = "too much"
+
+    def __init__(self, clock: Clock) -> None:
+        self.counts: Counter[str] = Counter()
+        self._clock = clock
+
+    def read(self) -> list[ImuSample]:
+        self.counts["excess_bytes"] += 1000
+        return [ImuSample(self._clock.monotonic_ns(), (0.0, 0.0, 0.0), (0.0, 0.0, 9.8))]
+
+    def close(self) -> None:
+        pass
+
+
+def test_what_is_dropped_for_being_too_much_is_told_once(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("lcf_edge.daemon.reader._COUNTS_EACH_NS", 0)
+    clock, arrivals = StoppableClock(), Arrivals()
+    reader = Reader("imu", TooMuch, arrivals, clock)
+    with running(reader, clock):
+        arrivals.wait_for_more(3)
+    assert sum("sends more than" in record.getMessage() for record in caplog.records) == 1
+    assert reader.counts["excess_bytes"] >= 3000

@@ -16,6 +16,7 @@ import pytest
 
 from lcf_edge.cli.command_line import main
 from lcf_edge.config import Config
+from lcf_edge.errors import UsageError
 from lcf_edge.evaluate import report
 from lcf_edge.evaluate.one_recording import Task
 from lcf_edge.evaluate.report import FrameLine
@@ -87,9 +88,41 @@ def test_a_second_report_in_the_same_folder_leaves_nothing_of_the_first(corpus: 
 
 
 def test_names_of_recordings_are_text_in_the_page(corpus: Path, tmp_path: Path) -> None:
-    (corpus / "without").rename(corpus / "<script>alert(1)<")
+    (corpus / "without").rename(corpus / "<script>alert(1)<{{RECORDINGS}}")
+    (corpus / "broken.mcap").rename(corpus / os.fsdecode(b"\xff\x1b[31m.mcap"))
     assert main(["evaluate", str(corpus), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
-    Links((tmp_path / "out/index.html").read_text())
+    page = (tmp_path / "out/index.html").read_text()
+    Links(page)
+    assert page.count('<section id="r1">') == 1
+    assert "\x1b" not in page
+    assert r"\udcff\x1b[31m.mcap" in rows(tmp_path / "out")
+
+
+@pytest.mark.parametrize("frames", ["/dev/zero", "../../etc/passwd", "frames/0001.jsonl/../../x", "pictures"])
+def test_a_report_of_others_names_no_file_outside_of_it(
+    corpus: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], frames: str
+) -> None:
+    theirs = tmp_path / "theirs"
+    theirs.mkdir()
+    row = report.RecordingRow("with-truth", "x", frames=frames)
+    told = report.Report(report.FORMAT, "1", "1", "now", "here", [], [row])
+    (theirs / report.FILE).write_bytes(msgspec.json.encode(told))
+    against = ["--against", str(theirs), "--out", str(tmp_path / "out")]
+    assert main(["evaluate", str(corpus / "with-truth"), *against, "--jobs", "1"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert "is no file of frames" in line
+
+
+def test_frames_to_compare_with_are_a_file_of_bounded_size(
+    drive: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pipe, large = tmp_path / "0001.jsonl", tmp_path / "0002.jsonl"
+    os.mkfifo(pipe)
+    large.write_bytes(bytes(11))
+    monkeypatch.setattr("lcf_edge.evaluate.one_recording.MAX_FRAMES_BYTES", 10)
+    for before, told in ((pipe, "no file"), (large, "too large")):
+        with pytest.raises(UsageError, match=told):
+            Task("one", drive, Config(), before=before).frames_before()
 
 
 def test_the_same_again_differs_in_no_frame_and_another_configuration_in_some(

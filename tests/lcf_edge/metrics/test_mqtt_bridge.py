@@ -9,22 +9,38 @@ from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import paho.mqtt.client as mqtt
 import pytest
 
 from lcf_edge.cdr import DiagnosticArray, Header
 from lcf_edge.diagnostics import DeviceStatus, Level
+from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
 
 PATIENCE_S = 30.0
 BRIDGE = Path(__file__).parents[3] / "examples/mqtt_bridge.py"
 
 
-def test_whatever_a_part_is_called_it_makes_a_topic() -> None:
+@pytest.fixture
+def bridge() -> Any:
+    """The example as a module."""
     spec = spec_from_file_location("mqtt_bridge", BRIDGE)
     assert spec
     assert spec.loader
-    bridge = module_from_spec(spec)
-    spec.loader.exec_module(bridge)
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_an_object_of_no_known_class_is_told_as_unknown(bridge: Any) -> None:
+    things = np.zeros(1, OBJECT)
+    things["class_id"], things["state"] = 250, 77
+    empty = np.zeros(0, CIRCLE), np.zeros(0, PSI_REGION)
+    (told,) = json.loads(bridge.objects_message(Scene(1, 1, 64, 48, 1.0, *empty, things)))["objects"]
+    assert (told["class"], told["state"]) == ("unknown", "coasting")
+
+
+def test_whatever_a_part_is_called_it_makes_a_topic(bridge: Any) -> None:
     client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
     for name in ("a/b+c#", "nothing\0more\n\x1b[31m", "long" * 50_000):
         diagnostics = DiagnosticArray(Header(1, ""), "rover", (DeviceStatus(name, Level.OK, ""),))

@@ -5,13 +5,15 @@ import resource
 import shlex
 import socket
 import ssl
+import struct
 import subprocess
 import sys
 import threading
 import time
 import tomllib
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable, Iterable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -336,6 +338,80 @@ def test_strangers_keep_no_planner_out_and_take_a_bounded_number_of_descriptors(
     assert not rover.is_closed()
     mine = len(list(Path("/proc/self/fd").iterdir())) - before
     assert mine < 30, "nothing of theirs has reached the rover"
+
+
+def handshake(gate: Gate, folder: Path, name: str) -> None:
+    """Somebody with a certificate who says nothing after it."""
+    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context.load_cert_chain(folder / f"{name}.pem", folder / f"{name}.key")
+    plain = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+    with suppress(OSError), context.wrap_socket(plain, server_hostname="localhost") as one:
+        one.settimeout(PATIENCE_S)
+        one.recv(1)
+
+
+def slowly(gate: Gate) -> socket.socket:
+    """A handshake that gives one byte and promises a record."""
+    one = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+    one.sendall(b"\x16\x03\x01\x3f\xff")
+    return one
+
+
+def half_open(gate: Gate) -> socket.socket:
+    """Says that nothing more comes, and listens."""
+    one = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+    one.shutdown(socket.SHUT_WR)
+    return one
+
+
+def reset(gate: Gate) -> None:
+    """Comes, and goes with a reset."""
+    one = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+    one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
+    one.close()
+
+
+def test_whoever_else_comes_a_planner_is_let_in(
+    link: Link, rover: zenoh.Session, gate: Gate, party: Any, folder: Path
+) -> None:
+    assert link
+    ends = threading.Event()
+    came: Counter[str] = Counter()
+    held: deque[socket.socket] = deque(maxlen=200)
+
+    def come() -> None:
+        while not ends.is_set():
+            with suppress(OSError):
+                handshake(gate, folder, "stranger")  # another authority's certificate
+                handshake(gate, folder, "unknown")  # ours, of nobody whom the gate knows
+                came["with a certificate"] += 2
+                for _ in range(20):
+                    reset(gate)
+                    for one in (slowly(gate), half_open(gate)):
+                        if len(held) == held.maxlen:
+                            held.popleft().close()
+                        held.append(one)
+                came["others"] += 60
+
+    crowd = threading.Thread(target=come, name="crowd")
+    crowd.start()
+    try:
+        deadline_s = time.monotonic() + 10 * PATIENCE_S
+        while came["others"] < 300 and time.monotonic() < deadline_s:
+            ends.wait(0.01)
+        for _ in range(3):
+            planner = party("planner")
+            assert planner.ask("connected", timeout_s=PATIENCE_S)
+            assert len(planner.get("lcf/query/config")) == 1
+        assert gate.descriptors < MAX_STRANGERS + 2 * 3 + 20
+        assert gate.resident_mib < 80
+    finally:
+        ends.set()
+        crowd.join()
+        for one in held:
+            one.close()
+    assert came["with a certificate"] >= 10
+    assert not rover.is_closed()
 
 
 def test_a_stranger_who_says_nothing_is_let_go(gate: Gate) -> None:
