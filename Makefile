@@ -83,7 +83,7 @@ drive: $(VENV)/.dev $(VENV)/.compiled
 wheels: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.wheels $(MACHINES)
-	$(BIN)/twine check --strict dist/*
+	$(BIN)/twine check --strict dist/*.whl dist/*.tar.gz
 
 bundle: wheels
 	$(BIN)/python -m release.bundle $(MACHINES)

@@ -76,15 +76,15 @@ def environment(machine: str, wheels: Sequence[Path], place: Path) -> None:
     (place / "bin/lcf-edge").write_text(command(f"/{PLACE}/bin/python"), encoding="ascii")
     (place / "bin/lcf-edge").chmod(0o755)
     (place / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n", encoding="ascii")
-    of_all = [wheel for wheel in wheels if wheel.name.partition("-")[0] != "pip" and not _python_of(wheel)]
+    of_all = [wheel for wheel in wheels if wheel.name.partition("-")[0] != "pip" and not python_of(wheel)]
     install(machine, PYTHONS[0], of_all, place / "lib/python3/site-packages")
     for python in PYTHONS:
         packages = place / f"lib/python{python}/site-packages"
-        install(machine, python, [wheel for wheel in wheels if _python_of(wheel) == python], packages)
+        install(machine, python, [wheel for wheel in wheels if python_of(wheel) == python], packages)
         (packages / "lcf-edge.pth").write_text("../../python3/site-packages\n", encoding="ascii")
 
 
-def _python_of(wheel: Path) -> str:
+def python_of(wheel: Path) -> str:
     """The one Python that it fits, as ``3.11``; empty: it fits all."""
     pythons = {tag.abi for tag in parse_wheel_filename(wheel.name)[3] if tag.abi.startswith("cp")}
     return f"3.{pythons.pop().removeprefix('cp3')}" if len(pythons) == 1 else ""

@@ -32,6 +32,15 @@ def try_out(machine: Machine, package: Path) -> str:
 
 def _tried_in(root: Path, name: str) -> str:
     before = _left_in(root)
+    (root / "opt/lcf-edge").mkdir()
+    try:
+        in_root(root, "dpkg", "--install", f"/{name}")
+    except ReleaseError as error:
+        if "first run sudo make uninstall" not in str(error):
+            raise
+    else:
+        raise ReleaseError(f"{name}: it is installed beside what make install has put there")
+    (root / "opt/lcf-edge").rmdir()
     apt(root, "install", f"/{name}")
     in_root(root, "/usr/lib/lcf-edge/bin/python", "-P", "-c", FILTERS)
     in_root(root, "lcf-edge", "--version")
