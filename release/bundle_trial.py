@@ -11,9 +11,7 @@ from release.debian import Machine, ReleaseError, run, unpacked
 
 SUITES = ("bookworm", "trixie")
 PACKAGES = ("python3", "libstdc++6", "libc-bin", "tzdata", "dash", "coreutils", "findutils", "grep", "sed")
-FILTERS = (
-    "from lcf_edge.compilation import extension; import cv2, numpy, zenoh, sys; sys.exit(extension().reason or 0)"
-)
+FILTERS = "from lcf_edge.compilation import extension; import cv2, numpy, zenoh, sys; sys.exit(extension().reason or 0)"
 
 
 def try_out(machine: Machine, archive: Path) -> str:
