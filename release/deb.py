@@ -1,4 +1,4 @@
-"""``python -m release.deb``: a Debian package for each processor, of the wheels of which ``release.bundle`` makes archives.
+"""``python -m release.deb``: a Debian package for each processor, of the same wheels as the archive of ``release.bundle``.
 
 At ``/usr/lib/lcf-edge`` it has a Python environment for all of ``PYTHONS`` at once. Python looks for packages in the
 folder of its own version there: what fits that version alone is in it, and a line leads to what fits all. So nothing is
@@ -18,8 +18,8 @@ from packaging.utils import parse_wheel_filename
 from lcf_edge.errors import LcfError
 from release.bundle import PROJECT, PYTHONS, built, documents, fetch, system_files
 from release.deb_trial import try_out
-from release.debian import Machine, ReleaseError, chosen, get_tools, run
-from release.foreign_pip import OF_DEBIAN_12, command, options_for
+from release.debian import Machine, chosen, get_tools, run
+from release.foreign_pip import OF_DEBIAN_12, command_for, options_for
 
 TOOLS = {"dh_builddeb": "debhelper", "dpkg-architecture": "dpkg-dev", "lintian": "lintian"}
 PLACE = "usr/lib/lcf-edge"
@@ -73,7 +73,7 @@ def environment(machine: str, wheels: Sequence[Path], place: Path) -> None:
     (place / "bin").mkdir(parents=True)
     (place / "bin/python3").symlink_to("/usr/bin/python3")
     (place / "bin/python").symlink_to("python3")
-    (place / "bin/lcf-edge").write_text(command(f"/{PLACE}/bin/python"), encoding="ascii")
+    (place / "bin/lcf-edge").write_text(command_for(f"/{PLACE}/bin/python"), encoding="ascii")
     (place / "bin/lcf-edge").chmod(0o755)
     (place / "pyvenv.cfg").write_text("home = /usr/bin\ninclude-system-site-packages = false\n", encoding="ascii")
     of_all = [wheel for wheel in wheels if wheel.name.partition("-")[0] != "pip" and not python_of(wheel)]

@@ -13,7 +13,7 @@ def options_for(processor: str, python: str, newest_libc: int = OF_TODAY) -> lis
     return [*platforms, "--only-binary=:all:", "--implementation=cp", f"--python-version={python}"]
 
 
-def command(python: str) -> str:
+def command_for(python: str) -> str:
     """The script ``lcf-edge`` for that Python; pip would write it for the one that runs it."""
     return f"#!{python}\nimport sys\n\nfrom lcf_edge.cli.command_line import main\n\nsys.exit(main())\n"
 
