@@ -1,4 +1,4 @@
-"""``python -m release.deb``: a Debian package for each processor, of the same wheels as the archive of ``release.bundle``.
+"""``python -m release.deb``: a Debian package for each processor, of the wheels of which ``bundle`` makes archives.
 
 At ``/usr/lib/lcf-edge`` it has a Python environment for all of ``PYTHONS`` at once. Python looks for packages in the
 folder of its own version there: what fits that version alone is in it, and a line leads to what fits all. So nothing is
