@@ -23,7 +23,7 @@ from release.foreign_pip import OF_DEBIAN_12, command_for, options_for
 
 TOOLS = {"dh_builddeb": "debhelper", "dpkg-architecture": "dpkg-dev", "lintian": "lintian"}
 PLACE = "usr/lib/lcf-edge"
-PACKED = ("-Zxz", "-z6")
+PACKED = ("-Zxz", "-z1")  # more takes minutes for little
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
