@@ -3,7 +3,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 
-.PHONY: demo test test-all test-arm64 compile wheels bundle bench budgets drive hil soak manual lint types clean help install install-program install-files uninstall fuzz siege
+.PHONY: demo test test-all test-arm64 compile wheels bundle deb bench budgets drive hil soak manual lint types clean help install install-program install-files uninstall fuzz siege
 
 help:
 	@echo "make demo   see the filter work on a drive that it renders itself (results in demo-out/)"
@@ -17,6 +17,7 @@ help:
 	@echo "make compile   the filter alone, after a change; demo, test and the others do it themselves"
 	@echo "make wheels as root: wheels for x86-64 and 64-bit Arm, each tried, into dist/ (docs/install.md)"
 	@echo "make bundle as root: archives that install without a network, into dist/ (docs/install.md)"
+	@echo "make deb    as root: Debian packages that install without a network, into dist/ (docs/install.md)"
 	@echo "make fuzz   attack every parser: SECONDS=60 for each (docs/fuzzing.md)"
 	@echo "make siege  the daemon, its gate and its page under attack, on loopback: SECONDS=60"
 	@echo "make manual the manual page and the completions, after a change of the command line"
@@ -82,10 +83,13 @@ drive: $(VENV)/.dev $(VENV)/.compiled
 wheels: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.wheels $(MACHINES)
-	$(BIN)/twine check --strict dist/*
+	$(BIN)/twine check --strict dist/*.whl dist/*.tar.gz
 
 bundle: wheels
 	$(BIN)/python -m release.bundle $(MACHINES)
+
+deb: wheels
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.deb $(MACHINES)
 
 # As root. HIL: what pytest is told. ARCH=arm64: Debian 13 for 64-bit Arm.
 hil: $(VENV)/.dev $(VENV)/.compiled
@@ -147,6 +151,7 @@ install: $(if $(FILES_ONLY),,install-program) install-files
 	fi
 
 install-program:
+	test ! -e "$(IMAGE)/usr/lib/lcf-edge" || { echo "the Debian package is installed: sudo apt remove lcf-edge" >&2; exit 1; }
 	test ! -L "$(PROGRAM)" || { echo "$(PROGRAM) comes from an archive: sudo $(PROGRAM)/setup remove" >&2; exit 1; }
 	umask 022; $(PYTHON) -m venv "$(PROGRAM)"
 	umask 022; "$(PROGRAM)/bin/python" -m pip install --quiet --disable-pip-version-check --require-hashes -r requirements.lock

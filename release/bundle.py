@@ -77,13 +77,10 @@ def pack(machine: str, wheel: Path, wheels: Path, lock: str, folder: Path) -> Pa
         content = Path(place, name)
         shutil.copytree(wheels, content / "wheels")
         shutil.copy(wheel, content / "wheels")
-        shutil.copytree(PROJECT / "docs", content / "doc/docs", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
-        for document in ("README.md", "CHANGELOG.md", "LICENSE"):
-            shutil.copy(PROJECT / document, content / "doc")
+        documents(content / "doc")
+        shutil.copy(PROJECT / "LICENSE", content / "doc")
         shutil.copy(PROJECT / "release/setup.sh", content / "setup")
-        environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
-        files = ("install", "FILES_ONLY=1", f"DESTDIR={content / 'system'}")
-        run("make", *files, folder=PROJECT, environment=environment)
+        system_files(content / "system")
         shutil.rmtree(content / "system/var")  # folders that setup makes
         (content / LOCK).write_text(f"{lock}\n{own}", encoding="utf-8")
         (content / "machine").write_text(f"{machine}\n", encoding="ascii")
@@ -94,6 +91,19 @@ def pack(machine: str, wheel: Path, wheels: Path, lock: str, folder: Path) -> Pa
         with tarfile.open(archive, "w") as tar:
             tar.add(content, name, filter=_plain)
     return archive
+
+
+def documents(folder: Path) -> None:
+    """What there is to read, into ``folder``."""
+    shutil.copytree(PROJECT / "docs", folder / "docs", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    for name in ("README.md", "CHANGELOG.md", "SECURITY.md"):
+        shutil.copy(PROJECT / name, folder)
+
+
+def system_files(root: Path) -> None:
+    """What ``make install`` puts into a system beside the program, into ``root``. Raises ``ReleaseError``."""
+    environment = {key: value for key, value in os.environ.items() if not key.startswith("MAKE")}
+    run("make", "install", "FILES_ONLY=1", f"DESTDIR={root}", folder=PROJECT, environment=environment)
 
 
 def _digest(content: Path) -> str:

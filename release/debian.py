@@ -1,4 +1,4 @@
-"""Debian, unpacked from its packages but not installed: nothing of it has to run, so any processor's will do.
+"""Debian from its packages: unpacked, where nothing of it has to run, or installed.
 
 Needs root for ``mmdebstrap``, as everything else of a release does. Unpacked roots are kept in the folder that
 ``LCF_EDGE_RELEASE_CACHE`` names, or ``~/.cache/lcf-edge/release``.
@@ -64,9 +64,12 @@ def chosen(program: str, about: str | None, made: str, arguments: Sequence[str] 
     return [MACHINES[name] for name in names]
 
 
-def get_tools(machines: Sequence[Machine], target: str = "wheels") -> None:
-    """Install what a target of the Makefile misses. Raises ``ReleaseError`` where that cannot be done."""
-    tools = dict(_TOOLS)
+def get_tools(machines: Sequence[Machine], target: str = "wheels", more: Mapping[str, str] | None = None) -> None:
+    """Install what a target of the Makefile misses. Raises ``ReleaseError`` where that cannot be done.
+
+    ``more``: commands that it needs beside the usual ones, and the packages that bring them.
+    """
+    tools = _TOOLS | dict(more or {})
     for machine in machines:
         tools |= machine.tools
     if not all(machine.is_this for machine in machines):
@@ -98,15 +101,24 @@ def cache() -> Path:
 def unpacked(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
     """A folder with these packages and all that they need, as ``suite`` has them."""
     named = hashlib.sha256(" ".join(packages).encode()).hexdigest()[:8]
+    links = "; ".join(f'mkdir -p "$1/usr/{name}"; ln -s usr/{name} "$1/{name}"' for name in _FOLDERS)
+    return _kept(machine, suite, packages, named, "--variant=extract", f"--setup-hook={links}")
+
+
+def installed(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
+    """A folder with a Debian that has ``apt`` and in which these packages are set up, by its own programs."""
+    named = "apt-" + hashlib.sha256(" ".join(packages).encode()).hexdigest()[:8]
+    return _kept(machine, suite, packages, named, "--variant=apt")
+
+
+def _kept(machine: Machine, suite: str, packages: Sequence[str], named: str, *options: str) -> Path:
     root = cache() / f"{suite}-{machine.debian}-{named}"
     if not root.exists():
         unfinished = root.with_name("unfinished")
         shutil.rmtree(unfinished, ignore_errors=True)
         unfinished.parent.mkdir(parents=True, exist_ok=True)
-        links = "; ".join(f'mkdir -p "$1/usr/{name}"; ln -s usr/{name} "$1/{name}"' for name in _FOLDERS)
-        options = ["--quiet", "--mode=root", "--variant=extract", "--format=directory", f"--setup-hook={links}"]
-        options += [f"--architectures={machine.debian}", f"--include={','.join(packages)}"]
-        run("mmdebstrap", *options, suite, str(unfinished))
+        usual = ("--quiet", "--mode=root", "--format=directory", f"--architectures={machine.debian}")
+        run("mmdebstrap", *usual, *options, f"--include={','.join(packages)}", suite, str(unfinished))
         shutil.rmtree(unfinished / "dev")  # nothing here is a device
         (unfinished / "dev").mkdir()
         unfinished.rename(root)

@@ -13,6 +13,11 @@ def options_for(processor: str, python: str, newest_libc: int = OF_TODAY) -> lis
     return [*platforms, "--only-binary=:all:", "--implementation=cp", f"--python-version={python}"]
 
 
+def command_for(python: str) -> str:
+    """The script ``lcf-edge`` for that Python; pip would write it for the one that runs it."""
+    return f"#!{python}\nimport sys\n\nfrom lcf_edge.cli.command_line import main\n\nsys.exit(main())\n"
+
+
 def locked_for(lock: str, python: str) -> str:
     """The requirements of a lock that are meant for that Python on Linux; pip would ask the Python that runs it."""
     environment = {"python_version": python, "python_full_version": f"{python}.0", "sys_platform": "linux"}

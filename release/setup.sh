@@ -45,6 +45,8 @@ fi
 install_version() {
     test -d "$here/wheels" || fail "$here: not an unpacked archive; run setup in one"
     version=$(cat "$here/version")
+    test ! -e "$root/usr/lib/lcf-edge" ||
+        fail "the Debian package is installed; first run sudo apt remove lcf-edge (it keeps configuration and recordings)"
     test -L "$current" || test ! -e "$current" ||
         fail "$current comes from make install; first run sudo make uninstall in that source (it keeps configuration and recordings)"
     machine=$(cat "$here/machine")

@@ -21,7 +21,7 @@ from lcf_edge.errors import LcfError
 from release import wheels as cross
 from release.debian import EMULATION, MACHINES, ReleaseError, let_run
 from release.elsewhere import installed as python_here
-from release.foreign_pip import OF_DEBIAN_12, locked_for, options_for
+from release.foreign_pip import OF_DEBIAN_12, command_for, locked_for, options_for
 
 PROJECT = Path(__file__).parents[2]
 PACKAGES = (
@@ -96,14 +96,6 @@ install -D -m 644 $stub/i2c-stub.ko -t /lib/modules/$kernel/updates'"""
 """An I2C bus, which Debian's kernel has on x86-64 alone."""
 
 BUILDING_S = 7200.0  # one step at most; emulated ones are slow
-
-_COMMAND = """#!/opt/lcf-edge/bin/python
-import sys
-
-from lcf_edge.cli.command_line import main
-
-sys.exit(main())
-"""
 
 _UNITS = "etc/systemd/system"
 _MASKED = (
@@ -293,7 +285,7 @@ def _install_from_outside(system: System, root: Path, wheels: Path) -> None:
     _do(*install, "--require-hashes", "-r", str(wheels / LOCK))
     with tempfile.TemporaryDirectory() as place:
         _do(*install, str(_cross_compiled(system, Path(place))))
-    (program / "bin/lcf-edge").write_text(_COMMAND, encoding="ascii")
+    (program / "bin/lcf-edge").write_text(command_for("/opt/lcf-edge/bin/python"), encoding="ascii")
     (program / "bin/lcf-edge").chmod(0o755)
     command = root / "usr/local/bin/lcf-edge"
     command.unlink(missing_ok=True)

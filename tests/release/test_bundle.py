@@ -16,6 +16,7 @@ from pathlib import Path
 
 import pytest
 
+from hil_mocks.small_wheel import wheel_of
 from release import bundle
 from release.debian import MACHINES, ReleaseError
 
@@ -24,33 +25,12 @@ HERE = os.uname().machine
 CONFIGURATION = "etc/lcf-edge/config.toml"
 DRIVE = "var/lib/private/lcf-edge/drive.mcap"
 UNIT = "etc/systemd/system/lcf-edge.service"
-PROGRAM = """def main():
-    print("lcf-edge {version}")
-"""
 Pack = Callable[..., Path]
 
 pytestmark = pytest.mark.skipif(
     shutil.which("make") is None or not any(Path(ensurepip.__file__).parent.glob("_bundled/pip-*.whl")),
     reason="no make, or no pip in this Python",
 )
-
-
-def wheel_of(folder: Path, version: str) -> Path:
-    """A wheel of the project's name with one command and one file."""
-    folder.mkdir(parents=True, exist_ok=True)
-    about = f"lcf_edge-{version}.dist-info"
-    files = {
-        "lcf_edge/__init__.py": PROGRAM.format(version=version),
-        f"{about}/METADATA": f"Metadata-Version: 2.1\nName: lcf-edge\nVersion: {version}\n",
-        f"{about}/WHEEL": "Wheel-Version: 1.0\nGenerator: test\nRoot-Is-Purelib: true\nTag: py3-none-any\n",
-        f"{about}/entry_points.txt": "[console_scripts]\nlcf-edge = lcf_edge:main\n",
-    }
-    files[f"{about}/RECORD"] = "".join(f"{name},,\n" for name in [*files, f"{about}/RECORD"])
-    wheel = folder / f"lcf_edge-{version}-py3-none-any.whl"
-    with zipfile.ZipFile(wheel, "w") as archive:
-        for name, text in files.items():
-            archive.writestr(zipfile.ZipInfo(name), text)  # as if made at no time
-    return wheel
 
 
 @pytest.fixture
@@ -181,6 +161,17 @@ def test_a_folder_of_make_install_another_processor_and_another_python_are_refus
     output = setup(place, image, status=1)
     assert "comes from make install; first run sudo make uninstall" in output
     assert output.count("\n") == 1
+
+
+def test_the_debian_package_is_left_alone(pack: Pack, image: Path) -> None:
+    (image / "usr/lib/lcf-edge").mkdir(parents=True)
+    told = setup(pack("1.0"), image, status=1)
+    assert told.startswith("lcf-edge: the Debian package is installed; first run sudo apt remove lcf-edge")
+    assert told.count("\n") == 1
+    make = ("make", "install-program", f"DESTDIR={image}")
+    done = subprocess.run(make, cwd=ROOT, check=False, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert done.stderr.startswith("the Debian package is installed: sudo apt remove lcf-edge\n")
 
 
 def test_make_install_leaves_an_archives_installation_alone(tmp_path: Path) -> None:

@@ -108,9 +108,9 @@ def test_an_uncompiled_filter_is_reported_once_at_the_start(
 def test_after_sigkill_the_next_one_starts(start: Start, manager: Any, endpoint: str) -> None:
     first = start()
     next(iter(scenes(endpoint)))
+    manager.until("READY=1")  # which may come after the first scene
     first.kill()
     first.wait(PATIENCE_S)
-    manager.until("READY=1")
     second = start()
     next(iter(scenes(endpoint)))
     manager.until("READY=1")
@@ -174,20 +174,21 @@ def test_a_clock_that_no_message_can_tell_is_no_end(start: Start, manager: Any, 
     assert said[-1] == "lcf-edge: stopping: SIGTERM"
 
 
-# A stand-in for strangers: whatever opens files in its process, and keeps them.
+# A stand-in for strangers: whatever opens files in its process once the FIFO is written to, as many as there are.
 CROWDED = """
 import os, resource, sys, threading
 from lcf_edge.cli.command_line import main
 
 def crowd():
-    while True:
-        try:
+    open({fifo!r}).close()
+    try:
+        while True:
             os.open(os.devnull, os.O_RDONLY)
-        except OSError:
-            threading.Event().wait(0.1)
+    except OSError:
+        pass
 
 resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
-threading.Timer(2.0, crowd).start()
+threading.Thread(target=crowd).start()
 sys.exit(main(sys.argv[1:]))
 """
 
@@ -195,8 +196,11 @@ sys.exit(main(sys.argv[1:]))
 def test_without_descriptors_it_lives_tells_and_reads_its_configuration(
     start: Start, manager: Any, tmp_path: Path
 ) -> None:
-    daemon = start(program=("-c", CROWDED))
+    fifo = tmp_path / "fifo"
+    os.mkfifo(fifo)
+    daemon = start(program=("-c", CROWDED.format(fifo=str(fifo))))
     manager.until("READY=1")
+    fifo.write_bytes(b"")
     assert daemon.stderr
     said = iter(daemon.stderr.readline, "")
     assert next(line for line in said if "file descriptors" in line)
@@ -205,7 +209,7 @@ def test_without_descriptors_it_lives_tells_and_reads_its_configuration(
     written.replace(tmp_path / "config.toml")  # at once: half a file would be read, and change nothing
     assert next(line for line in said if "reload" in line) == "lcf-edge: reload: changed filter.tr_s\n"
     manager.until("STATUS=")
-    daemon.send_signal(signal.SIGKILL)  # its crowd never ends
+    daemon.send_signal(signal.SIGKILL)
 
 
 def test_two_at_one_port(start: Start, endpoint: str) -> None:
