@@ -32,6 +32,8 @@ class MotionSums:
     ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common`` Σw·σ of the
     rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y, ``b2v1``
     Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+
+    ``expansion``, 1/s, and ``spread``, s²: see ``fit_expansion``.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -42,6 +44,7 @@ class MotionSums:
         self.forward, self.elapsed, self.common = (doubles(capacity) for _ in range(3))
         self.b2v0, self.b4v0, self.b1v1, self.b2v1, self.b0v2 = (doubles(capacity) for _ in range(5))
         self.left, self.top, self.right, self.bottom = (doubles(capacity) for _ in range(4))
+        self.expansion = self.spread = 0.0
 
 
 def clear(sums: MotionSums, k: int) -> None:
@@ -142,45 +145,22 @@ def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
     sums.top[k], sums.bottom[k] = min(sums.top[k], part.top[c]), max(sums.bottom[k], part.bottom[c])
 
 
-def spread_x(sums: MotionSums, k: int) -> float:
-    """Σw·(x - x̄)², s²: 1/σ² of the expansion in width."""
-    return max(sums.xx[k] - sums.x[k] * sums.x[k] / sums.weight[k], MIN_SPREAD)
+def fit_expansion(sums: MotionSums, k: int) -> None:
+    """``expansion``: Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|², and ``spread``, 1/σ² of it, Σw·|x - x̄|².
 
-
-def spread_y(sums: MotionSums, k: int) -> float:
-    """Σw·(y - ȳ)², s²: 1/σ² of the expansion in height."""
-    return max(sums.yy[k] - sums.y[k] * sums.y[k] / sums.weight[k], MIN_SPREAD)
-
-
-def expansion_x(sums: MotionSums, k: int) -> float:
-    """e in width alone, 1/s: Σw·(x - x̄)·(v - v̄) / Σw·(x - x̄)²."""
-    return (sums.xvx[k] - sums.x[k] * sums.vx[k] / sums.weight[k]) / spread_x(sums, k)
-
-
-def expansion_y(sums: MotionSums, k: int) -> float:
-    """e in height alone, 1/s."""
-    return (sums.yvy[k] - sums.y[k] * sums.vy[k] / sums.weight[k]) / spread_y(sums, k)
-
-
-def part_aside(sums: MotionSums, k: int) -> bool:
-    """Whether edges expand otherwise in width than in height: then they are of things that part, or meet, to the side."""
-    wide, tall = expansion_x(sums, k), expansion_y(sums, k)
-    noise = math.sqrt(1 / spread_x(sums, k) + 1 / spread_y(sums, k))
-    return math.fabs(wide - tall) > PARTS_SIGMAS * noise + PARTS_SHARE * max(math.fabs(wide), math.fabs(tall))
-
-
-def spread(sums: MotionSums, k: int) -> float:
-    """1/σ² of the expansion, s²."""
-    tall = spread_y(sums, k)
-    return tall if part_aside(sums, k) else spread_x(sums, k) + tall
-
-
-def expansion(sums: MotionSums, k: int) -> float:
-    """e, 1/s: the mean of those in width and in height by their variances, or what the height tells."""
-    if part_aside(sums, k):
-        return expansion_y(sums, k)
-    middle = (sums.x[k] * sums.vx[k] + sums.y[k] * sums.vy[k]) / sums.weight[k]
-    return (sums.xvx[k] + sums.yvy[k] - middle) / (spread_x(sums, k) + spread_y(sums, k))
+    Where edges expand otherwise in width than in height they are of things that part, or meet, to the side: then the
+    height alone tells.
+    """
+    weight, x, y = sums.weight[k], sums.x[k], sums.y[k]
+    wide, tall = max(sums.xx[k] - x * x / weight, MIN_SPREAD), max(sums.yy[k] - y * y / weight, MIN_SPREAD)
+    parting, growing = sums.xvx[k] - x * sums.vx[k] / weight, sums.yvy[k] - y * sums.vy[k] / weight
+    sums.expansion, sums.spread = growing / tall, tall
+    parting_hz = parting / wide
+    noise = PARTS_SIGMAS * math.sqrt(1 / wide + 1 / tall)
+    share = PARTS_SHARE * max(math.fabs(parting_hz), math.fabs(sums.expansion))
+    if math.fabs(parting_hz - sums.expansion) <= noise + share:
+        sums.spread = wide + tall
+        sums.expansion = (parting + growing) / sums.spread
 
 
 def is_ground(sums: MotionSums, k: int, around: Situation) -> bool:
