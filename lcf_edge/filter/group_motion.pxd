@@ -16,10 +16,11 @@ cdef double LIKE_GROUND
 
 cdef class MotionSums:
     cdef readonly int[::1] count
-    cdef readonly double[::1] weight, x, y, vx, vy, xx, yy, xvx, yvy, focus_x, focus_y, forward, elapsed, common
+    cdef readonly double[::1] weight, x, y, vx, vy, focus_x, focus_y, forward, elapsed, common
     cdef readonly double[::1] b2v0, b4v0, b1v1, b2v1, b0v2
     cdef readonly double[::1] left, top, right, bottom
-    cdef readonly double expansion, spread
+    cdef double[::1] xx, yy, xvx, yvy
+    cdef double expansion, spread
 
 cdef void clear(MotionSums sums, Py_ssize_t k) noexcept nogil
 cdef void add_motion(MotionSums sums, Py_ssize_t k, double weight, double x, double y, double vx, double vy) noexcept nogil

@@ -28,10 +28,10 @@ class MotionSums:
     """Sums over the edges of a circle or an object, a row each; the sums of parts add up to those of the whole.
 
     ``count``: edges. With the weight w = 1/σ_v² of each edge, s²/px²: ``weight`` Σw; ``x``, ``y`` Σw·x of the places
-    halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``xx``, ``yy`` Σw·x², Σw·y²; ``xvx``, ``yvy`` Σw·x·v_x, Σw·y·v_y; ``focus_x``,
-    ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common`` Σw·σ of the
-    rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y, ``b2v1``
-    Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+    halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``xx``, ``yy`` Σw·x², Σw·y²; ``xvx``, ``yvy`` Σw·x·v_x, Σw·y·v_y;
+    ``focus_x``, ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common``
+    Σw·σ of the rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y,
+    ``b2v1`` Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
 
     ``expansion``, 1/s, and ``spread``, s²: see ``fit_expansion``.
     """
