@@ -2,7 +2,8 @@
 
 An edge that was at x' a time T ago and is at x now has the velocity v = (x - x')/T halfway between, with the standard
 deviation √2·σ/T of two places. What its rotation leaves uncertain is common to all and added once. Of a set of edges
-v = v̄ + e·(x - x̄): an object that comes nearer expands by e in all directions, one that goes to the side does not.
+v = v̄ + e·(x - x̄): an object that comes nearer expands by e in all directions, one that goes to the side does not. Two
+that part to the side, taken for one, expand in width alone: then their height tells e.
 """
 
 import math
@@ -16,6 +17,8 @@ from lcf_edge.filter.situation import Situation
 
 FAR_PX = 1e9
 MIN_SPREAD = 1e-9
+PARTS_SIGMAS = 5.0  # of both, by which the expansions in width and in height differ where there is more than one thing,
+PARTS_SHARE = 0.3  # and by this share of the larger
 MIN_GROUND = 4  # edges that tell a plane from what stands upright
 LIKE_GROUND = 0.25  # of the logarithm of a speed: moves no otherwise than the ground does
 GROUND_GAIN = 16.0  # χ² that it must gain, in mean squares of what it leaves
@@ -25,26 +28,30 @@ class MotionSums:
     """Sums over the edges of a circle or an object, a row each; the sums of parts add up to those of the whole.
 
     ``count``: edges. With the weight w = 1/σ_v² of each edge, s²/px²: ``weight`` Σw; ``x``, ``y`` Σw·x of the places
-    halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``square`` Σw·(x² + y²); ``along`` Σw·(x·v_x + y·v_y); ``focus_x``,
-    ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common`` Σw·σ of the
-    rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y, ``b2v1``
-    Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+    halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``xx``, ``yy`` Σw·x², Σw·y²; ``xvx``, ``yvy`` Σw·x·v_x, Σw·y·v_y;
+    ``focus_x``, ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common``
+    Σw·σ of the rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y,
+    ``b2v1`` Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+
+    ``expansion``, 1/s, and ``spread``, s²: see ``fit_expansion``.
     """
 
     def __init__(self, capacity: int) -> None:
         self.count = integers(capacity)
         self.weight, self.x, self.y, self.vx, self.vy = (doubles(capacity) for _ in range(5))
-        self.square, self.along, self.focus_x, self.focus_y = (doubles(capacity) for _ in range(4))
+        self.xx, self.yy, self.xvx, self.yvy = (doubles(capacity) for _ in range(4))
+        self.focus_x, self.focus_y = (doubles(capacity) for _ in range(2))
         self.forward, self.elapsed, self.common = (doubles(capacity) for _ in range(3))
         self.b2v0, self.b4v0, self.b1v1, self.b2v1, self.b0v2 = (doubles(capacity) for _ in range(5))
         self.left, self.top, self.right, self.bottom = (doubles(capacity) for _ in range(4))
+        self.expansion = self.spread = 0.0
 
 
 def clear(sums: MotionSums, k: int) -> None:
     """No edges."""
     sums.count[k] = 0
     sums.weight[k] = sums.x[k] = sums.y[k] = sums.vx[k] = sums.vy[k] = 0.0
-    sums.square[k] = sums.along[k] = sums.focus_x[k] = sums.focus_y[k] = 0.0
+    sums.xx[k] = sums.yy[k] = sums.xvx[k] = sums.yvy[k] = sums.focus_x[k] = sums.focus_y[k] = 0.0
     sums.forward[k] = sums.elapsed[k] = sums.common[k] = 0.0
     sums.b2v0[k] = sums.b4v0[k] = sums.b1v1[k] = sums.b2v1[k] = sums.b0v2[k] = 0.0
     sums.left[k] = sums.top[k] = FAR_PX
@@ -58,8 +65,10 @@ def add_motion(sums: MotionSums, k: int, weight: float, x: float, y: float, vx: 
     sums.y[k] += weight * y
     sums.vx[k] += weight * vx
     sums.vy[k] += weight * vy
-    sums.square[k] += weight * (x * x + y * y)
-    sums.along[k] += weight * (x * vx + y * vy)
+    sums.xx[k] += weight * x * x
+    sums.yy[k] += weight * y * y
+    sums.xvx[k] += weight * x * vx
+    sums.yvy[k] += weight * y * vy
 
 
 def add_edge(
@@ -118,8 +127,10 @@ def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
     sums.y[k] += part.y[c]
     sums.vx[k] += part.vx[c]
     sums.vy[k] += part.vy[c]
-    sums.square[k] += part.square[c]
-    sums.along[k] += part.along[c]
+    sums.xx[k] += part.xx[c]
+    sums.yy[k] += part.yy[c]
+    sums.xvx[k] += part.xvx[c]
+    sums.yvy[k] += part.yvy[c]
     sums.focus_x[k] += part.focus_x[c]
     sums.focus_y[k] += part.focus_y[c]
     sums.forward[k] += part.forward[c]
@@ -134,16 +145,22 @@ def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
     sums.top[k], sums.bottom[k] = min(sums.top[k], part.top[c]), max(sums.bottom[k], part.bottom[c])
 
 
-def spread(sums: MotionSums, k: int) -> float:
-    """Σw·|x - x̄|², s²: 1/σ² of the expansion."""
-    middle = (sums.x[k] * sums.x[k] + sums.y[k] * sums.y[k]) / sums.weight[k]
-    return max(sums.square[k] - middle, MIN_SPREAD)
+def fit_expansion(sums: MotionSums, k: int) -> None:
+    """``expansion``: Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|², and ``spread``, 1/σ² of it, Σw·|x - x̄|².
 
-
-def expansion(sums: MotionSums, k: int) -> float:
-    """e, 1/s: Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|²."""
-    middle = (sums.x[k] * sums.vx[k] + sums.y[k] * sums.vy[k]) / sums.weight[k]
-    return (sums.along[k] - middle) / spread(sums, k)
+    Where edges expand otherwise in width than in height they are of things that part, or meet, to the side: then the
+    height alone tells.
+    """
+    weight, x, y = sums.weight[k], sums.x[k], sums.y[k]
+    wide, tall = max(sums.xx[k] - x * x / weight, MIN_SPREAD), max(sums.yy[k] - y * y / weight, MIN_SPREAD)
+    parting, growing = sums.xvx[k] - x * sums.vx[k] / weight, sums.yvy[k] - y * sums.vy[k] / weight
+    sums.expansion, sums.spread = growing / tall, tall
+    parting_hz = parting / wide
+    noise = PARTS_SIGMAS * math.sqrt(1 / wide + 1 / tall)
+    share = PARTS_SHARE * max(math.fabs(parting_hz), math.fabs(sums.expansion))
+    if math.fabs(parting_hz - sums.expansion) <= noise + share:
+        sums.spread = wide + tall
+        sums.expansion = (parting + growing) / sums.spread
 
 
 def is_ground(sums: MotionSums, k: int, around: Situation) -> bool:

@@ -476,8 +476,8 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
     repeated = NOISE_GAIN * NOISE_GAIN
     if math.isfinite(objects.mm[o]):
         repeated *= max(elapsed_s / around.dt_s, 1.0)
-    rate = group_motion.expansion(wholes, o)
-    variance = 1 / group_motion.spread(wholes, o)
+    group_motion.fit_expansion(wholes, o)
+    rate, variance = wholes.expansion, 1 / wholes.spread
     below = y - focus_y
     if math.fabs(below) > 1:
         # what moves on the ground moves about the horizon

@@ -105,6 +105,27 @@ def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clu
     assert sorted(np.sign(tables.objects.right[rows])) == [-1, 1]
 
 
+@pytest.mark.parametrize(("speed_mps", "aside_mps", "ahead_m"), [(0.5, 0.3, 5.0), (1.0, 0.3, 6.0), (0.3, 0.25, 5.0)])
+def test_two_who_part_before_the_vehicle_come_no_nearer_than_their_height_tells(
+    drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, aside_mps: float, ahead_m: float
+) -> None:
+    """They stand side by side and walk off to both sides: taken for one, they grow in width and not in height."""
+    way = replace(drive(clutter(150)), frames=36, speed_mps=speed_mps)
+    for side in (-1, 1):
+        walker = box((0.22 * side, -0.55, ahead_m), (0.4, 1.7, 0.2), landmarks=50, seed=2 + side)
+        way = way + drive(walker, np.array([aside_mps * side, 0, 0]))
+    told = 0
+    for frame, tables in enumerate(steps(way)):
+        objects = tables.objects
+        left_m = ahead_m - speed_mps * frame / FPS
+        for row in published(objects):
+            told += 1
+            assert objects.looming[row] == pytest.approx(speed_mps / left_m, rel=0.25)
+            assert objects.range[row] > 0.7 * left_m
+            assert objects.probability[row] < 0.3
+    assert told > 20
+
+
 def test_an_object_that_is_not_seen_coasts_keeps_its_id_and_ends(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
