@@ -110,6 +110,6 @@ def _speed(context: Context) -> Finding:
         return ok("calibration", "the speed is taken from the recording, if it has one")
     return warn(
         "calibration",
-        f"the speed is unknown unless {topic} is published: without it there are no ranges",
+        f"speed is unknown unless {topic} is published: without it there are no ranges",
         edit(context.path, '[vehicle] speed_source = "auto", speed_mps = 1.0, its usual speed'),
     )

@@ -29,7 +29,7 @@ def test_defaults_are_warned_of_one_by_one(machine: Machine) -> None:
         "camera.intrinsics",
         "camera.height_m",
         "imu.axes",
-        "nothing",
+        "speed",
     ]
     assert all(finding.level is Severity.WARN and finding.remedy for finding in found)
 
