@@ -39,6 +39,10 @@ def main():
 """
 SETUP_S = 2 * PATIENCE_S
 KEPT = "/opt/of-make-install"
+PUT_BACK = (
+    f"mv {KEPT} /opt/lcf-edge && ln -sfn /opt/lcf-edge/bin/lcf-edge /usr/local/bin/lcf-edge"
+    " && make -C /usr/src/lcf-edge install FILES_ONLY=1"
+)
 
 
 @pytest.fixture(scope="module")
@@ -47,11 +51,7 @@ def free(machine: Machine) -> Iterator[Machine]:
     machine.run(f"systemctl stop {UNIT}; mv /opt/lcf-edge {KEPT}")
     yield machine
     machine.tried("/opt/lcf-edge/setup remove", SETUP_S)
-    machine.run(
-        f"mv {KEPT} /opt/lcf-edge && ln -sfn /opt/lcf-edge/bin/lcf-edge /usr/local/bin/lcf-edge"
-        " && make -C /usr/src/lcf-edge install FILES_ONLY=1",
-        SETUP_S,
-    )
+    machine.run(PUT_BACK, SETUP_S)
 
 
 def unpacked(machine: Machine, folder: Path, version: str, program: str) -> str:
