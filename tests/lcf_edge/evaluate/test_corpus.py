@@ -8,7 +8,7 @@ import pytest
 
 from lcf_edge.errors import RecordingError, UsageError
 from lcf_edge.evaluate.corpus import find
-from lcf_edge.evaluate.pictures import MAX_HEIGHT_PX, draw
+from lcf_edge.evaluate.drawings import MAX_HEIGHT_PX, draw
 from lcf_edge.evaluate.truth import MAX_KNOWN, MAX_LINE_BYTES, MAX_NAME, MAX_PX, read_truth
 
 

@@ -297,7 +297,7 @@ def test_places_in_the_input_frame_are_those_of_the_lens(lens: Lens, x: float, y
 
 
 @given(st.floats(-1e6, 1e6), st.floats(0, 1e6), st.integers(1, 200))
-def test_cells_around_a_place_outside_the_picture_are_none_and_no_others(middle: float, gate: float, cells: int) -> None:
+def test_a_place_outside_the_picture_has_no_cells_around_it(middle: float, gate: float, cells: int) -> None:
     first, last = matching.first_cell(middle, gate, cells), matching.last_cell(middle, gate, cells)
     assert 0 <= first <= cells
     assert -1 <= last < cells
