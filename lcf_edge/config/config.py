@@ -153,7 +153,7 @@ class Filter(Table, frozen=True):
         28.0  # mean absolute grey difference that still is the same corner
     )
     appearance_share: Annotated[float, msgspec.Meta(ge=0.001, le=100)] = (
-        0.5  # and as a share of the corner's own contrast
+        0.25  # and as a share of the corner's own contrast
     )
     key_interval_s: Seconds = 0.05  # least time between key frames of α
     key_motion_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = (

@@ -1,7 +1,8 @@
-"""What a corner looks like: 16 grey samples around it, by which it is known again in the next picture."""
+"""What a corner looks like: 16 grey samples around it, by which it is recognised in the next image."""
 
 from typing import Any, TypeAlias
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 
@@ -14,19 +15,21 @@ RING_PX = (
     (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
 )  # fmt: skip
 MEAN_GREY = 128
+MEAN_PX = 3  # side of the square that a sample is the mean of: less than a px of shift changes it little
 
 _RING = np.array(RING_PX)
 
 
 def appearance(image: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.uint8]:
-    """Grey samples around whole pixels; their mean is moved to 128, so that a change of light is no change.
+    """Grey samples around whole pixels, each the mean of a square; their mean is 128, whatever the light.
 
     ``image``: uint8 (height, width). ``pixel``: int32 (n, 2), x and y, ``BORDER_PX`` or more from the border;
     the caller makes sure of that. Return uint8 (n, 16).
     """
     samples = np.empty((len(pixel), len(RING_PX)), np.uint8)
     width = image.shape[1]
-    sample(np.ascontiguousarray(image).reshape(-1).data, width, pixel.data, (_RING @ (1, width)).data, samples.data)
+    smooth = cv2.blur(image, (MEAN_PX, MEAN_PX))
+    sample(smooth.reshape(-1).data, width, pixel.data, (_RING @ (1, width)).data, samples.data)
     return samples
 
 

@@ -168,6 +168,6 @@ def test_circles_without_trust_and_normal_ones_are_left_out() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_every_driver_wants_a_speed(name: str) -> None:
     world = worlds.make(5).changed(course=Course(0.3), start_mps=1.0)
-    log = drive(world, driver(world, name), pictures=name not in (TRUTH, "blind"))
+    log = drive(world, driver(world, name), with_images=name not in (TRUTH, "blind"))
     assert log.target_mps
     assert all(0 <= target_mps <= world.cruise_mps for target_mps in log.target_mps)
