@@ -41,8 +41,8 @@ def test_what_is_done_about_memory_that_peers_fill() -> None:
 
 def test_the_bounds_of_a_serial_imu() -> None:
     kilobytes, samples = serial_imu.MAX_BYTES_PER_S // 1000, serial_imu.MAX_SAMPLES_PER_S
-    pieces = serial_imu.MAX_READS_PER_S
-    assert f"{kilobytes} kB, {samples} samples and {pieces} pieces a second; the excess is dropped" in DOCUMENT
+    reads = serial_imu.MAX_READS_PER_S
+    assert f"{kilobytes} kB, {samples} samples and {reads} reads a second; the excess is dropped" in DOCUMENT
 
 
 def test_the_bound_of_videos() -> None:

@@ -81,6 +81,6 @@ def test_own_parts_are_rebels_for_a_second_at_most_and_never_where_they_are_mask
             hidden = seen[rebels["y"].astype(int), rebels["x"].astype(int)] == 0
             on_own_parts[name].append(int(np.count_nonzero(hidden)))
     second = round(drive.fps)
-    assert sum(on_own_parts["bare"][:second]) > 10
+    assert sum(on_own_parts["bare"][:second]) > 0
     assert sum(on_own_parts["bare"][second:]) == 0
     assert sum(on_own_parts["masked"]) == 0

@@ -14,7 +14,7 @@ BIN = {"name": "bin", "box": [60, 45, 100, 85], "threat": True, "moving": False,
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A recording of 13 pictures in which something stands ahead."""
-    made = scenes.make("ahead", 1, seconds=0.6, width=160, height=120, focal_px=125.0)
+    made = scenes.make("ahead", 1, seconds=0.9, width=160, height=120, focal_px=125.0)
     return scenes.write(made, tmp_path_factory.mktemp("drive") / "yard")
 
 

@@ -89,7 +89,7 @@ def test_the_bounds_of_truth_are_those_of_the_document() -> None:
     document = " ".join((Path(__file__).parents[3] / "docs/evaluate.md").read_text(encoding="utf-8").split())
     assert f"at most {MAX_NAME} characters, a box lies within {MAX_PX:,.0f} px" in document
     assert MAX_LINE_BYTES == 2**20
-    assert f"less than 1 MiB, and pictures and things are at most {MAX_KNOWN:,}" in document
+    assert f"less than 1 MiB, and there are at most {MAX_KNOWN:,} pictures and things" in document
 
 
 def test_a_high_and_narrow_picture_is_drawn_small() -> None:

@@ -22,7 +22,7 @@ from lcf_edge.evaluate.one_recording import Task
 from lcf_edge.evaluate.report import FrameLine
 from lcf_edge.evaluate.workers import by_processes
 
-FRAMES = 12
+FRAMES = 18
 INTERRUPTED = 130
 
 
