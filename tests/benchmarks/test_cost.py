@@ -1,9 +1,15 @@
 """What counting instructions makes of what valgrind and qemu say."""
 
+import subprocess
+import sys
+from pathlib import Path
+
 import pytest
 
-from benchmarks.cost import CORES, FEW, MANY, Cost, of_a_frame, read_cachegrind, tables
+from benchmarks.cost import CORES, FEW, MANY, PARTS, Cost, frames_run, of_a_frame, read_cachegrind, tables
+from lcf_edge.compilation import uncompiled
 from lcf_edge.errors import LcfError
+from lcf_edge.rendered import scenes
 
 CACHEGRIND = """\
 ==7157== I   refs:      2,430,454,096
@@ -53,3 +59,12 @@ def test_without_a_count_of_64_bit_arm_the_estimate_takes_that_of_x86_64() -> No
     *_, estimate = tables(counted, {"whole": Cost(2e6)})
     *_, without = tables(counted, {})
     assert estimate.rows != without.rows
+
+
+@pytest.mark.skipif(bool(uncompiled()), reason="what is counted is the compiled filter")
+@pytest.mark.parametrize("part", PARTS)
+def test_what_is_counted_runs_and_says_nothing(part: str, tmp_path: Path) -> None:
+    drive = scenes.write(scenes.make("two_crossing", 1, seconds=0.2), tmp_path / "drive")
+    command = [sys.executable, *frames_run(drive, part, 2)]
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=120)
+    assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

@@ -2,8 +2,6 @@
 
 import ast
 import re
-import shlex
-import shutil
 import subprocess
 import sys
 import tomllib
@@ -66,23 +64,42 @@ def test_the_oldest_python_is_that_of_the_package() -> None:
     assert project["requires-python"] == f">={oldest}"
 
 
+INSTANCES = ("front", "tele")
+
+
 @pytest.fixture
 def cameras(blocks: Blocks, tmp_path: Path) -> list[Config]:
     """The configurations of the two daemons."""
     found = []
-    for number, content in enumerate(blocks("docs/several-cameras.md", "toml")):
-        file = tmp_path / f"{number}.toml"
+    for name, content in zip(INSTANCES, blocks("docs/several-cameras.md", "toml"), strict=True):
+        file = tmp_path / f"{name}.toml"
         file.write_text(content, encoding="utf-8")
         found.append(load(file))
     return found
 
 
 def test_two_daemons_share_nothing(cameras: list[Config]) -> None:
-    front, left = cameras
-    assert front.camera.device != left.camera.device
-    assert front.imu.address != left.imu.address
-    assert not set(front.zenoh.listen) & set(left.zenoh.listen)
-    assert front.publish.prefix != left.publish.prefix
+    front, tele = cameras
+    assert front.camera.device != tele.camera.device
+    assert front.imu.address != tele.imu.address
+    assert not set(front.zenoh.listen) & set(tele.zenoh.listen)
+    assert front.publish.prefix != tele.publish.prefix
+    assert front.publish.frame_id != tele.publish.frame_id
+    assert front.publish.robot != tele.publish.robot
+
+
+def test_the_instances_of_the_unit_read_these_files_and_keep_recordings_in_these_folders(
+    cameras: list[Config], blocks: Blocks
+) -> None:
+    text = text_of("several-cameras.md")
+    unit = (ROOT / "systemd/lcf-edge@.service").read_text(encoding="utf-8")
+    started = f"sudo systemctl enable --now {' '.join(f'lcf-edge@{name}' for name in INSTANCES)}\n"
+    assert any(started in block for block in blocks("docs/several-cameras.md", "bash"))
+    for name, config in zip(INSTANCES, cameras, strict=True):
+        of_this = unit.replace("%i", name).replace("%S", "/var/lib")
+        assert f"`/etc/lcf-edge/{name}.toml`:" in text
+        assert f"lcf-edge run -c /etc/lcf-edge/{name}.toml\n" in of_this
+        assert f"WorkingDirectory={config.record.folder}\n" in of_this
 
 
 def test_a_planner_hears_both(cameras: list[Config], blocks: Blocks, endpoint: str) -> None:
@@ -102,21 +119,4 @@ def test_a_planner_hears_both(cameras: list[Config], blocks: Blocks, endpoint: s
             publisher.put(scene)
         assert planner.stdout
         heard = {planner.stdout.readline() for _ in cameras}
-    assert heard == {"front 7 0\n", "left 7 0\n"}
-
-
-def test_the_second_unit_has_its_own_configuration_and_folder(blocks: Blocks, tmp_path: Path) -> None:
-    (block,) = [text for text in blocks("docs/several-cameras.md", "bash") if text.startswith("sed ")]
-    line, _, _ = block.replace("\\\n", "").partition(" |" + " sudo tee")
-    *command, _ = shlex.split(line)
-    unit = subprocess.run(
-        (*command, ROOT / "systemd/lcf-edge.service"), check=True, capture_output=True, text=True
-    ).stdout
-    assert "ExecStart=/opt/lcf-edge/bin/lcf-edge run -c /etc/lcf-edge/left.toml\n" in unit
-    assert "WorkingDirectory=%S/lcf-edge-left\n" in unit
-    assert "StateDirectory=lcf-edge-left\n" in unit
-    if shutil.which("systemd-analyze"):
-        file = tmp_path / "lcf-edge-left.service"
-        file.write_text(unit.replace("/opt/lcf-edge/bin/lcf-edge", "/bin/true"), encoding="utf-8")
-        done = subprocess.run(("systemd-analyze", "verify", file), check=False, capture_output=True, text=True)
-        assert [said for said in done.stderr.splitlines() if file.name in said] == []
+    assert heard == {"front 7 0\n", "tele 7 0\n"}
