@@ -41,24 +41,24 @@ Rows = np.ndarray[Any, np.dtype[np.void]]
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What pictures show without samples: the corners, what is wrong with the last one, whether they stand still.
+    """What images show without samples: the corners, what is wrong with the last image, whether they stand still.
 
-    ``repeats``: the scene before, if the frame is that scene's image once more.
+    ``repeats``: the scene before, if the frame repeats its image.
     """
 
     frame: Frame
     corners: Corners
     cut: int  # corners that were left out because the budget was full
     notes: tuple[str, ...]
-    still: bool | None  # whether the picture has stood still for half a second; None: unknown
-    detect_ns: int  # that the corners took
-    took_ns: int  # that all of it took
+    still: bool | None  # whether the image has stood still for half a second; None: unknown
+    detect_ns: int  # time for the corners
+    took_ns: int  # time for all of it
     repeats: PipelineScene | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """What one frame gave, and how to see what it was made of, which holds until the next frame."""
+    """The result of one frame, and a view of how it was made, which is valid until the next frame."""
 
     scene: PipelineScene
     view: Callable[[], View]
@@ -83,7 +83,7 @@ class Pipeline:
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
         self._image_rotation = ImageRotation(lens)
         self._stillness = Stillness(lens.width, lens.height)
-        self._lost = False  # the last step found too few edges to tell its rotation
+        self._lost = False  # the last step had too few edges for its rotation
         self.filter = LineCircleFilter(config, lens)
         memory, self._plane = config.memory, ImagePlane(lens)
         self._circle_records = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
@@ -188,13 +188,13 @@ class Pipeline:
         return self._scene
 
     def _highest_row(self) -> float:
-        """Row, px, above which all that could be met within the horizon is higher than the vehicle; NaN: unknown."""
+        """Return the row, px, above which all that could be met within the horizon is too high to hit; NaN: unknown."""
         vehicle, camera = self._config.vehicle, self._config.camera
         farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, MIN_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
     def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
-        """The motion, with the rotation by the image where it is not known well."""
+        """Return the motion, with the image's rotation where the gyro does not know it well."""
         if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego
@@ -202,13 +202,13 @@ class Pipeline:
         return ego if turn is None else self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
 
     def _expansion_hz(self) -> float:
-        """Mean V/Z of the normal circles, weighed by their edges; 0 without any."""
+        """Return the mean V/Z of the normal circles, 1/s, weighted by their edges; 0 without any."""
         normal = self.filter.normal
         weight = normal.support * normal.active
         return float(np.abs(normal.expansion) @ weight / max(weight.sum(), 1))
 
     def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
-        """The circles from Tr_s up, rebels first, and the object of each, 0: none."""
+        """Return the circles from Tr_s up, rebels first, and the object id of each, 0: none."""
         records, least = self._circle_records, self._config.filter.tr_s
         records.count = 0
         objects = self.filter.objects.columns
@@ -217,7 +217,7 @@ class Pipeline:
         return records.written(), records.written_owners()
 
     def _objects(self) -> Rows:
-        """The objects from Tr_s up."""
+        """Return the objects from Tr_s up."""
         records = self._object_records
         records.count = 0
         least = self._config.filter.tr_s
@@ -231,7 +231,7 @@ class Pipeline:
         return records.written()
 
     def view(self) -> View:
-        """What the last scene was made of, for those who draw it."""
+        """Return what the last scene was made of, for drawing."""
         corners, omitted = self._last_corners
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
@@ -252,7 +252,7 @@ class Pipeline:
 
 
 def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
-    """The scene of an image that comes once more: as it was, with contacts nearer by the time that has passed."""
+    """Return the scene of a repeated image: as it was, with contacts nearer by the time that has passed."""
     passed_s = (look.frame.stamp_ns - scene.stamp_ns) / 1e9
     return replace(
         scene,
@@ -266,14 +266,14 @@ def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
 
 
 def _nearer(rows: Rows, passed_s: float) -> Rows:
-    """The same circles or objects, so much later."""
+    """Return the same circles or objects, later by so many seconds."""
     rows = rows.copy()
     rows["ttc"] = np.maximum(rows["ttc"] - np.float32(passed_s), 0)
     return rows
 
 
 def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:
-    """Coordinates, (n,) each, side by side."""
+    """Stack coordinates, (n,) each, as (n, 2)."""
     return np.stack(coordinates, axis=1).astype(np.float32)
 
 

@@ -1,8 +1,8 @@
 """Corners that only mark a place along an edge: the grey values around them change in one direction alone.
 
-FAST takes the steps of a slanting line for corners. They keep station while the line passes by, and so look like
+FAST takes the steps of a slanting line for corners. They keep their place while the line passes, and so look like
 something that drives ahead. The structure tensor around a corner, the sum of g gᵀ over the gradients g of its
-surroundings, distinguishes them: of its two eigenvalues the smaller is next to nothing along an edge (Harris and
+surroundings, distinguishes them: along an edge, the smaller of its two eigenvalues is almost zero (Harris and
 Stephens 1988; Shi and Tomasi 1994).
 """
 

@@ -1,4 +1,4 @@
-"""From a picture to corners: FAST, but for those along an edge; spread over the picture, with looks."""
+"""From an image to corners: FAST without places along an edge, spread over the image, with their appearance."""
 
 import math
 
@@ -10,27 +10,30 @@ from lcf_edge.corners.along_edge import keep_round
 from lcf_edge.corners.appearance import BORDER_PX, appearance
 from lcf_edge.corners.fast import Fast, Found, Grey, Parts, Pixels, Strengths
 from lcf_edge.corners.fast_threshold import FollowingThreshold
-from lcf_edge.corners.spread import Squares, find_poor, keep_spread, keep_strongest, leave_poor
+from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, keep_spread, keep_strongest, leave_poor
 from lcf_edge.filter.inputs import Corners
 from lcf_edge.filter.memory import memory_of
 from lcf_edge.lens import Lens
 
-SQUARES = 192  # that a picture is divided into, about
-MOST = 4.0  # times the mean: no square has more corners
+SQUARES = 192  # approximate number that an image is divided into
+MOST = 4.0  # times the mean: most corners of a square
 FEW = 2  # a square with fewer is poor
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
+CLOSE_PX = 3  # corners as close as this are mistaken for each other if they look alike
 THRESHOLDS = (13, 90)
-WEAKEST = THRESHOLDS[0]  # what is fainter still is noise as often as not
-ROWS_ABOVE = 2  # of squares: what can be met may begin so much higher than is thought
-WEAK_SHARE = 0.5  # of the wanted corners may be looked at there
+WEAKEST = THRESHOLDS[0]  # half of what is fainter is noise
+DARK = 48  # grey level; what reflects little has few levels between its parts, and less noise
+DARK_SHARE = 0.6  # of the faint threshold, which is enough there
+ROWS_ABOVE = 2  # of squares: margin for how high things that can be met may reach
+WEAK_SHARE = 0.5  # of the wanted corners, at most, come from there
 
 
 class CornerDetector:
-    """FAST-9 corners of one size of picture, at most ``capacity`` a frame.
+    """FAST-9 corners of one size of image, at most ``capacity`` a frame.
 
     With ``fast_adaptive`` about ``corners_target`` are found, by a threshold that follows the scene; no part of the
-    picture has more than its share, and where there are next to none a lower threshold looks again. All of it depends
-    on the pictures so far and nothing else. ``visible``: where corners are wanted, (height, width), elsewhere 0; None:
+    image has more than its share, and where there are next to none a lower threshold looks again. All of it depends
+    on the images so far and nothing else. ``visible``: where corners are wanted, (height, width), elsewhere 0; None:
     everywhere.
     """
 
@@ -53,17 +56,17 @@ class CornerDetector:
 
     @property
     def threshold(self) -> int:
-        """Of the next frame, grey levels."""
+        """Threshold of the next frame, grey levels."""
         return self._strong.value
 
     def detect(self, image: Grey, highest_row: float = math.nan) -> tuple[Corners, int]:
-        """Corners of a (height, width) picture, and how many were left out because the budget was full.
+        """Corners of a (height, width) image, and how many were left out because the budget was full.
 
         ``highest_row``: px, above it nothing can be met, and faint corners are not looked for; NaN: unknown.
         """
         image = np.ascontiguousarray(image)
         self._fast.look(image)
-        pixel, strength = self._look(image, self._strong, self._whole)
+        pixel, strength = self._look(image, self._strong.value, self._whole)
         if self._settings.fast_adaptive:
             pixel, strength = self._shared_out(image, pixel, strength, highest_row)
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
@@ -76,30 +79,40 @@ class CornerDetector:
             pixel, position = pixel.take(kept, axis=0), position.take(kept, axis=0)
         return Corners(pixel, position, appearance(image, pixel)), evicted
 
-    def _look(self, image: Grey, threshold: FollowingThreshold, parts: Parts) -> Found:
-        """Corners of parts of the picture, but for those along an edge."""
+    def _look_for_faint(self, image: Grey, parts: Parts) -> Found:
+        """Return the corners of poor parts of the image: on what is dark, also fainter ones."""
+        pixel, strength = self._look(image, round(DARK_SHARE * self._weak.value), parts)
+        kept = (image[pixel[:, 1], pixel[:, 0]] < DARK) | (strength >= self._weak.value)
+        return pixel[kept], strength[kept]
+
+    def _look(self, image: Grey, threshold: int, parts: Parts) -> Found:
+        """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
         within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
-        pixel, strength = self._fast.corners(threshold.value, within)
+        pixel, strength = self._fast.corners(threshold, within)
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
         if least := self._settings.least_roundness:
             count = keep_round(image.reshape(-1).data, image.shape[1], pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]
+        if self._settings.fast_adaptive:
+            samples, beaten = appearance(image, pixel), np.empty(len(pixel), np.uint8)
+            count = keep_distinct(pixel.data, strength.data, samples.data, beaten.data, CLOSE_PX)
+            pixel, strength = pixel[:count], strength[:count]
         return pixel, strength
 
     def _shared_out(self, image: Grey, pixel: Pixels, strength: Strengths, highest_row: float) -> Found:
-        """No square has more than its share; the poor ones are looked at again."""
+        """Limit every square to its share, and search poor ones again."""
         squares = self._squares
         pixel, strength = strongest(squares, pixel, strength, self._most)
         found = 0
-        if self._weak.value < self._strong.value:  # else it would find what has been found
+        if self._weak.value < self._strong.value:  # else it would find the same again
             first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
             square = np.empty(len(pixel), np.int32)
             poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
-            faint, how_faint = self._look(image, self._weak, self._rectangles[:poor])
+            faint, how_faint = self._look_for_faint(image, self._rectangles[:poor])
             found = len(faint)
-            if found:  # also what is in the poor ones, again
+            if found:  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, square.data)
                 faint, how_faint = strongest(squares, faint, how_faint, FEW)
                 pixel, strength = np.concatenate([pixel[:rich], faint]), np.concatenate([strength[:rich], how_faint])
@@ -108,7 +121,7 @@ class CornerDetector:
         return pixel, strength
 
     def _touched(self, visible: Grey | None) -> npt.NDArray[np.uint8]:
-        """Which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
+        """Return which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
         rows, columns, side = self._squares.rows, self._squares.columns, self._squares.side_px
         if visible is None:
             return np.ones((rows, columns), np.uint8)
@@ -132,5 +145,5 @@ def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capac
 
 
 def side_px(width: int, height: int) -> int:
-    """Of ``SQUARES`` squares that divide a picture."""
+    """Return the side, px, of about ``SQUARES`` squares that divide an image."""
     return max(round(math.sqrt(width * height / SQUARES)), 1)

@@ -1,7 +1,7 @@
-"""FAST-9 corners of parts of a picture, with several thresholds.
+"""FAST-9 corners of parts of an image, with several thresholds.
 
 The compiled ``fast_scores`` looks at each pixel once for all of them, and its corners are arrays from the beginning:
-OpenCV's would take longer to be made objects of Python, and numbers again, than to be found. Uncompiled they come from
+converting OpenCV's to Python objects and back to numbers would take longer than finding them. Uncompiled they come from
 OpenCV, which finds the same.
 """
 
@@ -24,24 +24,24 @@ _REACH_PX = max(max(pixel) for pixel in RING_PX)
 
 
 class Fast:
-    """FAST-9 with non-maximum suppression, for one size of picture; ``compiled``: None: as the filter is."""
+    """FAST-9 with non-maximum suppression, for one size of image; ``compiled``: None: as the filter is."""
 
     def __init__(self, width: int, height: int, *, compiled: bool | None = None) -> None:
         self._image = np.empty((0, 0), np.uint8)
         self._scores = None
         if not uncompiled() if compiled is None else compiled:
             self._scores = Scores(width, height)
-            self._pixel = np.empty((width * height, 2), np.int32)  # what is not written takes no memory
+            self._pixel = np.empty((width * height, 2), np.int32)  # untouched pages take no memory
             self._strength = np.empty(width * height, np.float32)
 
     def look(self, image: Grey) -> None:
-        """Take the next picture, contiguous (height, width), which must not change until its corners are found."""
+        """Take the next image, contiguous (height, width), which must not change until its corners are found."""
         self._image = image
         if self._scores is not None:
             bound(self._scores, image.reshape(-1).data)
 
     def corners(self, threshold: int, parts: Parts) -> Found:
-        """Corners of parts of the picture, part by part and row by row; 3 px or more inside the picture."""
+        """Corners of parts of the image, part by part and row by row; 3 px or more inside the image."""
         if self._scores is None:
             return self._by_opencv(threshold, parts)
         pixel, strength = self._pixel, self._strength
@@ -50,7 +50,7 @@ class Fast:
         return pixel[:count].copy(), strength[:count].copy()
 
     def _by_opencv(self, threshold: int, parts: Parts) -> Found:
-        """The same, slower."""
+        """Return the same, more slowly."""
         fast = cv2.FastFeatureDetector.create(threshold, True, cv2.FAST_FEATURE_DETECTOR_TYPE_9_16)
         pixel, strength = [np.empty((0, 2), np.int32)], [np.empty(0, np.float32)]
         for left, top, right, bottom in np.add(parts, (-_REACH_PX, -_REACH_PX, _REACH_PX, _REACH_PX)).tolist():

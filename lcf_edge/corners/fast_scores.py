@@ -4,9 +4,9 @@ Of the 16 pixels of a ring around it, 9 in a row are all brighter than it, or al
 score is the largest difference that all 9 of one such arc have; a corner's is above the threshold, and above those of
 the 8 pixels around.
 
-First ``bound`` gives each pixel of a picture a score that its own cannot exceed, which takes no branch and is done for
+First ``bound`` gives each pixel of an image a score that its own cannot exceed, which takes no branch and is done for
 many pixels at once. Then ``find`` takes the few for which it is above the threshold, puts their true scores in its
-place, and says which are corners: for as many parts of the picture and thresholds as one likes.
+place, and says which are corners: for any number of parts of the image and thresholds.
 """
 
 from typing import Any, TypeAlias
@@ -23,12 +23,12 @@ RING_PX = (
     (0, -3), (-1, -3), (-2, -2), (-3, -1), (-3, 0), (-3, 1), (-2, 2), (-1, 3),
 )  # fmt: skip
 REACH_PX = 3
-BLOCK = 256  # pixels that are scored together
+BLOCK = 256  # pixels scored at once
 LOW_BITS, HIGH_BITS, ONES = 0x7F7F7F7F7F7F7F7F, 0x8080808080808080, 0x0101010101010101  # of 8 octets in a word
 
 
 class Scores:
-    """Of the pixels of one size of picture, row after row.
+    """Scores of the pixels of an image, row after row, and work space.
 
     ``plane``: uint8, of each pixel, or a bound of it; ``words``: the same memory, 8 pixels each; ``above``: int32,
     the pixels above a threshold; ``ring``: how much farther on each of the 16 lies. ``around``, ``least``,
@@ -45,10 +45,10 @@ class Scores:
 
 
 def bound(scores: Scores, image: Column) -> None:
-    """Give each pixel of a picture, uint8, the most that its score can be.
+    """Give each pixel of an image, uint8, the most that its score can be.
 
-    Each arc of 9 has one of every two pixels that lie opposite each other: as bright as the brighter ones of them is
-    the most that an arc can be. The last ``REACH_PX`` rows and columns are of no meaning.
+    Each arc of 9 contains one of every two opposite pixels, so it cannot be brighter than the brighter of each pair.
+    The last ``REACH_PX`` rows and columns have no meaning.
     """
     plane, down = scores.plane, scores.width
     for at in range(REACH_PX * down + REACH_PX, image.shape[0] - REACH_PX * down - REACH_PX):
@@ -65,7 +65,7 @@ def bound(scores: Scores, image: Column) -> None:
 
 
 def find(scores: Scores, image: Column, threshold: int, parts: Grid, pixel: Grid, strength: Column) -> int:
-    """Find the corners of parts of a picture whose pixels have their ``bound``, part by part, row by row.
+    """Find the corners of parts of an image whose pixels have their ``bound``, part by part, row by row.
 
     ``parts``: int32 (n, 4), left, top, right, bottom, px, the last two beyond it, at least ``REACH_PX`` inside. What
     lies outside of a part does not keep a pixel from being a corner. Written are ``pixel``, int32 (m, 2), x and y, and
@@ -154,7 +154,7 @@ def is_peak(scores: Scores, x: int, y: int, left: int, top: int, right: int, bot
     """Whether the score of a pixel of a part is above those of all 8 around that are in it."""
     at = y * scores.width + x
     score = scores.plane[at]
-    if left < x < right - 1 and top < y < bottom - 1:  # as nearly all
+    if left < x < right - 1 and top < y < bottom - 1:  # true for nearly all
         above, below = at - scores.width, at + scores.width
         most = max(scores.plane[above - 1], scores.plane[above], scores.plane[above + 1], scores.plane[at - 1])
         most = max(scores.plane[below - 1], scores.plane[below], scores.plane[below + 1], scores.plane[at + 1], most)

@@ -2,7 +2,7 @@
 
 
 class FollowingThreshold:
-    """Grey levels, kept within ``least`` and ``most`` once it follows."""
+    """A threshold in grey levels, kept within ``least`` and ``most`` once it follows."""
 
     def __init__(self, value: int, least: int, most: int) -> None:
         self.value = value
@@ -10,9 +10,9 @@ class FollowingThreshold:
         self._too_many: bool | None = None  # in the last frame
 
     def follow(self, ratio: float) -> None:
-        """Take next frame's threshold; ``ratio``: how many corners were found to how many are wanted.
+        """Adapt the threshold for the next frame; ``ratio``: corners found to corners wanted.
 
-        Corner counts fall with its 1.5th to 8th power: a step suits 2.5, and 5 when the last one went too far.
+        Corner counts fall with its 1.5th to 8th power: a step assumes 2.5, and 5 when the last one went too far.
         """
         swung = self._too_many not in {None, ratio > 1}
         self._too_many = ratio > 1

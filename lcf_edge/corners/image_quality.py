@@ -1,4 +1,4 @@
-"""What is wrong with a picture, in a word: few corners, dark, glare, blurred."""
+"""What is wrong with an image, in a word or two: few corners, dark, glare, blurred."""
 
 import cv2
 import numpy as np
@@ -7,22 +7,22 @@ import numpy.typing as npt
 FEW_CORNERS = 40
 DARK = 25  # mean grey level
 BURNT_OUT = 250  # grey level of a pixel
-GLARE_SHARE = 0.2  # of the picture is burnt out
+GLARE_SHARE = 0.2  # of the image that is burnt out
 BLURRED = 0.65  # of the usual sharpness
-MEMORY = 0.05  # share by which each picture changes what is usual
+MEMORY = 0.05  # share by which each image changes the usual sharpness
 GREY_STEP_PX, LINE_STEP_PX = 8, 32  # of the samples
 
 Grey = npt.NDArray[np.uint8]
 
 
 class ImageQuality:
-    """Follows the pictures of one camera: what is sharp for one lens is soft for another."""
+    """Follows the images of one camera, because lenses differ in sharpness."""
 
     def __init__(self) -> None:
         self._typical: float | None = None  # sharpness
 
     def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
-        """What degrades this (height, width) picture, in which so many corners were found; most often nothing."""
+        """Return what degrades this (height, width) image, in which that many corners were found; usually nothing."""
         grey = image[::GREY_STEP_PX, ::GREY_STEP_PX]
         notes: list[str] = []
         if not corners:
@@ -42,9 +42,9 @@ class ImageQuality:
 
 
 def sharpness(image: Grey) -> float:
-    """How much of what differs over 4 px differs over 1 px already, squared: 1/4 of steps, 1/16 of long ramps.
+    """Return the mean square difference over 1 px as a share of that over 4 px: 1/4 for steps, 1/16 for long ramps.
 
-    The lesser of rows and columns, as motion blurs one direction alone.
+    The smaller of rows and columns, because motion blurs one direction only.
     """
     rows = image[LINE_STEP_PX // 2 :: LINE_STEP_PX]
     columns = np.ascontiguousarray(image[:, LINE_STEP_PX // 2 :: LINE_STEP_PX].T)
@@ -52,7 +52,7 @@ def sharpness(image: Grey) -> float:
 
 
 def _fine_share(lines: Grey) -> float:
-    """``lines``: uint8 (n, length), each along a row or a column of the picture."""
+    """``lines``: uint8 (n, length), each along a row or a column of the image."""
     if lines.shape[0] == 0 or lines.shape[1] <= 4:
         return 1.0
     near, far = _square_difference(lines, 1), _square_difference(lines, 4)
@@ -60,6 +60,6 @@ def _fine_share(lines: Grey) -> float:
 
 
 def _square_difference(lines: Grey, apart: int) -> float:
-    """Mean over all places."""
+    """Return the mean square difference of pixels ``apart`` px apart, squared grey levels."""
     count = lines.shape[0] * (lines.shape[1] - apart)
     return float(cv2.norm(lines[:, apart:], lines[:, :-apart], cv2.NORM_L2SQR) / count)

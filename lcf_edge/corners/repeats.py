@@ -1,14 +1,14 @@
-"""Whether an image is the one before once more, as slow cameras and recorders at a fixed rate deliver them."""
+"""Whether an image repeats the one before, as slow cameras and recorders at a fixed rate deliver them."""
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 STEP_PX = 4  # of the samples, along rows and columns
-MAX_CHANGE = 0.25  # mean grey levels; what a coder adds to a copy is less, the noise of a camera more
-MAX_SHARE = 0.05  # of the change that is usual
-MEMORY = 0.2  # share by which each new picture changes what is usual
-MAX_REPEAT_S = 0.25  # an image that stays longer shows a scene that stands still
+MAX_CHANGE = 0.25  # mean grey levels; coding noise in a copy is less, camera noise more
+MAX_SHARE = 0.05  # of the usual change
+MEMORY = 0.2  # share by which each new image changes the usual change
+MAX_REPEAT_S = 0.25  # an image that stays longer shows a still scene
 
 Grey = npt.NDArray[np.uint8]
 
@@ -24,7 +24,7 @@ class Repeats:
     def is_repeat(self, stamp_ns: int, image: Grey) -> bool:
         """Take an image, uint8 (height, width). Return whether it shows nothing since the last new one.
 
-        Only where the images change: of a scene that stands still before a camera without noise, all are new.
+        Only while images change: if a camera without noise sees a still scene, all images are new.
         """
         samples = np.ascontiguousarray(image[::STEP_PX, ::STEP_PX])
         if self._last is None or self._last.shape != samples.shape:

@@ -1,5 +1,9 @@
 cimport cython
+from libc.stdlib cimport abs
 
+cdef int MEAN_GREY
+cdef int NOISE
+cdef double ALIKE_SHARE
 cdef int LEAVES
 
 cdef class Squares:
@@ -8,6 +12,11 @@ cdef class Squares:
     cdef readonly unsigned char[::1] poor
     cdef readonly int[:, ::1] rectangles
 
+@cython.locals(kept=cython.int)
+cpdef int keep_distinct(int[:, ::1] pixel, float[::1] strength, const unsigned char[:, ::1] samples,
+                        unsigned char[::1] beaten, int reach) noexcept nogil
+@cython.locals(differences=cython.int, one=cython.int, other=cython.int, s=cython.int)
+cdef bint look_alike(const unsigned char[:, ::1] samples, Py_ssize_t i, Py_ssize_t k) noexcept nogil
 cdef void count(Squares squares, const int[:, ::1] pixel, int[::1] square) noexcept nogil
 cdef void gather(Squares squares, const int[::1] square, int[::1] listed) noexcept nogil
 cdef int place_in_square(Squares squares, int s, int i, const float[::1] strength, const int[::1] listed,

@@ -1,7 +1,8 @@
-"""The picture in squares: which corners are kept, and where there are too few.
+"""Which corners are kept, and where there are too few.
 
-A hedge, a row of trees or printed paint has more corners than all the rest and would take them all; something dark
-before a bright sky has none that are as strong.
+Of corners that lie close and look alike the next image mistakes one for the other, so only the strongest is kept. A
+hedge, a row of trees or printed paint has more corners than all the rest, and would use up the budget; something dark
+before a bright sky has none that strong. So the image is divided into squares.
 """
 
 from typing import Any, TypeAlias
@@ -10,13 +11,16 @@ from lcf_edge.filter.memory import integers, octets
 
 Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
 Grid: TypeAlias = Any  # and [i, j]
-LEAVES = -1  # the square of a corner that is one too many
+MEAN_GREY = 128  # of an appearance
+NOISE = 3  # grey levels
+ALIKE_SHARE = 0.6  # of the contrast; at half of it one is taken for the other
+LEAVES = -1  # in place of a square: the corner is surplus
 
 
 class Squares:
-    """The squares of one size of picture, row after row.
+    """The squares of one size of image, row after row.
 
-    ``begin``: of each square, where its corners begin in a list of all, square after square, or how many it has;
+    ``begin``: of each square, where its corners begin in the list ordered by squares, or how many it has;
     ``poor``: uint8, 1 where there are few; ``rectangles``: int32 (n, 4), left, top, right, bottom, px,
     the last two beyond it; as many in use as ``find_poor`` says.
     """
@@ -27,6 +31,41 @@ class Squares:
         self.begin = integers(self.rows * self.columns + 1)
         self.poor = octets(self.rows * self.columns)
         self.rectangles = integers(self.rows * self.columns, 4)
+
+
+def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, reach: int) -> int:
+    """Move the corners without a stronger one that lies close and looks alike to the front, in the same order.
+
+    Of equals the first stays. Close: no more than ``reach`` px away, both across and down. ``pixel``: int32 (n, 2),
+    part by part of an image, row by row; parts do not rival each other. ``samples``: uint8 (n, 16), the appearances.
+    ``beaten``: uint8 (n,), written. Return how many are kept.
+    """
+    corners = pixel.shape[0]
+    for i in range(corners):
+        beaten[i] = 0
+    for i in range(corners):
+        for k in range(i + 1, corners):
+            across, down = pixel[k, 0] - pixel[i, 0], pixel[k, 1] - pixel[i, 1]
+            if down < 0 or down > reach:
+                break
+            if -reach <= across <= reach and look_alike(samples, i, k):
+                beaten[i if strength[k] > strength[i] else k] = 1
+    kept = 0
+    for i in range(corners):
+        if not beaten[i]:
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            kept += 1
+    return kept
+
+
+def look_alike(samples: Grid, i: int, k: int) -> bool:
+    """Whether two appearances differ by less than noise and a share of the higher one's contrast."""
+    differences = one = other = 0
+    for s in range(16):
+        differences += abs(samples[i, s] - samples[k, s])
+        one += abs(samples[i, s] - MEAN_GREY)
+        other += abs(samples[k, s] - MEAN_GREY)
+    return bool(differences < 16 * NOISE + ALIKE_SHARE * max(one, other))
 
 
 def count(squares: Squares, pixel: Grid, square: Column) -> None:
@@ -66,7 +105,7 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, listed: Column,
     ``listed``, ``place``: int32 (n,), written; ``capacity``: n at most.
     """
     count(squares, pixel, place)
-    last, fit = 0, 0  # places in a square for which there is room, and corners in them
+    last, fit = 0, 0  # ranks within a square that fit, and corners of these ranks
     while fit < capacity:
         last += 1
         fit = 0
@@ -107,7 +146,7 @@ def keep_strongest(squares: Squares, pixel: Grid, strength: Column, listed: Colu
     gather(squares, square, listed)
     for i in range(pixel.shape[0]):
         s = square[i]
-        if squares.begin[s + 1] - squares.begin[s] > share:  # where there are fewer, all stay
+        if squares.begin[s + 1] - squares.begin[s] > share:  # with fewer, all stay
             leaves = place_in_square(squares, s, i, strength, listed, share) >= share
             square[i] = LEAVES if leaves else s
     kept = 0

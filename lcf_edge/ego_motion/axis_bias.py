@@ -4,9 +4,9 @@ import math
 
 PRIOR_RADPS = 0.2  # 1 sigma of an unknown bias: an MPU-6050's 20 °/s are 0.35
 PRIOR_VARIANCE = PRIOR_RADPS * PRIOR_RADPS
-DRIFT_RADPS = 1e-3  # 1 sigma of what the bias wanders in a second
-FLOW_TIME_S = 10.0  # for which s lasts
-OUTLIER = 4.0  # sigmas by which an observation may be off
+DRIFT_RADPS = 1e-3  # 1 sigma of the bias's drift in a second
+FLOW_TIME_S = 10.0  # correlation time of s
+OUTLIER = 4.0  # sigmas beyond which an observation is an outlier
 MIN_VARIANCE = 1e-12
 
 
@@ -24,8 +24,8 @@ class AxisBias:
         self.bias_bias, self.flow_flow, self.noise_noise = PRIOR_VARIANCE, flow_radps * flow_radps, 0.0
         self.bias_flow = self.bias_noise = self.flow_noise = 0.0
         self.with_bias = self.with_flow = self.with_noise = 0.0  # covariance of what is observed with each state
-        self.off = 0.0  # what is observed, less what was expected
-        self.variance = 1.0  # of that
+        self.off = 0.0  # innovation: observed less expected
+        self.variance = 1.0  # of the innovation
 
     def sigma(self) -> float:
         """1 sigma of b."""
@@ -42,22 +42,22 @@ class AxisBias:
         return math.sqrt(max(variance, MIN_VARIANCE))
 
     def forget(self) -> None:
-        """The bias may be any."""
+        """Forget the bias: it may have any value."""
         self.bias_bias = PRIOR_VARIANCE
         self.bias_flow = self.bias_noise = 0.0
 
     def set_noise(self, sigma: float) -> None:
-        """1 sigma of w, which nothing else measures."""
+        """Set 1 sigma of w, which nothing else measures."""
         self.noise_noise = sigma * sigma
         self.bias_noise = self.flow_noise = 0.0
 
     def set_flow(self, sigma: float) -> None:
-        """σ_s."""
+        """Set σ_s."""
         self.flow_flow += max(0.0, sigma * sigma - self.flow_radps * self.flow_radps)
         self.flow_radps = sigma
 
     def advance(self, dt_s: float, noise_radps: float, measured: bool) -> None:
-        """A new interval. ``noise_radps``: 1 sigma of w. ``measured``: whether there is a gyro's rate for it."""
+        """Begin a new interval. ``noise_radps``: 1 sigma of w. ``measured``: whether there is a gyro's rate for it."""
         self.measured = 1.0 if measured else 0.0
         kept = math.exp(-dt_s / FLOW_TIME_S)
         self.flow *= kept
@@ -69,7 +69,7 @@ class AxisBias:
         self.bias_bias = min(grown, max(self.bias_bias, PRIOR_VARIANCE))
 
     def compare(self, bias: float, flow: float, noise: float, observed: float, sigma: float) -> bool:
-        """Compare an observation of ``bias``·b + ``flow``·s + ``noise``·w. False: it is an outlier."""
+        """Compare an observation of ``bias``·b + ``flow``·s + ``noise``·w. Return False for an outlier."""
         self.with_bias = self.bias_bias * bias + self.bias_flow * flow + self.bias_noise * noise
         self.with_flow = self.bias_flow * bias + self.flow_flow * flow + self.flow_noise * noise
         self.with_noise = self.bias_noise * bias + self.flow_noise * flow + self.noise_noise * noise
@@ -78,7 +78,7 @@ class AxisBias:
         return self.off * self.off <= OUTLIER * OUTLIER * self.variance
 
     def learn(self) -> None:
-        """Take in what was compared."""
+        """Update the states with the observation that was compared."""
         bias, flow, noise = (
             self.with_bias / self.variance,
             self.with_flow / self.variance,

@@ -1,7 +1,7 @@
 """Ego-motion: how the camera turned and how fast the vehicle drove between two exposures.
 
 Camera axes: x right, y down, z forward (taken for the vehicle's forward). With body rates ω the camera's
-orientation follows Ṙ = R·[ω]×, so a direction that stands still turns by exp(-[ω]× dt) in the camera's axes.
+orientation follows Ṙ = R·[ω]×, so a fixed direction turns by exp(-[ω]× dt) in the camera's axes.
 No clock, no I/O; memory is two fixed rings of samples.
 """
 
@@ -28,7 +28,7 @@ IMU_CAPACITY = 1024
 SPEED_CAPACITY = 256
 MIN_DT_S = 5e-3  # of a first frame, or of two with one stamp
 
-# What no small vehicle does.
+# Beyond what any small vehicle does.
 _MAX_GYRO_RADPS = 40.0
 _MAX_ACCEL_MPS2 = 200.0
 
@@ -37,27 +37,27 @@ _FRESH_S = 0.5  # older odometry is stale
 
 # Standing still, for this long.
 _REST_NS = 500_000_000
-_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when nothing but a quiet IMU shows it
-_REST_GYRO_RADPS = 0.1  # then, the largest bias that is believed
+_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when only a quiet IMU shows it
+_REST_GYRO_RADPS = 0.1  # then the largest bias that is believed
 _SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # when odometry or the image shows it: motors shake it
 _REST_GRAVITY_ERROR_MPS2 = 0.8
 _REST_SPEED_MPS = 0.02
 _REST_YAW_RADPS = 0.02
-_REST_TURN_RADPS = 0.02  # what the mean rate may differ within the rest, and from a known bias
+_REST_TURN_RADPS = 0.02  # largest difference of the mean rate within the rest, and from a known bias
 _REST_SIGMA_RADPS = 1e-3  # 1 sigma of how still a rest is
 
 # Rotation, 1 sigma of the rate where nothing measures it.
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
 _SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
 _SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
-_GUESS_TIME_S = 0.5  # over which that is averaged
+_GUESS_TIME_S = 0.5  # over which the sigma of a guess is averaged
 _GUESS_MIN_RADPS, _GUESS_MAX_RADPS = 0.04, 2.0
 _STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value for so long and so often, is stuck
-_NOISY_SHARE = 0.5  # of the samples, at most, are repeated by one with noise
-_MIN_BIAS_SHARE = 0.5  # of the picture's uncertainty: a better known rotation gains nothing from it
-_LAG_SHARE = 0.5  # of what the flow takes out, that may be left from before: tracks follow late
-_TURN_SHARE = 0.05  # of the rate, that scale and time of the gyro, and the shaken focus, put into the difference
-_ROLL_SHARE = 0.5  # roll moves the picture's edge by so much of what yaw moves it by
+_NOISY_SHARE = 0.5  # largest share of repeated samples of a gyro with noise
+_MIN_BIAS_SHARE = 0.5  # of the image's uncertainty: a rotation known better than that gains nothing from it
+_LAG_SHARE = 0.5  # of the correction by the flow that may stem from before: tracks lag
+_TURN_SHARE = 0.05  # of the rate: error by the gyro's scale and time, and a shaken focus
+_ROLL_SHARE = 0.5  # roll moves the image's edge by this share of what yaw does
 
 _SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
 
@@ -72,11 +72,11 @@ class EgoMotion:
     speed_mps: float  # forward, mean over the interval, NaN: unknown
     yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
     path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
-    gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: never stood still yet
+    gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: it has never stood still
     notes: tuple[str, ...]  # what degrades it; docs/replay.md lists them
 
     def to_motion(self) -> Motion:
-        """Return what a step of the filter takes of it."""
+        """Return it as a step of the filter takes it."""
         dt_s = max(self.dt_s, MIN_DT_S)
         return Motion(dt_s, self.rotation, self.rotation_sigma_rad, self.speed_mps, self.path_yaw_rate_radps)
 
@@ -86,8 +86,8 @@ class _Interval:
     """What is measured over the interval between two exposures."""
 
     span: Span
-    rates: Track  # as the gyro, or in its place odometry, shows them, in its first columns
-    measured: bool  # by a gyro that lives
+    rates: Track  # of the gyro, or of odometry in its place, in the first columns
+    measured: bool  # by a working gyro
     odometry_mps: float
     odometry_yaw_radps: float
     path_yaw_before_radps: float
@@ -99,7 +99,7 @@ class EgoMotionEstimator:
     """Takes IMU and odometry samples; gives the motion from each exposure to the next.
 
     ``refused`` counts the samples that were not used, or not trusted, by sensor and reason. ``bias``: the gyro's,
-    learnt at rest and from what the pictures show.
+    learnt at rest and from what the images show.
     """
 
     def __init__(self, imu: Imu, vehicle: Vehicle) -> None:
@@ -114,7 +114,7 @@ class EgoMotionEstimator:
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
         self._path_yaw_radps = 0.0
         self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
-        self._noisy = False  # as a real gyro; made-up samples have no noise
+        self._noisy = False  # as a real gyro; synthetic samples have no noise
         self._speed_mps = nan
         self._stamp_ns: int | None = None
         self._samples = Track(IMU_CAPACITY + 2, self._imu.columns)
@@ -150,12 +150,12 @@ class EgoMotionEstimator:
     def advance(self, stamp_ns: int, still: bool | None = None) -> EgoMotion:
         """The motion over (previous stamp, ``stamp_ns``], from the samples taken so far.
 
-        ``still``: whether the picture has stood still for half a second, None: unknown. The first frame has
+        ``still``: whether the image has stood still for half a second, None: unknown. The first frame has
         no interval; neither has one whose stamp goes back, which is counted.
 
         ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
         interval) (white noise), and stated rates over what was held, missed or saturated. Without a gyro: by how much
-        rates were lately guessed wrong.
+        guessed rates were lately wrong.
         """
         notes: list[str] = []
         if self._stamp_ns is None:
@@ -221,7 +221,7 @@ class EgoMotionEstimator:
         return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
 
     def _guess(self, interval: _Interval) -> None:
-        """Rates that no gyro measures: odometry's yaw, or else it goes on as it went."""
+        """Guess the rates without a gyro: odometry's yaw rate, or else the last rates."""
         yaw_radps = self._path_yaw_radps
         if isfinite(interval.odometry_yaw_radps):
             interval.notes.append("rotation from odometry")
@@ -237,10 +237,10 @@ class EgoMotionEstimator:
         return max(self.bias.error_sigmas()[:2]) * interval.span.dt_s > _MIN_BIAS_SHARE * sigma_rad
 
     def add_image_rotation(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
-        """The motion of the present interval, knowing besides how the whole picture turned.
+        """Return the motion of the present interval, using the rotation of the whole image as well.
 
-        A gyro that lives, and whose bias is known, is believed more than a picture that contradicts it; whatever else
-        is said of the rotation is not. ``turn_rad``: rotation vector (3,) of directions, as in
+        A working gyro with a known bias is believed more than an image that contradicts it; any other source of the
+        rotation is not. ``turn_rad``: rotation vector (3,) of directions, as in
         ``EgoMotion.rotation``; ``sigma_rad``: (3,).
         """
         interval, bias = self._interval, self.bias
@@ -256,13 +256,13 @@ class EgoMotionEstimator:
         return self._answer(self._rotation())
 
     def _less_rates(self, turn_rad: Floats) -> list[float]:
-        """By how much the rates are mistaken if the picture turned so in the present interval, (3,) rad/s."""
+        """Return the error of the rates, (3,) rad/s, if the image's rotation of the present interval is true."""
         interval = self._interval
         both = zip(interval.mean_radps, turn_rad.tolist(), strict=True)
         return [mean + turned / interval.span.dt_s for mean, turned in both]
 
     def correct(self, turn_rad: Floats, sigma_rad: Floats, expansion_hz: float = 0.0) -> None:
-        """What the flow took out of the present interval besides: the bias learns from it.
+        """Take the rotation that the flow corrected in the present interval: the bias learns from it.
 
         ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
         ``expansion_hz``: mean V/Z of what is seen.
@@ -288,7 +288,7 @@ class EgoMotionEstimator:
     def see_ground(self, ground: GroundSpeed) -> None:
         """Take the speed that the ground shows in the present interval, where nothing measures it.
 
-        Windows overlap: each counts only with what is new in it.
+        Windows overlap, so each counts only with its new part.
         """
         interval = self._interval
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
@@ -297,7 +297,7 @@ class EgoMotionEstimator:
         self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
 
     def _rotation(self) -> Floats:
-        """Of directions, over the interval."""
+        """Return the rotation of directions over the interval, (3, 3)."""
         rotation = np.empty((3, 3))
         x, y, z = self.bias.errors()
         self._interval.rates.turn(x, y, z, rotation)
@@ -332,7 +332,7 @@ class EgoMotionEstimator:
         return yaw_rate_radps
 
     def _stuck(self, stamp_ns: int, gap_limit_s: float, period_s: float, may_rest: bool) -> bool:
-        """Whether the gyro, which had noise, repeats one value; made-up samples may do so at rest, all six."""
+        """Whether a gyro that had noise repeats one value; synthetic samples may do so at rest, in all six columns."""
         imu, window = self._imu, self._window
         if not imu.find_latest(window, stamp_ns, round(max(_STUCK_S, _STUCK_SAMPLES * period_s) * 1e9), gap_limit_s):
             return False
@@ -376,14 +376,14 @@ class EgoMotionEstimator:
         if not rests:
             return None
         rate_radps = at[:3]
-        if self.bias.known:  # the window's other samples have been used
+        if self.bias.known:  # the window's other samples were used before
             rate_radps = list(self._interval.mean_radps)
             rows = self._interval.rates.count
         self.bias.see_rest(rate_radps, _REST_SIGMA_RADPS + 2 * gyro_std / sqrt(rows))
         return at[3:6] if level else None
 
     def _stands(self, stamp_ns: int, odometry_mps: float, still: bool | None) -> bool | None:
-        """Whether the picture or odometry says that it stands; None: it may."""
+        """Whether image or odometry shows that it stands; None: undecided."""
         if still:
             return True
         if isfinite(odometry_mps):
@@ -393,17 +393,17 @@ class EgoMotionEstimator:
             return (
                 odometry.find_latest(window, stamp_ns, _REST_NS, inf)
                 and odometry.largest(window, 0) <= _REST_SPEED_MPS
-                and not odometry.largest(window, 1) > _REST_YAW_RADPS  # NaN: unknown
+                and not odometry.largest(window, 1) > _REST_YAW_RADPS  # False for NaN
             )
         if still is False and not self.bias.known:
-            return False  # what moves in it may be others, but nothing else speaks for rest
+            return False  # what moves may be others, but nothing else shows rest
         return None if self._inertial.may_stand() else False
 
     def _choose_speed(self, span: Span, odometry_mps: float, notes: list[str]) -> float:
-        """Mean speed over the interval by ``vehicle.speed_source``, m/s; NaN: unknown."""
+        """Return the mean speed over the interval by ``vehicle.speed_source``, m/s; NaN: unknown."""
         source, constant_mps = self._vehicle.speed_source, self._vehicle.speed_mps
         if source in ("auto", "odometry", "zenoh") and isfinite(odometry_mps):
-            if self._odometry.age_s(span.end_ns) <= span.dt_s:  # not one that is only held
+            if self._odometry.age_s(span.end_ns) <= span.dt_s:  # not just held from before
                 self._inertial.correct(odometry_mps)
             return odometry_mps
         if source in ("auto", "constant") and constant_mps is not None:

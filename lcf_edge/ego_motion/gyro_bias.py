@@ -1,14 +1,14 @@
-"""The gyro's bias: unknown until learnt, from rest and from the rotation that the pictures show.
+"""The gyro's bias: unknown until learnt, from rest and from the rotation that the images show.
 
 A Kalman filter, each axis by itself, with the states, all rad/s,
 
 - b: the bias, a random walk (temperature);
-- s: by how much the flow is mistaken about the rate, slowly changing (O and lens are not known exactly);
-- w: what else the gyro is mistaken over the present interval, forgotten with it.
+- s: the flow's error of the rate, slowly changing (O and lens are not known exactly);
+- w: the gyro's other error over the present interval, forgotten after it.
 
 The gyro's mean rate over an interval is ω + b + w. Whatever else gives the rate ω of that interval is an observation
-of the difference: b + w when corners of the whole picture tell it, b + w + s when the flow does, and b alone, over a
-longer time, at rest. No clock, no I/O.
+of the difference: b + w for corners of the whole image, b + w + s for the flow, and b alone, over a longer time, at
+rest. No clock, no I/O.
 """
 
 from collections.abc import Iterable, Sequence
@@ -25,13 +25,13 @@ Three = Sequence[float] | Floats
 KNOWN_RADPS = 0.03  # a bias with a larger sigma is not known
 _FLOW_RADPS = 0.002  # 1 sigma of s, at least
 _FOCUS_RAD = 0.01  # 1 sigma of O
-_ANY_RADPS = 3.0  # 1 sigma of a rate of which nothing is known
-_REFUTED_S = 1.0  # of outliers without a break: then the bias is another one
+_ANY_RADPS = 3.0  # 1 sigma of an unknown rate
+_REFUTED_S = 1.0  # of outliers without a break: then the bias was wrong
 
 
 class GyroBias:
-    """``mean_radps``, ``sigma_radps``: (3,), the bias. ``error_radps``, ``error_sigma_radps``: (3,), all that the
-    gyro is mistaken by over the present interval."""
+    """``mean_radps``, ``sigma_radps``: (3,), the bias. ``error_radps``, ``error_sigma_radps``: (3,), the
+    gyro's whole error over the present interval."""
 
     def __init__(self) -> None:
         self._axes = [AxisBias(_FLOW_RADPS) for _ in range(3)]
@@ -56,7 +56,7 @@ class GyroBias:
         return np.array(self.error_sigmas())
 
     def means(self) -> list[float]:
-        """``mean_radps`` as plain numbers, which are quicker where there are three."""
+        """``mean_radps`` as plain numbers, which are faster for three."""
         return [axis.bias for axis in self._axes]
 
     def sigmas(self) -> list[float]:
@@ -77,36 +77,36 @@ class GyroBias:
         return max(self.sigmas()) <= KNOWN_RADPS
 
     def forget(self) -> None:
-        """The bias may be any."""
+        """Forget the bias: it may have any value."""
         for axis in self._axes:
             axis.forget()
         self._against_s = 0.0
 
     def advance(self, dt_s: float, noise_radps: Three, measured: bool) -> None:
-        """A new interval. ``noise_radps``: (3,), 1 sigma of w. ``measured``: whether there is a gyro's rate for it."""
+        """Begin a new interval. ``noise_radps``: (3,), 1 sigma of w. ``measured``: whether a gyro gives its rate."""
         self._measured, self._dt_s = measured, dt_s
         for axis, noise in zip(self._axes, noise_radps, strict=True):
             axis.advance(dt_s, noise, measured)
 
     def doubt(self) -> None:
-        """The gyro may be mistaken by anything over the present interval."""
+        """Allow any error of the gyro over the present interval."""
         for axis in self._axes:
             axis.set_noise(_ANY_RADPS)
 
     def see_rest(self, rate_radps: Three, sigma_radps: float) -> bool:
-        """The gyro's mean rate (3,) while the vehicle stands. False: it is an outlier, and not used."""
+        """Take the gyro's mean rate (3,), rad/s, while the vehicle stands. Return False for an outlier, not used."""
         axes = zip(self._axes, rate_radps, strict=True)
         return self._learn([axis.compare(1.0, 0.0, 0.0, rate, sigma_radps) for axis, rate in axes])
 
     def add_image_rotation(self, error_radps: Three, sigma_radps: Three) -> bool:
-        """The gyro's rate less that of the whole picture, (3,), with its sigmas. False: an outlier, not used."""
+        """Take the gyro's rate less the whole image's, (3,), with its sigmas. Return False for an outlier, not used."""
         axes = zip(self._axes, error_radps, sigma_radps, strict=True)
         return self._learn([axis.compare(self._measured, 0.0, 1.0, error, sigma) for axis, error, sigma in axes])
 
     def see_flow(self, error_radps: Three, sigma_radps: Three, expansion_hz: float) -> bool:
-        """The gyro's rate less that of the flow, (3,), with its sigmas. False: an outlier, not used.
+        """Take the gyro's rate less the flow's, (3,), with its sigmas. Return False for an outlier, not used.
 
-        ``expansion_hz``: mean V/Z of what is seen; an error of O turns so much of itself into rotation.
+        ``expansion_hz``: mean V/Z of what is seen; by this factor an error of O becomes one of the rate.
         """
         for axis in self._axes:
             axis.set_flow(max(_FLOW_RADPS, _FOCUS_RAD * expansion_hz))
@@ -114,7 +114,7 @@ class GyroBias:
         return self._learn([axis.compare(self._measured, 1.0, 1.0, error, sigma) for axis, error, sigma in axes])
 
     def _learn(self, fits: Iterable[bool]) -> bool:
-        """All axes learn, or none."""
+        """Let all axes learn, or none."""
         if not all(fits):
             self._against_s += self._dt_s
             if self._against_s > _REFUTED_S:

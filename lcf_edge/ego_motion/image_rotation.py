@@ -1,8 +1,8 @@
-"""By how much the camera turned between two pictures, by the pictures alone.
+"""By how much the camera turned between two images, from the images alone.
 
-Phase correlation of small pictures, their brightness levelled: the shift that most of the picture shares, found at
-once, however far it went. What is near or moves by itself shifts otherwise, and does not agree with the rest. Good to
-a few pixels, which is near enough for corners to be matched; no clock, no I/O.
+Phase correlation of small images with levelled brightness finds the shift that most of the image shares, however large.
+Near and moving things shift differently, and do not agree with the rest. Accurate to a few pixels, which is enough to
+match corners; no clock, no I/O.
 """
 
 from dataclasses import dataclass
@@ -18,16 +18,16 @@ from lcf_edge.lens import Lens
 Grey = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
 
-_AREA_PX = 4800  # of a small picture, about
+_AREA_PX = 4800  # of a small image, about
 _LEVEL_PX = 9  # over which brightness is levelled
-_MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a small picture: a plain one shows no shift
+_MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a small image: a plain one shows no shift
 _MIN_RESPONSE = 0.3  # share of the correlation in its peak
-_SIGMA_PX = 0.35  # 1 sigma of the shift of small pictures
-_SIGMA_SHARE = 0.03  # and of its size: roll, and the corners of the picture
+_SIGMA_PX = 0.35  # 1 sigma of the shift of small images
+_SIGMA_SHARE = 0.03  # 1 sigma as a share of the shift: roll, and the image's corners
 _ROLL_SIGMA_RAD = pi  # unknown
 _STEP_RAD = 1e-3
 _GRID = 24
-_MIN_GAIN_PX = 1.0  # a rad; lenses that no camera has give less
+_MIN_GAIN_PX = 1.0  # px a rad; no real lens gives less
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class Turn:
 
 
 class ImageRotation:
-    """For pictures of one size and ``lens``. ``sigma_rad``: of pitch and yaw at best."""
+    """For images of one size and ``lens``. ``sigma_rad``: of pitch and yaw at best."""
 
     def __init__(self, lens: Lens) -> None:
         self._before: npt.NDArray[np.float32] | None = None
@@ -53,11 +53,11 @@ class ImageRotation:
         self.sigma_rad = _SIGMA_PX / float(self._px_per_rad.min())
 
     def forget(self) -> None:
-        """The next picture does not follow the last one."""
+        """The next image does not follow the last one."""
         self._before = None
 
     def turn(self, image: Grey) -> Turn | None:
-        """From the last picture to this one, (height, width); None: they do not tell."""
+        """Return the turn from the last image to this one, (height, width); None: they do not show it."""
         before, self._before = self._before, self._small(image)
         if before is None or self._before is None:
             return None
@@ -72,7 +72,7 @@ class ImageRotation:
         )
 
     def _small(self, image: Grey) -> npt.NDArray[np.float32] | None:
-        """The picture in small, without its slow changes of brightness; None: it is plain."""
+        """Return the image in small, without slow changes of brightness; None: it is plain."""
         side = 2**self._halvings
         small: npt.NDArray[Any] = image[: self._height * side, : self._width * side]
         for _ in range(self._halvings):
@@ -83,7 +83,7 @@ class ImageRotation:
 
 
 def _gain(lens: Lens) -> Floats:
-    """By how many px the picture shifts to the right for 1 rad about y, and up for 1 rad about x, in its middle."""
+    """Return the shift in the middle of the image, px: to the right for 1 rad about y, up for 1 rad about x."""
     x, y = np.meshgrid(np.linspace(0, lens.width - 1, _GRID), np.linspace(0, lens.height - 1, _GRID))
     weight = np.outer(np.hanning(_GRID), np.hanning(_GRID)).ravel() ** 2
     placed = np.stack([x.ravel(), y.ravel()], axis=1).astype(np.float32)

@@ -13,16 +13,16 @@ Floats = npt.NDArray[np.float64]
 GRAVITY_MPS2 = 9.81
 MAX_SPEED_MPS = 70.0  # no small vehicle is faster
 _LEVEL_TIME_S = 30.0  # time constant of the accelerometer's pull on the gravity direction
-_LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # only while next to nothing but gravity acts
+_LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # largest difference from gravity at which it pulls
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
 _SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes, or saturated ones
 _SIGMA_ODOMETRY_MPS = 0.05
-_LATE_S = 0.3  # by which the end of a rest is noticed late
+_LATE_S = 0.3  # by which the end of a rest is noticed too late
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
 
 
 class _Moment(NamedTuple):
-    """What was measured in a frame of a rest, and what was known of gravity before it."""
+    """What was measured in one frame at rest, and gravity as known before."""
 
     dt_s: float
     accel_mps2: Sequence[float]
@@ -35,9 +35,9 @@ class InertialSpeed:
     """Forward speed by the accelerometer, from the last rest on; its uncertainty grows until it is unknown.
 
     The gravity direction is learnt at rest and turned along by the gyro, with a slow pull towards the
-    accelerometer. What acts along the camera's forward, laid into the horizontal plane, is then acceleration:
-    f · h, h = (z - (z·up) up) / |…|, free of gravity. That a rest is over is noticed late: what was measured in the
-    last moments of one is kept, and integrated then, with the gravity from before them.
+    accelerometer. The force along the camera's forward axis, projected into the horizontal plane, is then
+    acceleration: f · h, h = (z - (z·up) up) / |…|, free of gravity. The end of a rest is noticed late: measurements of
+    its last moments are kept and then integrated, with gravity from before them.
     """
 
     def __init__(self, gyro_noise_radps: float) -> None:
@@ -46,13 +46,13 @@ class InertialSpeed:
         self.pitch_rad = nan
         self._speed_mps = 0.0
         self._up: tuple[float, float, float] | None = None  # unit vector in camera axes
-        self._gravity_mps2 = GRAVITY_MPS2  # as this accelerometer shows it
+        self._gravity_mps2 = GRAVITY_MPS2  # as this accelerometer measures it
         self._noise_radps = gyro_noise_radps
         self._since_rest_s = 0.0
         self._late: deque[_Moment] = deque()
 
     def may_stand(self) -> bool:
-        """Whether standing still lies within the uncertainty; once all is unknown, it may."""
+        """Whether the vehicle may stand still, within the uncertainty; true while the speed is unknown."""
         return not self.sigma_mps <= _SIGMA_LIMIT_MPS or abs(self._speed_mps) <= 2 * self.sigma_mps
 
     def rest(self, mean_mps2: Sequence[float], dt_s: float, accel_mps2: Sequence[float], rotation: Floats) -> None:
@@ -66,14 +66,14 @@ class InertialSpeed:
         self._speed_mps = self.mean_mps = self.sigma_mps = self._since_rest_s = 0.0
 
     def correct(self, speed_mps: float) -> None:
-        """Another source knows the speed."""
+        """Take the speed from another source, m/s."""
         if self._up is None:
             return
         self._speed_mps = speed_mps
         self.sigma_mps = min(self.sigma_mps, _SIGMA_ODOMETRY_MPS)
 
     def see_ground(self, error_mps: float, sigma_mps: float) -> None:
-        """Take by how much the speed is too low, as the ground shows it, with 1 sigma."""
+        """Take by how much the speed is too low according to the ground, m/s, with 1 sigma."""
         if self._up is None or not self.sigma_mps < inf:
             return
         variance = self.sigma_mps**2
@@ -82,12 +82,12 @@ class InertialSpeed:
         self.sigma_mps = sqrt((1 - gain) * variance)
 
     def lose(self) -> None:
-        """Nothing was measured."""
+        """Make the speed unknown: nothing was measured."""
         self.mean_mps, self.sigma_mps, self.pitch_rad, self._up = nan, inf, nan, None
         self._late.clear()
 
     def advance(self, dt_s: float, accel_mps2: Sequence[float], rotation: Floats, gap_s: float) -> None:
-        """Go on by ``dt_s`` with the mean specific force (3,) and the rotation (3, 3) over it."""
+        """Advance by ``dt_s`` with the mean specific force (3,) and the rotation (3, 3) over it."""
         late, self._late = self._late, deque()
         if late and late[0].up is not None:
             self._up, self._gravity_mps2 = late[0].up, late[0].gravity_mps2
@@ -98,7 +98,7 @@ class InertialSpeed:
         ax, ay, az = accel_mps2
         before_x, before_y, before_z = self._up
         ux, uy, uz = (a * before_x + b * before_y + c * before_z for a, b, c in rotation.tolist())
-        x, y, z = before_x + ux, before_y + uy, before_z + uz  # half-way
+        x, y, z = before_x + ux, before_y + uy, before_z + uz  # at the middle of the interval
         size = max(hypot(x, y, z), 1e-9)
         x, y, z = x / size, y / size, z / size
         along_up = x * ax + y * ay + z * az
@@ -118,7 +118,7 @@ class InertialSpeed:
         self._turn(ux, uy, uz)
 
     def _turn(self, x: float, y: float, z: float) -> None:
-        """Up lies in this direction."""
+        """Set the direction of up."""
         size = hypot(x, y, z)
         self._up = x / size, y / size, z / size
         self.pitch_rad = asin(max(-1.0, min(1.0, z / size)))

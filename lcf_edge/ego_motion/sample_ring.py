@@ -11,7 +11,7 @@ from lcf_edge.filter.memory import Doubles, doubles, memory_of
 
 Stamps: TypeAlias = Any  # int64, ns: typed memory when compiled, else a memoryview
 
-MAX_STAMP_NS = 2**62  # what no stamp says
+MAX_STAMP_NS = 2**62  # beyond any real stamp
 RESTART_AFTER = 5  # samples in order, but behind the newest: then the newest was wrong
 PERIODS = 16  # of the latest samples, whose median is the period
 MIN_ROWS = 3  # of a window
@@ -32,7 +32,7 @@ class Span:
 
 
 class Track:
-    """Samples over a span, to be joined by straight lines; ``count`` rows are in use.
+    """Samples over a span, joined by straight lines; ``count`` rows are in use.
 
     ``times_s``: (rows,), the first 0 and the last dt; ``values``: (rows, columns).
     """
@@ -59,9 +59,8 @@ class Track:
     def turn(self, error_x: float, error_y: float, error_z: float, rotation: Doubles) -> None:
         """Write the rotation (3, 3) of directions by the rates, rad/s, in the first three columns.
 
-        The rates are mistaken by the errors. Ṙ = R·[ω]× for the camera's orientation, so a direction that stands still
-        turns by exp(-[ω]× dt) in the camera's axes; from sample to sample ω is the mean of both. Multiplied as
-        quaternions.
+        The errors are subtracted from the rates. Ṙ = R·[ω]× for the camera's orientation, so a fixed direction turns by
+        exp(-[ω]× dt) in the camera's axes; from sample to sample ω is the mean of both. Multiplied as quaternions.
         """
         w, x, y, z = 1.0, 0.0, 0.0, 0.0
         for i in range(1, self.count):
@@ -90,7 +89,7 @@ class Track:
         rotation[2, 2] = 1 - scale * (x * x + y * y)
 
     def hold(self, dt_s: float, values: Sequence[float]) -> None:
-        """The same values for so long."""
+        """Hold the same values for so long."""
         self.count = 2
         self.times_s[0], self.times_s[1] = 0.0, dt_s
         for k in range(self.columns):
@@ -108,7 +107,7 @@ class Ring:
     """The latest samples of one sensor, in time order; the oldest make room for new ones.
 
     ``stamps_ns``: (capacity,), ``values``: (capacity, columns); ``count`` rows are in use. ``used_ns``: samples up to
-    here are not missed when they leave. ``refused`` counts those that are not taken, by sensor and reason.
+    here are no longer needed. ``refused`` counts refused samples, by sensor and reason.
     """
 
     def __init__(self, sensor: str, capacity: int, columns: int, refused: Counter[str]) -> None:
@@ -123,7 +122,7 @@ class Ring:
         self.periods_ns = stamps(PERIODS)
 
     def refuse(self, reason: str, count: int = 1) -> None:
-        """Count samples that are not taken."""
+        """Count refused samples."""
         self.refused[f"{self.sensor} {reason}"] += count
 
     def add(self, stamp_ns: int, values: Sequence[float]) -> None:
@@ -153,7 +152,7 @@ class Ring:
         return False
 
     def make_room(self) -> None:
-        """A quarter leaves at once, so that adding stays cheap."""
+        """Drop the oldest quarter at once, so that adding stays cheap."""
         leaving = self.capacity // 4
         missed = 0
         for i in range(leaving):
@@ -167,7 +166,7 @@ class Ring:
                 self.values[i, k] = self.values[i + leaving, k]
 
     def after(self, stamp_ns: int) -> int:
-        """Row of the first sample later than ``stamp_ns``."""
+        """Return the row of the first sample later than ``stamp_ns``."""
         low, high = 0, self.count
         while low < high:
             middle = (low + high) // 2
@@ -178,12 +177,12 @@ class Ring:
         return low
 
     def age_s(self, now_ns: int) -> float:
-        """Age of the latest sample that is not later than ``now_ns``; inf: none."""
+        """Return the age, s, of the latest sample not later than ``now_ns``; inf: none."""
         i = self.after(now_ns)
         return (now_ns - self.stamps_ns[i - 1]) * 1e-9 if i else INF
 
     def period_s(self) -> float:
-        """Median interval of the latest samples; 0: fewer than two."""
+        """Return the median interval of the latest samples, s; 0: fewer than two."""
         n = min(self.count - 1, PERIODS)
         if n < 1:
             return 0.0
@@ -191,7 +190,7 @@ class Ring:
             row = self.count - n + i
             period_ns = self.stamps_ns[row] - self.stamps_ns[row - 1]
             k = i
-            while k > 0 and self.periods_ns[k - 1] > period_ns:  # sorted as they come
+            while k > 0 and self.periods_ns[k - 1] > period_ns:  # insertion sort
                 self.periods_ns[k] = self.periods_ns[k - 1]
                 k -= 1
             self.periods_ns[k] = period_ns
@@ -205,14 +204,14 @@ class Ring:
         return max(before_ns, beyond_ns) <= gap_limit_s * 1e9
 
     def held_s(self, span: Span) -> float:
-        """Time of ``span`` for which a sample is held beyond the last one, or before the first."""
+        """Return the time of ``span`` beyond the last sample or before the first, s, for which one is held."""
         first = max(0, self.after(span.start_ns) - 1)
         last = min(self.after(span.end_ns), self.count - 1)
         held_ns = max(0, self.stamps_ns[first] - span.start_ns) + max(0, span.end_ns - self.stamps_ns[last])
         return held_ns * 1e-9
 
     def gap_s(self, span: Span, gap_limit_s: float) -> float:
-        """Time of ``span`` between samples that are farther apart than the limit."""
+        """Return the time of ``span``, s, between samples that are farther apart than the limit."""
         first = max(0, self.after(span.start_ns) - 1)
         last = min(self.after(span.end_ns), self.count - 1)
         gap_ns = 0

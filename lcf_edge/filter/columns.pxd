@@ -1,5 +1,8 @@
+cimport cython
+
 cdef double OWN_PART_S
 
+@cython.final
 cdef class EdgeColumns:
     cdef public Py_ssize_t count, capacity
     cdef double[::1] x, y, beta, speed, bl, trust, deviation, origin_x, origin_y
@@ -13,7 +16,12 @@ cdef class EdgeColumns:
     cdef double[::1] fixed_s
     cdef bint own_way(self, Py_ssize_t i) noexcept nogil
     cdef bint is_own_part(self, Py_ssize_t i) noexcept nogil
+    @cython.locals(number=int)
+    cpdef int rebels(self) noexcept nogil
+    @cython.locals(number=int)
+    cpdef int chains(self) noexcept nogil
 
+@cython.final
 cdef class CircleColumns:
     cdef public Py_ssize_t capacity
     cdef unsigned char[::1] active, cause
@@ -21,7 +29,10 @@ cdef class CircleColumns:
     cdef int[::1] support
     cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral, unseen_s
     cdef int[::1] square
+    @cython.locals(number=int)
+    cpdef int rows(self) noexcept nogil
 
+@cython.final
 cdef class ObjectColumns:
     cdef public Py_ssize_t capacity
     cdef unsigned char[::1] active, class_id, state
@@ -31,13 +42,18 @@ cdef class ObjectColumns:
     cdef double[::1] reference, middle, middle_sigma
     cdef double[::1] ttc, ttc_sigma, range, range_sigma, lateral, lateral_sigma, forward, forward_sigma
     cdef double[::1] right, right_sigma, closest, closest_sigma, probability
+    @cython.locals(number=int)
+    cpdef int rows(self) noexcept nogil
 
+@cython.final
 cdef class PsiColumns:
     cdef public Py_ssize_t capacity, live_count
     cdef unsigned char[::1] active, shape
     cdef unsigned int[::1] id
     cdef double[::1] x, y, width, height, trust, expansion, life_s
     cdef int[::1] circle, edges, missing, new, live
+    @cython.locals(number=int)
+    cpdef int rows(self) noexcept nogil
 
 cdef class GroupColumns:
     cdef public Py_ssize_t count, capacity

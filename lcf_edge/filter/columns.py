@@ -34,6 +34,20 @@ class EdgeColumns:
         """Whether an edge has stayed where it is in the picture: a part of the vehicle, or dirt on the lens."""
         return self.fixed_s[i] >= OWN_PART_S
 
+    def rebels(self) -> int:
+        """Rows of E_r."""
+        number = 0
+        for i in range(self.count):
+            number += self.rebel[i] != 0
+        return number
+
+    def chains(self) -> int:
+        """Rows of α."""
+        number = 0
+        for i in range(self.count):
+            number += self.suspect_keys[i] > 0 and self.rebel[i] == 0
+        return number
+
 
 class CircleColumns:
     """Of a ``CircleTable``."""
@@ -51,6 +65,13 @@ class CircleColumns:
         self.corr, self.width, self.height = memory["corr"], memory["width"], memory["height"]
         self.ttc, self.range, self.lateral = memory["ttc"], memory["range"], memory["lateral"]
         self.unseen_s, self.square = memory["unseen_s"], memory["square"]
+
+    def rows(self) -> int:
+        """How many are in use."""
+        number = 0
+        for k in range(self.capacity):
+            number += self.active[k] != 0
+        return number
 
 
 class ObjectColumns:
@@ -73,6 +94,13 @@ class ObjectColumns:
         self.closest, self.closest_sigma = memory["closest"], memory["closest_sigma"]
         self.probability = memory["probability"]
 
+    def rows(self) -> int:
+        """How many are in use."""
+        number = 0
+        for k in range(self.capacity):
+            number += self.active[k] != 0
+        return number
+
 
 class PsiColumns:
     """Of a ``PsiTable``. ``live_count``: entries of ``live``."""
@@ -90,6 +118,13 @@ class PsiColumns:
         self.edges, self.missing, self.new = memory["edges"], memory["missing"], memory["new"]
         self.live_count = 0
         self.live = memory["live"]
+
+    def rows(self) -> int:
+        """How many are in use."""
+        number = 0
+        for k in range(self.capacity):
+            number += self.active[k] != 0
+        return number
 
 
 class GroupColumns:

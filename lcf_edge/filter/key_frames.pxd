@@ -16,7 +16,7 @@ cdef void learn(KeyFrames keys, int k, double x, double y, double z, double sigm
 cpdef void turn(KeyFrames keys, const double[:, :, ::1] rotation) noexcept nogil
 cpdef void advance(KeyFrames keys, const double[:, :, ::1] rotation, double ahead_x, double ahead_y, double ahead_z, double way_m, double dt_s) noexcept nogil
 cpdef void inflate(KeyFrames keys, double sigma_rad) noexcept nogil
-cpdef void stop(KeyFrames keys) noexcept nogil
+cpdef void scale(KeyFrames keys, double factor) noexcept nogil
 cpdef int mark(KeyFrames keys) noexcept nogil
 cdef int oldest_key(EdgeColumns edges, Py_ssize_t i, KeyFrames keys) noexcept nogil
 cdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double least_s) noexcept nogil

@@ -79,10 +79,11 @@ def inflate(keys: KeyFrames, sigma_rad: float) -> None:
         keys.sigma_rad[k] = math.sqrt(keys.sigma_rad[k] * keys.sigma_rad[k] + sigma_rad * sigma_rad)
 
 
-def stop(keys: KeyFrames) -> None:
-    """The vehicle has stood all the while: there was no displacement."""
+def scale(keys: KeyFrames, factor: float) -> None:
+    """The vehicle has driven so many times as far since each; 0: it has stood all the while."""
     for k in range(KEYS):
-        keys.displacement[k, 0] = keys.displacement[k, 1] = keys.displacement[k, 2] = 0.0
+        for i in range(3):
+            keys.displacement[k, i] *= factor
 
 
 def mark(keys: KeyFrames) -> int:

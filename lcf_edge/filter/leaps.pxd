@@ -21,14 +21,16 @@ cdef class Leaps:
     cdef readonly int[::1] part, seen, lost
     cdef readonly double[::1] u, v
     cdef readonly int[:, ::1] votes, voter
-    cdef public int across, down, most, rival
+    cdef public int across, down, most
 
 cdef void ask(Leaps leaps, ImagePlane plane, EdgeColumns edges) noexcept nogil
 cdef bint is_lost(Leaps leaps, int part) noexcept nogil
 @cython.locals(astray=bint, across=int, down=int, a=int, b=int)
 cdef void vote(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
-@cython.locals(near=bint, a=int, b=int)
-cdef void count(Leaps leaps) noexcept nogil
+@cython.locals(a=int, b=int)
+cdef void most_votes(Leaps leaps) noexcept nogil
+@cython.locals(near=bint, rival=int, a=int, b=int)
+cdef int rival_votes(Leaps leaps) noexcept nogil
 @cython.locals(best=int)
 cdef int take(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
 @cython.locals(agree=bint, part=int, i=int, a=int, b=int)

@@ -35,7 +35,7 @@ class Leaps:
         self.u, self.v = doubles(capacity), doubles(capacity)
         self.seen, self.lost = (integers(COLUMNS * ROWS) for _ in range(2))
         self.votes, self.voter = (integers(BINS + 1, BINS + 1) for _ in range(2))
-        self.across = self.down = self.most = self.rival = 0
+        self.across = self.down = self.most = 0
 
 
 def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
@@ -91,18 +91,24 @@ def vote(
                         leaps.votes[a, b] += 1
 
 
-def count(leaps: Leaps) -> None:
-    """The shift with the most votes, and how many the best one has that is another one."""
-    leaps.most = leaps.rival = 0
+def most_votes(leaps: Leaps) -> None:
+    """The shift with the most votes."""
+    leaps.most = 0
     for a in range(BINS + 1):
         for b in range(BINS + 1):
             if leaps.votes[a, b] > leaps.most:
                 leaps.most, leaps.across, leaps.down = leaps.votes[a, b], a, b
+
+
+def rival_votes(leaps: Leaps) -> int:
+    """How many votes the best shift has that is another one."""
+    rival = 0
     for a in range(BINS + 1):
         for b in range(BINS + 1):
             near = abs(a - leaps.across) <= 2 and abs(b - leaps.down) <= 2
-            if not near and leaps.votes[a, b] > leaps.rival:
-                leaps.rival = leaps.votes[a, b]
+            if not near and leaps.votes[a, b] > rival:
+                rival = leaps.votes[a, b]
+    return rival
 
 
 def take(
@@ -162,9 +168,9 @@ def find(
         for i in range(edges.count):
             if leaps.part[i] == part:
                 vote(leaps, index, edges, i, corners, reach, settings)
-        count(leaps)
+        most_votes(leaps)
         agree = leaps.most >= max(1.0 * MIN_VOTES, AGREEING_SHARE * leaps.lost[part])
-        if agree and leaps.rival <= RIVAL_SHARE * leaps.most:
+        if agree and rival_votes(leaps) <= RIVAL_SHARE * leaps.most:
             for i in range(edges.count):
                 if leaps.part[i] == part:
                     found += take(leaps, index, edges, i, corners, reach, settings)

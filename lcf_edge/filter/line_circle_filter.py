@@ -62,6 +62,7 @@ SURPRISES = 3.0  # and by so many times what the gyro lately missed
 GYRO_SIGMAS = 3.0  # within which a rotation is looked for
 NOISE_SHARE = 0.7  # of what stays off the flow lines, which is of two places, is the noise of one
 DELTA_SIGMAS = 4.0  # of it, within which an edge of the flow stays
+SLOWEST_MPS = 0.05  # that tells a direction
 FORGET = 0.3  # share of what the gyro missed that the latest frame tells
 
 
@@ -133,6 +134,7 @@ class LineCircleFilter:
         self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
         self._homography = Homography()
         self._off_line = OffLine()
+        self._speed_mps = math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
@@ -213,7 +215,7 @@ class LineCircleFilter:
         self._rest.measured_mps = motion.speed_mps
         if not self._rest.stands:
             return motion
-        key_frames.stop(self._keys)
+        key_frames.scale(self._keys, 0.0)
         return replace(motion, speed_mps=0.0)
 
     def _take(self, corners: Corners) -> None:
@@ -243,7 +245,17 @@ class LineCircleFilter:
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
     def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
-        speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0  # of an unknown speed, the direction
+        """Account for the motion; of an unknown speed only the direction counts, as if it were 1 m/s.
+
+        Once it is known the vehicle is taken to have driven at it all the while: else what stands still would seem to
+        have kept up with a metre a second.
+        """
+        before, self._speed_mps = self._speed_mps, motion.speed_mps
+        if math.isfinite(motion.speed_mps) and not math.isfinite(before):
+            key_frames.scale(self._keys, motion.speed_mps)
+        elif math.fabs(before) > SLOWEST_MPS and not math.isfinite(motion.speed_mps):
+            key_frames.scale(self._keys, 1 / before)
+        speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0
         x, y = self._heading.ray_x, self._heading.ray_y
         scale = 1 / math.sqrt(x * x + y * y + 1)
         key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, speed * motion.dt_s, motion.dt_s)
@@ -445,7 +457,7 @@ class LineCircleFilter:
             omitted=omitted,
             edges_normal=n - rebels,
             edges_rebel=rebels,
-            chains=int(np.count_nonzero(self.edges.suspect_keys[:n])),
+            chains=self.edges.chains,
             circles_normal=self.normal.count,
             circles_rebel=self.rebel.count,
             groups=self.groups.count,

@@ -20,8 +20,11 @@ MIN_SIGMAS = 4.0  # by which the inverse range of what will be met is above zero
 ALIKE_SIGMAS = 3.0  # and that of a patch that agrees
 SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
 SMALL_TURN_RAD = 0.25  # of the path on the way to what is met, which may as well not come
+KNOWN_WIDTHS = 1.1  # half widths from the path within which what is known to be in the way still is
 HALF_SHARE = 0.6  # of half a side, by which what a patch shows reaches to the side at least
 GROUND_MARGIN = 0.3  # share by which the ground may be misjudged
+UPRIGHT_SHARE = 0.25  # of 1/Z, by which the ground's differs at least between two patches that are told from it,
+UPRIGHT_SIGMAS = 4.0  # and by these more than theirs do
 LOWEST_SHARE = 0.8  # of the camera's height; what is lower is the ground
 DRIFT_RAD = 0.004  # by which a patch may leave its flow line to the side, and still stand,
 PITCH_RAD = 0.02  # and up or down: pitch is known less well;
@@ -39,12 +42,12 @@ INFINITY = float("inf")
 class PatchGroups:
     """Patches that show one thing; a row a patch, by which the group was found.
 
-    ``threat``: whether a patch will be met; ``taken``: whether it is of a group already. ``members``: as those of
+    ``obstacle``: whether a patch shows one; ``taken``: whether it is of a group already. ``members``: as those of
     circles, of the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m.
     """
 
     def __init__(self, patches: int) -> None:
-        self.threat, self.taken = (octets(max(patches, 1)) for _ in range(2))
+        self.obstacle, self.taken = (octets(max(patches, 1)) for _ in range(2))
         self.members = Members(max(patches, 1))
         self.left = self.top = self.right = self.bottom = self.weight = self.inverse = 0.0
 
@@ -64,8 +67,8 @@ def stands(patches: Patches, p: int, around: Situation) -> bool:
     return math.fabs(drift_x) < across and math.fabs(drift_y) < down
 
 
-def is_threat(patches: Patches, p: int, around: Situation) -> bool:
-    """Whether what a patch shows stands in the way, above the ground, within the horizon."""
+def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
+    """Whether what a patch shows stands above the ground, and is as near as the vehicle gets within the horizon."""
     inverse, doubt = patches.inverse[p], patches.doubt[p]
     reach_m = around.speed_mps * around.horizon_s
     if not inverse > MIN_SIGMAS * doubt or not (inverse - doubt) * SLOWER_HORIZONS * reach_m > 1:
@@ -74,21 +77,50 @@ def is_threat(patches: Patches, p: int, around: Situation) -> bool:
     half = patches.half_px[p] * patches.scale[p]
     right_m = (patches.x[p] - around.focus_x) / around.pinhole.fx * range_m
     up_m = (around.horizon_y - patches.y[p]) / around.pinhole.fy * range_m
-    beside_m = HALF_SHARE * half / around.pinhole.fx * range_m
     if path.way_to(right_m, range_m, around) >= reach_m or not stands(patches, p, around):
-        return False
-    if math.fabs(least_miss(right_m, range_m, around)) >= around.half_width_m + beside_m:
         return False
     if not around.camera_height_m > 0:
         return up_m < around.height_m
-    below = patches.y[p] + 0.5 * half - around.horizon_y
-    ground = max(below, 0.0) / around.pinhole.fy / around.camera_height_m
     above_m = up_m + around.camera_height_m
-    return (
-        inverse > (1 + GROUND_MARGIN) * ground + doubt
-        and above_m < around.height_m
-        and above_m > (1 - LOWEST_SHARE) * around.camera_height_m
+    if not (1 - LOWEST_SHARE) * around.camera_height_m < above_m < around.height_m:
+        return False
+    ground = ground_inverse(patches.y[p] + 0.5 * half, around)
+    return inverse > (1 + GROUND_MARGIN) * ground + doubt or (
+        inverse > ground_inverse(patches.y[p], around) and is_upright(patches, p, around)
     )
+
+
+def ground_inverse(y: float, around: Situation) -> float:
+    """1/Z of the ground at an image row, 1/m; 0 above the horizon."""
+    return max(y - around.horizon_y, 0.0) / around.pinhole.fy / around.camera_height_m
+
+
+def is_upright(patches: Patches, p: int, around: Situation) -> bool:
+    """Whether a patch and one above or below that agrees are as far off; of the ground, the lower one would be nearer.
+
+    Unlike the ground's range, this does not depend on the pitch.
+    """
+    for q in range(patches.capacity):
+        if not agree(patches, p, q):
+            continue
+        nearer = (patches.y[q] - patches.y[p]) / around.pinhole.fy / around.camera_height_m
+        short = nearer - (patches.inverse[q] - patches.inverse[p])
+        doubt = flow.length(patches.doubt[p], patches.doubt[q])
+        if (
+            math.fabs(nearer) > UPRIGHT_SHARE * patches.inverse[p]
+            and (short if nearer > 0 else -short) > UPRIGHT_SIGMAS * doubt
+        ):
+            return True
+    return False
+
+
+def is_in_way(patches: Patches, p: int, is_known: bool, around: Situation) -> bool:
+    """Whether the path meets what a patch shows. What is known already must leave the way by more than the doubt."""
+    range_m = 1 / patches.inverse[p]
+    right_m = (patches.x[p] - around.focus_x) / around.pinhole.fx * range_m
+    beside_m = HALF_SHARE * patches.half_px[p] * patches.scale[p] / around.pinhole.fx * range_m
+    half_m = around.half_width_m * (KNOWN_WIDTHS if is_known else 1.0)
+    return math.fabs(least_miss(right_m, range_m, around)) < half_m + beside_m
 
 
 def agree(patches: Patches, p: int, q: int) -> bool:
@@ -114,7 +146,6 @@ def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
     """Take a patch into a group."""
     half = patches.half_px[p] * patches.scale[p]
     weight = 1 / (patches.doubt[p] * patches.doubt[p])
-    groups.taken[p] = 1
     groups.members.size[g] += 1
     groups.left, groups.right = min(groups.left, patches.x[p] - half), max(groups.right, patches.x[p] + half)
     groups.top, groups.bottom = min(groups.top, patches.y[p] - half), max(groups.bottom, patches.y[p] + half)
@@ -140,6 +171,15 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
     groups.members.variance_x[p] = across * across / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
     groups.members.variance_y[p] = down * down / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
     return True
+
+
+def claim(groups: PatchGroups, p: int, patches: Patches, circle: int) -> None:
+    """The patches of a group found no other one. ``circle``: row of C_r that they support, -1: none."""
+    for q in range(patches.capacity):
+        if q == p or agree(patches, p, q):
+            groups.taken[q] = 1
+            if circle >= 0:
+                patches.circle[q] = circle
 
 
 def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Settings) -> int:
@@ -188,28 +228,27 @@ def update(
         return evicted
     for p in range(patches.capacity):
         seen = patches.active[p] and not patches.misses[p] and patches.elapsed_s[p] >= MIN_ELAPSED_S
-        groups.threat[p] = 1 if seen and is_threat(patches, p, around) else 0
+        groups.obstacle[p] = 1 if seen and is_obstacle(patches, p, around) else 0
         groups.taken[p] = 0
     for p in range(patches.capacity):
-        if not groups.threat[p] or groups.taken[p] or not gather(groups, p, patches):
+        if not groups.obstacle[p] or groups.taken[p] or not gather(groups, p, patches):
             continue
         c = circle_of(groups, p, circles, settings)
-        if c >= 0 and updated[c]:
+        if not is_in_way(patches, p, c >= 0 and circles.cause[c] == INCOMING, around):
             continue
+        is_shown = c >= 0 and updated[c] != 0  # by rebels, to which it is left
         if c < 0:
             c = shared.free_row(circles)
             if c < 0:
                 evicted += 1
                 c = shared.make_room(edges, circles, True, settings)
-            if c < 0:
-                continue
-            shared.give_birth(circles, c, groups.members, p, settings, ids)
-        else:
+            if c >= 0:
+                shared.give_birth(circles, c, groups.members, p, settings, ids)
+        elif not is_shown:
             shared.blend(circles, c, groups.members, p, settings)
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
-        updated[c] = 1
-        tell(groups, p, circles, c, around, settings)
-        for q in range(patches.capacity):
-            if q == p or agree(patches, p, q):
-                patches.circle[q] = c
+        claim(groups, p, patches, -1 if is_shown else c)
+        if c >= 0 and not is_shown:
+            updated[c] = 1
+            tell(groups, p, circles, c, around, settings)
     return evicted

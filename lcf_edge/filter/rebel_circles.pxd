@@ -40,6 +40,9 @@ cdef double MAX_TTC_HORIZONS
 cdef double MIN_EXTENT2_PX
 cdef double FASTEST_EXPANSION
 cdef double LINK_SHARE
+cdef double FAR_LINK_SHARE
+cdef double FAR_LINK_RAD
+cdef double FAR_LIKE_SPEED
 cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE

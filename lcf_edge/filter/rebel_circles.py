@@ -45,6 +45,9 @@ MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
 # Times in shares of the horizon, so that what holds for a rover holds for a snail.
 FASTEST_EXPANSION = 4.0  # of one object, over one horizon
 LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
+FAR_LINK_SHARE = 0.08  # or in this one, where they move alike
+FAR_LINK_RAD = 0.35  # but no farther
+FAR_LIKE_SPEED = 0.3  # share of the faster one's speed, by which they then differ at most, and which noise stays below
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
@@ -206,15 +209,17 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
 
     They are near, and move in the same direction with a like speed, or differ in velocity by no more than the parts of
-    an object that grows in the picture do.
+    an object that grows in the picture do. The few corners on something large and plain that passes fast lie farther
+    apart: these must move alike, and be known to.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
     one, other = flow.length(ax, ay), flow.length(bx, by)
     slower, faster = min(one, other), max(one, other)
-    if distance >= max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster):
-        return False
     difference = flow.length(ax - bx, ay - by)
     noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+    if distance >= max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster):
+        far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
+        return distance < far and max(difference, noise) < FAR_LIKE_SPEED * faster
     if difference < noise + FASTEST_EXPANSION / around.horizon_s * distance:
         return True
     return (

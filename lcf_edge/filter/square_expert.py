@@ -773,11 +773,18 @@ def take_others(
                 break
 
 
-def square_of(circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
-    """The object that an edge belongs to, by its circle, or as it did before; -1: none."""
+def square_of(objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
+    """The object that an edge belongs to, by its circle, or as it did before; -1: none.
+
+    The object goes on without an edge that is left behind, on what it hid.
+    """
     if edges.rebel[i] and edges.circle[i] >= 0 and circles.square[edges.circle[i]] >= 0:
         return circles.square[edges.circle[i]]
-    return edges.square[i]
+    o = edges.square[i]
+    if o < 0:
+        return -1
+    beside = math.fabs(edges.x[i] - objects.x[o]) > objects.width[o]
+    return -1 if beside or math.fabs(edges.y[i] - objects.y[o]) > objects.height[o] else o
 
 
 def count_members(
@@ -794,7 +801,7 @@ def count_members(
         group_motion.clear(squares.wholes, o)
         squares.members[o] = squares.resting[o] = 0
     for i in range(edges.count):
-        edges.square[i] = o = square_of(circles, edges, i)
+        edges.square[i] = o = square_of(objects, circles, edges, i)
         if o >= 0 and edges.matched[i] and math.fabs(around.speed_mps) < RESTS_MPS:
             squares.resting[o] += 1
     for j in range(verdicts.count):

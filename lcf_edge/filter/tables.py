@@ -300,7 +300,12 @@ class EdgeTable(Table):
     @property
     def rebels(self) -> int:
         """Rows of E_r."""
-        return int(np.count_nonzero(self.rebel[: self.count]))
+        return int(self.columns.rebels())
+
+    @property
+    def chains(self) -> int:
+        """Rows of α."""
+        return int(self.columns.chains())
 
     def own_way(self) -> Mask:
         """Edges that follow no flow line: rebels and chains; bool (count,)."""
@@ -325,9 +330,9 @@ class EdgeTable(Table):
     def trim(self) -> int:
         """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; return how many."""
         n = self.count
-        chains = (self.suspect_keys[:n] > 0) & ~self.rebel[:n]
-        excess_chains = max(0, int(np.count_nonzero(chains)) - self.chain_capacity)
+        excess_chains = max(0, self.chains - self.chain_capacity)
         if excess_chains:
+            chains = (self.suspect_keys[:n] > 0) & ~self.rebel[:n]
             self.suspect_keys[self.least_trusted(chains, excess_chains)] = 0
         excess = max(0, -self.normal_room())
         if excess:
@@ -353,7 +358,7 @@ class CircleTable(Table):
     @property
     def count(self) -> int:
         """Rows in use."""
-        return int(np.count_nonzero(self.active))
+        return int(self.columns.rows())
 
 
 class ObjectTable(Table):
@@ -366,7 +371,7 @@ class ObjectTable(Table):
     @property
     def count(self) -> int:
         """Rows in use."""
-        return int(np.count_nonzero(self.active))
+        return int(self.columns.rows())
 
 
 class PsiTable(Table):
@@ -379,7 +384,7 @@ class PsiTable(Table):
     @property
     def count(self) -> int:
         """Rows in use."""
-        return int(np.count_nonzero(self.active))
+        return int(self.columns.rows())
 
 
 class GroupTable(Table):

@@ -1,5 +1,6 @@
 """Corners: where they are found, how many are kept, and what they look like."""
 
+import itertools
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -161,6 +162,16 @@ def test_a_dark_body_before_a_bright_skyline_has_corners_of_its_own() -> None:
     inside = 210, 290, 430, 390
     assert within(np.array([each.pt for each in everywhere]), *inside) == 0
     assert within(corners.pixel, *inside) >= 15
+
+
+@pytest.mark.parametrize(("darkest", "some"), [(20, True), (110, False)])
+def test_what_is_dark_has_corners_of_fewer_grey_levels(darkest: int, some: bool) -> None:
+    image = clutter(12) // 3 + 80
+    image[280:400, 200:440] = darkest
+    for x, y in itertools.product(range(215, 430, 20), range(295, 390, 20)):
+        image[y : y + 10, x : x + 10] += 14
+    _, corners = settled(np.asarray(cv2.GaussianBlur(image, (3, 3), 0), np.uint8), Filter())
+    assert (within(corners.pixel, 210, 290, 430, 390) >= 5) == some
 
 
 def test_no_corner_is_found_twice() -> None:

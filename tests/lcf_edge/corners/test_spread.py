@@ -1,4 +1,4 @@
-"""Which corners are kept when there are too many: the strongest, from all over the picture."""
+"""Which corners are kept: the strongest, none close to another one, from all over the picture."""
 
 from collections import Counter
 
@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.corners.detector import FEW, SQUARES, side_px, strongest, strongest_spread
-from lcf_edge.corners.spread import Squares, find_poor, leave_poor
+from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, leave_poor
 
 SIDE_PX = 40
 WIDTH, HEIGHT = 320, 240
@@ -17,6 +17,65 @@ WIDTH, HEIGHT = 320, 240
 
 def squares(pixel: npt.NDArray[np.int32], side: int = SIDE_PX) -> list[tuple[int, int]]:
     return [(int(x // side), int(y // side)) for x, y in pixel.tolist()]
+
+
+Samples = npt.NDArray[np.uint8]
+
+
+def distinct(
+    pixel: npt.NDArray[np.int32], strength: npt.NDArray[np.float32], reach: int, samples: Samples | None = None
+) -> list[list[int]]:
+    """Those of corners that are kept; without ``samples`` all look alike."""
+    if samples is None:
+        samples = np.tile(EDGE, (len(pixel), 1))
+    pixel = pixel.copy()
+    count = keep_distinct(pixel.data, strength.copy().data, samples.data, np.empty(len(pixel), np.uint8).data, reach)
+    return pixel[:count].tolist()
+
+
+EDGE: Samples = np.repeat(np.array([78, 178], np.uint8), 8)
+CORNER: Samples = np.repeat(np.array([78, 178], np.uint8), (6, 10))
+
+
+@pytest.mark.parametrize(
+    ("strength", "kept"),
+    [((1, 2), [[13, 5]]), ((2, 1), [[10, 5]]), ((1, 1), [[10, 5]])],
+)
+def test_of_two_that_lie_close_the_stronger_is_kept_and_of_equals_the_first(
+    strength: tuple[float, ...], kept: list[list[int]]
+) -> None:
+    pixel = np.array([(10, 5), (13, 5)], np.int32)
+    assert distinct(pixel, np.array(strength, np.float32), 3) == kept
+    assert distinct(pixel, np.array(strength, np.float32), 2) == pixel.tolist()
+
+
+@pytest.mark.parametrize(("other", "count"), [(EDGE[::-1], 2), (EDGE + np.uint8(2), 1), (CORNER, 1)])
+def test_two_that_lie_close_are_kept_where_they_look_different_by_more_than_noise(other: Samples, count: int) -> None:
+    pixel, strength = np.array([(10, 5), (12, 6)], np.int32), np.array([1, 2], np.float32)
+    assert len(distinct(pixel, strength, 3, np.array([EDGE, other]))) == count
+
+
+def test_parts_of_an_image_do_not_rival_each_other() -> None:
+    pixel = np.array([(10, 40), (12, 39)], np.int32)  # the second part begins above the end of the first
+    assert distinct(pixel, np.array([1, 2], np.float32), 3) == pixel.tolist()
+
+
+@given(
+    places=st.sets(st.tuples(st.integers(0, 30), st.integers(0, 30)), max_size=80),
+    reach=st.integers(0, 6),
+    seed=st.integers(0, 99),
+)
+def test_who_leaves_has_a_stronger_one_close_and_who_stays_has_none(
+    places: set[tuple[int, int]], reach: int, seed: int
+) -> None:
+    pixel = np.array([(x, y) for y, x in sorted(places)], np.int32).reshape(-1, 2)
+    strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
+    expected = [
+        corner
+        for corner, own in zip(pixel.tolist(), strength, strict=True)
+        if strength[np.abs(pixel - corner).max(axis=1) <= reach].max() == own
+    ]
+    assert distinct(pixel, strength, reach) == expected
 
 
 def test_the_strongest_are_kept() -> None:

@@ -1,6 +1,6 @@
 """A corpus on a Dask cluster: a scheduler and two workers, each a process of its own."""
 
-import json
+import re
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -57,14 +57,10 @@ class process:  # noqa: N801
 @pytest.fixture
 def scheduler(tmp_path: Path) -> Iterator[Cluster]:
     with ExitStack() as stack:
-        file = tmp_path / "scheduler.json"
-        options = ("--host", "127.0.0.1", "--port", "0", "--no-dashboard", "--scheduler-file", str(file))
-        running = stack.enter_context(process("scheduler", *options))
-        errors = running.stderr
-        assert errors is not None
-        while not file.exists():
-            assert errors.readline()  # it says what it does
-        yield Cluster(json.loads(file.read_text())["address"], stack, tmp_path)
+        running = stack.enter_context(process("scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard"))
+        assert running.stderr is not None
+        said = (re.search(rb"Scheduler at:\s+(tcp://\S+)", line) for line in running.stderr)
+        yield Cluster(next(match[1].decode() for match in said if match), stack, tmp_path)
 
 
 @pytest.fixture

@@ -210,7 +210,9 @@ def test_a_recording_that_ends_its_process_takes_no_other_with_it(drive: Path) -
     assert "its process ended" in str(outcomes["bad"])
 
 
-def test_an_interrupt_ends_it_without_a_traceback(corpus: Path, tmp_path: Path) -> None:
+def test_an_interrupt_ends_it_without_a_traceback(corpus: Path, drive: Path, tmp_path: Path) -> None:
+    for number in range(30):  # so that it cannot be through before it is interrupted
+        (corpus / f"more-{number}").symlink_to(drive)
     command = (
         sys.executable,
         "-c",

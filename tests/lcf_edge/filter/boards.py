@@ -39,7 +39,7 @@ class Board:
 
     ``range_m``, ``right_m``, ``width_m``, ``height_m``: of the board's middle, at the start and at the camera's height,
     and its size. ``speed_mps``, ``yaw_rate_radps``: as told; the camera itself looks straight ahead. ``flicker``: share
-    of the corners that a frame does not show.
+    of the corners that a frame does not show. ``floor_m``: the camera's height above a floor that is drawn; None: none.
     """
 
     range_m: float = 6.0
@@ -52,6 +52,7 @@ class Board:
     frames: int = 50
     fps: float = 20.0
     flicker: float = 0.6
+    floor_m: float | None = None
     seed: int = 0
 
     def __iter__(self) -> Iterator[tuple[Corners, Motion, Grey]]:
@@ -72,7 +73,19 @@ class Board:
     def image(self, seq: int) -> Grey:
         """What the camera sees."""
         background = 160 + pattern(LENS.width, LENS.height, self.seed + 100) // 8
+        if self.floor_m:
+            background = self.floored(background, self.floor_m, self.speed_mps * seq / self.fps)
         px_m = LENS.fx / self.distance_m(seq)
         texture = pattern(200, round(200 * self.height_m / self.width_m), self.seed, 14.0)
         left = LENS.cx + (self.right_m - self.width_m / 2) * px_m
         return drawn(background, texture, left, LENS.cy - self.height_m / 2 * px_m, self.width_m * px_m / 200)
+
+    def floored(self, image: Grey, height_m: float, driven_m: float) -> Grey:
+        """The picture with a floor of soft blobs below the horizon, 50 px a metre."""
+        floor = pattern(400, 1200, self.seed + 200, 4.0)
+        u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))
+        below = np.maximum(v - LENS.cy, 0.5)
+        range_m = height_m * LENS.fy / below
+        across, along = (u - LENS.cx) * range_m / LENS.fx * 50 + 200, (range_m + driven_m) * 50
+        seen = cv2.remap(floor, across.astype(np.float32), along.astype(np.float32), cv2.INTER_LINEAR)
+        return np.asarray(np.where((v > LENS.cy) & (range_m < 15.0), seen, image), np.uint8)

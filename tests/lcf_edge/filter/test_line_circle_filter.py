@@ -182,6 +182,19 @@ def test_in_a_full_table_the_trusted_stay(street: Any, lens: Lens) -> None:
     assert len(trusted & left) > 0.8 * len(trusted)
 
 
+@pytest.mark.parametrize("speed_mps", [0.0, 0.3, 2.0, 8.0, -1.0])
+@pytest.mark.parametrize("unknown", [range(10), range(10, 16)], ids=["at first", "for a while"])
+def test_a_speed_that_becomes_known_makes_no_rebels_of_what_stands(
+    drive: Drive, clutter: Landmarks, lens: Lens, speed_mps: float, unknown: range
+) -> None:
+    tables = LineCircleFilter(Config(), lens)
+    rebels = []
+    for seq, (corners, moved) in enumerate(drive(clutter(250), speed_mps=speed_mps)):
+        tables.step(corners, replace(moved, speed_mps=math.nan) if seq in unknown else moved)
+        rebels.append(tables.edges.rebels)
+    assert max(rebels) == 0
+
+
 ODD = {
     "speed unknown": motion(speed_mps=math.nan),
     "standing": motion(speed_mps=0.0),

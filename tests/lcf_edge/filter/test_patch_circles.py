@@ -1,11 +1,12 @@
 """What stands ahead and comes slowly is found by how much a piece of the picture grows, though its corners flicker."""
 
 import math
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
-from lcf_edge.config import Config, Filter, Memory, Vehicle, load
+from lcf_edge.config import Camera, Config, Filter, Memory, Vehicle, load
 from lcf_edge.filter import LineCircleFilter
 from lcf_edge.messages import Cause
 from tests.lcf_edge.filter.boards import LENS, Board
@@ -43,6 +44,32 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
             ranges_m.append(rebel.range[c] / board.distance_m(seq))
     assert len(ranges_m) > 10
     assert np.median(ranges_m) == pytest.approx(1.0, abs=0.15)
+
+
+def test_at_the_rim_of_the_way_it_is_told_without_a_gap_once_it_was_told_twice() -> None:
+    tables = LineCircleFilter(CONFIG, LENS)
+    told = []
+    for corners, motion, image in Board(right_m=VEHICLE.half_width_m):
+        tables.step(corners, motion, image)
+        told.append(bool((tables.rebel.active & (tables.rebel.trust >= CONFIG.filter.tr_s)).any()))
+    assert sum(told) > 25
+    twice = [before and now for before, now in pairwise(told)].index(True)
+    assert all(told[twice:])
+
+
+LEVEL = Config(vehicle=VEHICLE, camera=Camera(height_m=0.45))
+TILTED = Config(vehicle=VEHICLE, camera=Camera(height_m=0.45, pitch_rad=-0.05))  # which is wrong
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_pieces_one_above_the_other_and_as_far_are_not_of_the_ground_wherever_the_horizon_is(seed: int) -> None:
+    assert len(driven(Board(height_m=0.9, floor_m=0.45, seed=seed), TILTED)) > 18
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_floor_is_nothing_that_stands(seed: int) -> None:
+    beyond = Board(range_m=60.0, floor_m=0.45, flicker=0.3, seed=seed)
+    assert not driven(beyond, LEVEL)
 
 
 def test_it_is_an_object_that_stands() -> None:

@@ -194,6 +194,20 @@ def test_links_reach_through_neighbours_and_no_farther_than_they_do(situation: S
     assert label[0] != label[9]
 
 
+@pytest.mark.parametrize(
+    ("speed_pxps", "slower", "groups"),
+    [(400, 1.0, 1), (400, 0.8, 1), (400, 0.6, 6), (60, 1.0, 6)],
+    ids=["fast", "nearly alike", "not alike", "slow"],
+)
+def test_few_rebels_far_apart_on_something_that_passes_fast_go_together(
+    situation: Situation, speed_pxps: float, slower: float, groups: int
+) -> None:
+    x = 90 * np.arange(6, dtype=np.float32)
+    still = np.zeros(6, np.float32)
+    vx = np.where(np.arange(6) % 2, slower, 1.0).astype(np.float32) * speed_pxps
+    assert len(set(linked(x, still + 150, vx, still, situation()))) == groups
+
+
 def test_a_few_rebels_in_a_crowd_that_flows_make_and_keep_no_circle(situation: Situation) -> None:
     few = SETTINGS.rebel_support
     assert not Scene(situation()).update(CROSSING, number=few, flowing=40).trust

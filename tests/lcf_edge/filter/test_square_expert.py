@@ -235,6 +235,27 @@ def test_what_stands_before_a_vehicle_that_stops_stays_where_it_was(
     assert tables.objects.class_id[row] == ObjectClass.STANDING
 
 
+def test_before_a_vehicle_that_stands_an_object_is_not_held_by_what_lies_beside_it(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """Else what somebody hid would hold him at its place, long after he left."""
+    wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
+    tables = LineCircleFilter(Config(), wall.lens)
+    for corners, motion in wall:
+        tables.step(corners, motion)
+    for _ in range(20):
+        tables.step(corners, replace(motion, speed_mps=0.0))
+    edges, (row,) = tables.edges, published(tables.objects)
+    x, width = edges.x[: edges.count], tables.objects.width[row]
+    beside = np.abs(x - tables.objects.x[row]) > 1.5 * width
+    assert beside.sum() > 10
+    edges.square[: edges.count][beside] = row
+    tables.step(corners, replace(motion, speed_mps=0.0))
+    own = edges.square[: edges.count] == row
+    assert own.any()
+    assert (np.abs(edges.x[: edges.count][own] - tables.objects.x[row]) <= 1.5 * width).all()
+
+
 def test_who_leaves_the_picture_at_its_side_is_expected_there_for_a_second(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
