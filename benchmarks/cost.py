@@ -84,12 +84,17 @@ def of_a_frame(count: Callable[[str, int], Cost], part: str) -> Cost:
     return (count(part, MANY) - count(part, FEW)) / (MANY - FEW)
 
 
+def frames_run(drive: Path, part: str, frames: int) -> tuple[str, ...]:
+    """What Python is told to run; ``-P``: else ``benchmarks/drivers.py`` would be imported for ``drivers``."""
+    return "-P", str(HERE / "cost_of_frames.py"), str(drive), part, str(frames)
+
+
 def by_valgrind(drive: Path, core: Core) -> Callable[[str, int], Cost]:
     """Count on this processor with the caches of that core."""
 
     def count(part: str, frames: int) -> Cost:
         options = ["--tool=cachegrind", "--cache-sim=yes", "--cachegrind-out-file=/dev/null", *core.options()]
-        child = (sys.executable, str(HERE / "cost_of_frames.py"), str(drive), part, str(frames))
+        child = (sys.executable, *frames_run(drive, part, frames))
         return read_cachegrind(run("sh", "-c", 'exec "$@" 2>&1', "sh", "valgrind", *options, *child))
 
     return count
@@ -114,7 +119,7 @@ def by_qemu(drive: Path, wheel: Path, place: Path) -> Callable[[str, int], Cost]
     run("gcc", "-O2", "-shared", "-fPIC", "-o", str(plugin), str(HERE / "instructions.c"))
 
     def count(part: str, frames: int) -> Cost:
-        child = (str(root / "usr/bin/python3"), str(HERE / "cost_of_frames.py"), str(drive), part, str(frames))
+        child = (str(root / "usr/bin/python3"), *frames_run(drive, part, frames))
         environment = {**os.environ, "PYTHONPATH": str(place / "wheel"), "PYTHONHOME": str(root / "usr")}
         output = run(
             *("sh", "-c", 'exec "$@" 2>&1', "sh", "qemu-aarch64", "-L", str(root), "-plugin", str(plugin), *child),
