@@ -51,12 +51,12 @@ FLAGS += ["-fno-align-functions", "-fno-align-jumps", "-fno-align-loops"]  # as 
 FLAGS += ["-fno-math-errno", "-fno-trapping-math"]  # nobody asks for either: square roots without a call
 FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a tenth smaller
 
-# What goes once over a few rows a frame is made small instead: a quarter smaller, and a tenth slower.
+# What takes little of a frame is made small instead: a quarter smaller, and a tenth slower.
 SMALL = ["-Os"]
-FEW_ROWS = {"_memoryviews", "axis_bias", "columns", "ground_speed", "group_motion", "heading", "key_frames"}
-FEW_ROWS |= {"circles", "edge_rows", "feedback", "leaps", "normal_circles", "patch_circles", "path", "range_belief"}
-FEW_ROWS |= {"rebel_circles", "rest", "sample_ring"}
-FEW_ROWS |= {"scene_records", "settings", "situation", "square_expert"}
+LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
+LITTLE |= {"feedback", "flow_fit", "ground_speed", "group_motion", "heading", "key_frames", "leaps", "least_squares"}
+LITTLE |= {"line_expert", "normal_circles", "patch_circles", "path", "range_belief", "rebel_circles", "rest"}
+LITTLE |= {"sample_ring", "scene_records", "settings", "situation", "square_expert"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))
@@ -94,7 +94,7 @@ class BuildOneExtension(build_ext):
     def _compiled(self, source: str, ext: Extension) -> str:
         made = OBJECTS / Path(source).with_suffix(".o")
         if not made.exists() or made.stat().st_mtime < Path(source).stat().st_mtime:
-            flags = ext.extra_compile_args + (SMALL if Path(source).stem in FEW_ROWS else [])
+            flags = ext.extra_compile_args + (SMALL if Path(source).stem in LITTLE else [])
             self.compiler.compile([source], str(OBJECTS), ext.define_macros, extra_postargs=flags)
         return str(made)
 

@@ -46,7 +46,7 @@ def describe_imu(sample: ImuSample) -> str:
 
 
 def describe_frame(frame: Frame) -> str:
-    """Size and brightness of a picture."""
+    """Size and brightness of an image."""
     height, width = frame.image.shape
     return f"{width}x{height}, mean {frame.image.mean():.0f}"
 

@@ -1,4 +1,4 @@
-"""The interface of every driver, and how a device is kept open for as long as a vehicle runs."""
+"""The interface of every driver, and how a device is kept open while a vehicle runs."""
 
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -12,8 +12,8 @@ Delivered_co = TypeVar("Delivered_co", covariant=True)
 
 FIRST_PAUSE_S = 0.1
 MAX_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
-MAX_HOPELESS_PAUSE_S = 10.0  # what only the user can fix
-EXCESS = ("excess_bytes", "excess_samples")  # counts of what was dropped because no such device sends so much
+MAX_HOPELESS_PAUSE_S = 10.0  # after errors that only the user can fix
+EXCESS = ("excess_bytes", "excess_samples")  # counts of what was dropped because no real device sends so much
 
 
 class Device(Protocol[Delivered_co]):
@@ -56,11 +56,11 @@ class KeptOpen(Generic[Record]):
 
     @property
     def counts(self) -> Counter[str]:
-        """What was counted so far."""
+        """Counts so far."""
         return self._past if self._device is None else self._past + self._device.counts
 
     def read(self) -> Sequence[Record]:
-        """What the device delivers; nothing, after a pause, while it is away. Never raises ``DriverError``."""
+        """Return what the device delivers; empty, after a pause, while it is away. Never raises ``DriverError``."""
         try:
             if self._device is None:
                 self._device = self._open()

@@ -1,4 +1,4 @@
-"""What a source delivers: frames, inertial samples, speeds.
+"""What sources deliver: frames, inertial samples, speeds.
 
 SI units. An IMU's samples come in its own axes; ``imu.axes`` turns them into the camera's: x right, y down,
 z forward.
@@ -17,7 +17,7 @@ class Frame:
     """One frame: an image with its stamp and number."""
 
     stamp_ns: int  # start of exposure
-    seq: int  # counts pictures of the source, gaps tell drops
+    seq: int  # counts images of the source; gaps are drops
     image: npt.NDArray[np.uint8]  # (height, width) luminance
 
 

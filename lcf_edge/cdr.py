@@ -1,8 +1,8 @@
 """ROS 2 messages as bytes: Common Data Representation (OMG DDSI-RTPS 2.5, section 10; plain CDR, version 1).
 
 A payload is four bytes of encapsulation (``00 01 00 00``: little-endian) and the fields in order, each
-aligned to its own size from the end of those four bytes. Read are both byte orders, written is little-endian.
-Every length is compared with the bytes that are left before anything of that length is made.
+aligned to its own size from the end of those four bytes. Both byte orders are read, little-endian is written.
+Every length is compared with the bytes that are left before memory is taken for it.
 """
 
 import struct
@@ -22,9 +22,9 @@ Vector = tuple[float, float, float]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
 
-_TWIST_BYTES = 7 + 48  # with what may align it
+_TWIST_BYTES = 7 + 48  # with padding
 
-_WITHOUT_GAPS = (CIRCLE, OBJECT)  # between their fields
+_WITHOUT_GAPS = (CIRCLE, OBJECT)  # types without padding between their fields
 
 _BYTE_ORDERS: dict[int, Literal["<", ">"]] = {0x0000: ">", 0x0001: "<"}
 
@@ -291,7 +291,7 @@ def decode_scene(payload: bytes | memoryview) -> Scene:
         ("class of an object", objects["class_id"], ObjectClass),
         ("state of an object", objects["state"], ObjectState),
     ):
-        if (ids > max(known)).any():  # they count from 0
+        if (ids > max(known)).any():  # valid ids are 0 to the largest known
             raise CdrError(f"CDR: the {name} is none that is known")
     if _signals(circles) or _signals(psi) or _signals(objects):
         raise CdrError("CDR: a signalling NaN")
@@ -307,7 +307,7 @@ def _signals(rows: npt.NDArray[np.void]) -> bool:
 
 @cache
 def _float_words(dtype: np.dtype[np.void]) -> list[int]:
-    """Which words of four bytes of a record are float32 fields."""
+    """Return which four-byte words of a record are float32 fields."""
     fields = (dtype.fields or {}).values()
     return [offset // 4 for kind, offset, *_ in fields if kind == np.float32]
 
@@ -319,7 +319,7 @@ class Writer:
         self._body = bytearray()
 
     def payload(self) -> bytes:
-        """What was written, with its encapsulation."""
+        """Return what was written, with its encapsulation."""
         return LITTLE_ENDIAN + self._body
 
     def header(self, stamp_ns: int, frame_id: str) -> None:
@@ -341,7 +341,7 @@ class Writer:
             raise CdrError(f"CDR: a value does not fit its field ({error})") from error
 
     def string(self, text: str) -> None:
-        """A NUL would end it; what UTF-8 cannot say is a question mark."""
+        """Append a string up to its first NUL; characters that UTF-8 does not have become question marks."""
         self.octets(text.replace("\0", "").encode(errors="replace") + b"\0")
 
     def octets(self, data: bytes) -> None:
@@ -350,7 +350,7 @@ class Writer:
         self._body.extend(data)
 
     def records(self, rows: npt.NDArray[np.void], dtype: np.dtype[np.void]) -> None:
-        """A sequence of fixed-size records; what lies between their fields is zero, not what memory held."""
+        """Append a sequence of fixed-size records; padding between their fields is zero."""
         block: npt.NDArray[np.void] = rows
         if rows.dtype != dtype or dtype not in _WITHOUT_GAPS:
             block = np.zeros(len(rows), dtype)
@@ -361,7 +361,7 @@ class Writer:
 
 
 class _Reader:
-    """A place in a payload."""
+    """Reads a payload field by field. Raises ``CdrError`` where it is too short."""
 
     def __init__(self, payload: bytes | memoryview) -> None:
         if len(payload) < 4:
@@ -375,7 +375,7 @@ class _Reader:
 
     @property
     def left(self) -> int:
-        """Bytes that were not read."""
+        """Number of bytes not yet read."""
         return len(self._data) - self._at
 
     def header(self) -> Header:
@@ -394,7 +394,7 @@ class _Reader:
         return x, y, z
 
     def string(self) -> str:
-        """A string with its closing NUL, or without one and empty."""
+        """Read a string: with its closing NUL, or empty without one."""
         try:
             return str(self.octets(), "utf-8").removesuffix("\0")
         except UnicodeDecodeError as error:
@@ -407,14 +407,14 @@ class _Reader:
 
     def sequence(self, dtype: np.dtype[Any], align: int) -> npt.NDArray[Any]:
         (count,) = self.scalars("I")
-        if not count:  # then nothing is aligned either
+        if not count:  # an empty sequence has no padding either
             return np.empty(0, dtype)
         start = self._take(count * dtype.itemsize, align)
         rows = np.frombuffer(self._data, dtype.newbyteorder(self._order), count, start)
         return rows.astype(dtype, copy=False)
 
     def _take(self, size: int, align: int) -> int:
-        """Start of the next ``size`` bytes."""
+        """Return the start of the next ``size`` bytes, and move beyond them."""
         start = self._at + -self._at % align
         if size > len(self._data) - start:
             raise CdrError(f"CDR: {size} bytes are wanted at {start}, {max(0, len(self._data) - start)} are left")

@@ -1,8 +1,7 @@
 """For planners: what a running lcf-edge sees, as NumPy records.
 
 ``for scene in lcf_edge.client.scenes("tcp/rover:7447"): …`` needs NumPy, msgspec and Zenoh, neither OpenCV nor a
-driver. ``scene.objects``, ``scene.circles`` and ``scene.psi`` look into the payload, without a copy; they are
-read-only.
+driver. ``scene.objects``, ``scene.circles`` and ``scene.psi`` are read-only views of the payload.
 """
 
 from lcf_edge.errors import PublishError

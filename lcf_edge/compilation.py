@@ -1,8 +1,8 @@
-"""Imports the filter's modules from the compiled extension, where there is one that was made of these very sources.
+"""Imports the filter's modules from the compiled extension, if one was built from exactly these sources.
 
 The extension ``lcf_edge._compiled`` holds every module that has a ``.pxd`` beside its ``.py`` (setup.py). Without it,
-or when one of those files has changed since, all of them run as the Python that they are written in: right, and slow.
-``LCF_EDGE_PURE=1`` asks for that.
+or when one of those files has changed since, all of them run as plain Python: correct, but slow. ``LCF_EDGE_PURE=1``
+forces that.
 """
 
 import os
@@ -18,24 +18,24 @@ from pathlib import Path
 from types import ModuleType
 
 PACKAGE = Path(__file__).parent
-SLOWER = 100  # times, about
+SLOWER = 100  # times, approximately
 _INSTALL = "sudo apt install gcc python3-dev  # and install again; or install a wheel"
 _EXTENSION, _SHARED = "lcf_edge._compiled", "lcf_edge._memoryviews"
 
 
 @dataclass(frozen=True, slots=True)
 class Compiled:
-    """The extension and the modules in it; or why it is not used, and the command that changes that."""
+    """The extension and its modules; or why it is not used, and the command that fixes that."""
 
     path: str = ""
     modules: frozenset[str] = frozenset()
     reason: str = ""
     command: str = ""
-    outdated: bool = False  # it is there, made of other sources
+    outdated: bool = False  # it exists, but was built from other sources
 
 
 def uncompiled() -> str:
-    """Why the filter runs uncompiled, and the remedy, in one line; empty: it is compiled."""
+    """Return why the filter runs uncompiled, and the remedy, in one line; empty: it is compiled."""
     compiled = extension()
     if not compiled.reason:
         return ""
@@ -44,7 +44,7 @@ def uncompiled() -> str:
 
 @cache
 def extension() -> Compiled:
-    """The extension, looked at once."""
+    """Return the extension; it is examined once."""
     if os.environ.get("LCF_EDGE_PURE") == "1":
         return Compiled(reason="LCF_EDGE_PURE is set", command="unset LCF_EDGE_PURE")
     try:
@@ -57,7 +57,7 @@ def extension() -> Compiled:
 
 
 def examined(path: str, modules: str, made_of: str, present: Mapping[str, str]) -> Compiled:
-    """The extension at ``path`` with what it says of itself, beside the sources that are ``present``."""
+    """Compare the extension at ``path`` with the sources that are ``present``."""
     then = dict(each.split(":") for each in made_of.split())
     changed = sorted(name for name in {*then, *present} if then.get(name) != present.get(name))
     if changed:
@@ -67,7 +67,7 @@ def examined(path: str, modules: str, made_of: str, present: Mapping[str, str]) 
 
 
 def sources() -> dict[str, str]:
-    """CRC-32 of every file that goes into the extension, by its path within the package."""
+    """Return the CRC-32 of every source of the extension, by path within the package."""
     declarations = list(PACKAGE.rglob("*.pxd"))
     modules = (path.with_suffix(".py") for path in declarations)
     files = (*declarations, *(module for module in modules if module.exists()))
@@ -75,12 +75,12 @@ def sources() -> dict[str, str]:
 
 
 def use_compiled() -> None:
-    """From now on import what is compiled from the extension."""
+    """Import compiled modules from the extension from now on."""
     sys.meta_path.insert(0, _Finder())
 
 
 class _Finder:
-    """Finds the modules of the extension, which is not looked at before one of them is wanted."""
+    """Finds the modules of the extension, which is examined when the first of them is imported."""
 
     def find_spec(
         self, fullname: str, path: Sequence[str] | None, target: ModuleType | None = None

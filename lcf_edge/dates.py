@@ -8,5 +8,5 @@ _FIRST_S = (datetime.min.replace(tzinfo=UTC) - _EPOCH) // timedelta(seconds=1)
 
 
 def utc(system_ns: int) -> datetime:
-    """A time of the system clock as a date, to the second; beyond the years 1 to 9999 the nearest of them."""
+    """Return a time of the system clock as a date, to the second; limited to the years 1 to 9999."""
     return _EPOCH + timedelta(seconds=min(max(system_ns // 1_000_000_000, _FIRST_S), _LAST_S))

@@ -1,11 +1,11 @@
-"""How large a picture may be: checked by its header, and once more by the decoder."""
+"""How large an image may be: checked by its header, and again by the decoder."""
 
 import os
 
 MAX_PIXELS = 2**25
-"""8K; a picture of more is refused, for a small file can decode to gigabytes."""
+"""Pixels of 8K; larger images are refused, because a small file can decode to gigabytes."""
 
 
 def limit_opencv() -> None:
-    """OpenCV refuses what is larger, on every way into it. Only before it is loaded, and only for a whole program."""
+    """Let OpenCV itself refuse larger images. Call before it is loaded; holds for the whole process."""
     os.environ.setdefault("OPENCV_IO_MAX_IMAGE_PIXELS", str(MAX_PIXELS))

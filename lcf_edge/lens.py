@@ -1,6 +1,6 @@
 """The lens: positions of the input frame to those of an ideal pinhole, and back.
 
-Distortion is removed from the corners, not from the picture. The models are those of OpenCV: with a ray's
+Distortion is removed from the corners, not from the image. The models are those of OpenCV: with a ray's
 x/z, y/z and r = √(x² + y²),
 
 - radial-tangential (k1, k2, p1, p2[, k3]): r ↦ r(1 + k1 r² + k2 r⁴ + k3 r⁶), then decentring by p1, p2;
@@ -23,22 +23,22 @@ Points = npt.NDArray[np.float32]
 
 _Floats = npt.NDArray[np.float64]
 
-WIDEST, NARROWEST = 200, 1000  # sides of the picture in a focal length, focal lengths in a side
-FARTHEST_MIDDLE = 10  # in sides
+WIDEST, NARROWEST = 200, 1000  # largest focal length in image sides; largest side in focal lengths
+FARTHEST_MIDDLE = 10  # from the principal point to the image, in sides
 MAX_COEFFICIENT = 100.0
 
-_MIN_COEFFICIENT = 1e-12  # what is less bends nothing, and has no root
-_MAX_ANGLE_RAD = np.radians(85.0)  # off the optical axis: a plane picture holds no more
+_MIN_COEFFICIENT = 1e-12  # less bends nothing, and has no root
+_MAX_ANGLE_RAD = np.radians(85.0)  # off the optical axis: a plane image holds no more
 _MIN_SLOPE = 0.1  # beyond, 1 px of corner noise would become 10 px; the fold, where it is 0, is near
-_NEWTON_STEPS = 3  # always as many: a point's answer must not depend on the others
-_TOLERANCE = 1e-4  # of x/z, y/z before the last step, which squares it: below 1e-3 px in the end
+_NEWTON_STEPS = 3  # a fixed number: a point's result must not depend on others
+_TOLERANCE = 1e-4  # of x/z, y/z before the last step, which squares it to below 1e-3 px
 _NODES = 2048  # of the radial inverse; its error is below 1e-4 px
 _COEFFICIENTS = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}
 
 
 @dataclass(frozen=True)
 class Lens:
-    """Intrinsics of a camera for pictures of ``width`` × ``height`` px.
+    """Intrinsics of a camera for images of ``width`` × ``height`` px.
 
     ``fx``, ``fy``, ``cx``, ``cy``: px, pixel centres at whole numbers. A model that folds back, or looks over
     85° off the axis, is used up to there; positions beyond are NaN both ways. Raises ``ConfigError``.
@@ -73,7 +73,7 @@ class Lens:
 
     @classmethod
     def from_config(cls, camera: Camera, width: int, height: int) -> "Lens":
-        """The lens of ``camera`` for pictures of ``width`` × ``height`` px.
+        """The lens of ``camera`` for images of ``width`` × ``height`` px.
 
         Without intrinsics the field of view gives the focal length, and the axis meets the middle. Raises
         ``ConfigError``.
@@ -90,7 +90,7 @@ class Lens:
         return cls(width, height, focal, focal, (width - 1) / 2, (height - 1) / 2, model, coefficients)
 
     def scaled(self, width: int, height: int) -> "Lens":
-        """The same lens for pictures of another size. Raises ``ConfigError`` when the aspect is another."""
+        """The same lens for images of another size. Raises ``ConfigError`` when the aspect is another."""
         if (width, height) == (self.width, self.height):
             return self
         if abs(width * self.height - height * self.width) > max(self.width, self.height):  # 1 px of rounding
@@ -112,7 +112,7 @@ class Lens:
         ray = self._ray(np.sqrt(s))
         gain = _poly(self.radial, ray * ray) + 2 * (p2 * x + p1 * y)
         if self.model == "equidistant":
-            gain *= ray / np.sqrt(np.maximum(s, 1e-18))  # θ/r; the middle stays where it is
+            gain *= ray / np.sqrt(np.maximum(s, 1e-18))  # θ/r; 1 on the axis
         gain[ray > self.reach] = np.nan
         return self._pixels(x * gain + p2 * s, y * gain + p1 * s)
 
@@ -182,7 +182,7 @@ class Lens:
 
     @cached_property
     def reach(self) -> float:
-        """Largest r (radial-tangential) or θ (equidistant) that the model maps usefully."""
+        """Largest r (radial-tangential) or θ (equidistant, rad) that the model maps usefully."""
         slope = [(2 * i + 1) * k for i, k in enumerate(self.radial)]  # of ρ, as a polynomial of r² or θ²
         slope[0] -= _MIN_SLOPE
         slope = [k if abs(k) >= _MIN_COEFFICIENT else 0.0 for k in slope]
@@ -192,7 +192,7 @@ class Lens:
 
     @cached_property
     def _inverse(self) -> tuple[_Floats, _Floats]:
-        """Distorted radius, ascending, and what it must be multiplied with to become r."""
+        """Return distorted radii, ascending, and the factors that turn them into r."""
         equidistant = self.model == "equidistant"
         angles = np.linspace(1e-6, self.reach if equidistant else np.arctan(self.reach), _NODES)
         r = np.tan(angles)
@@ -202,7 +202,7 @@ class Lens:
 
     @cached_property
     def _table(self) -> Points:
-        """``undistort`` of every pixel, row by row, so that little memory is needed meanwhile."""
+        """Return ``undistort`` of every pixel; made row by row to save memory."""
         table = np.empty((self.height, self.width, 2), np.float32)
         row = np.zeros((self.width, 2), np.float32)
         row[:, 0] = np.arange(self.width)

@@ -28,7 +28,7 @@ class Cause(IntEnum):
 
 
 class ObjectClass(IntEnum):
-    """What an object does, over ground. A number that is none of these, of a newer sender or a liar, is ``UNKNOWN``."""
+    """What an object does, over ground. Other numbers, of newer or faulty senders, are ``UNKNOWN``."""
 
     UNKNOWN = 0
     STANDING = 1

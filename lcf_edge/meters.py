@@ -1,4 +1,4 @@
-"""Running figures in fixed memory: the rate at which records come, and how long something takes."""
+"""Running statistics in fixed memory: the rate of records, and durations."""
 
 import math
 from collections.abc import Iterable
@@ -7,7 +7,7 @@ import numpy as np
 
 _SMOOTHED_OVER = 64  # intervals
 _FINEST_S, _COARSEST_S = 1e-5, 10.0
-_RESOLUTION = 1.03  # of one bin to the next
+_RESOLUTION = 1.03  # ratio of neighbouring bins
 _BINS = math.ceil(math.log(_COARSEST_S / _FINEST_S, _RESOLUTION)) + 1
 
 
@@ -40,7 +40,7 @@ class IntervalMeter:
         self._variance_s2 = (1 - share) * (self._variance_s2 + share * off_s * off_s)
 
     def restart(self) -> None:
-        """The next record comes after a pause that says nothing about the rate."""
+        """Begin anew after a pause that says nothing about the rate."""
         self.last_ns = None
 
     @property
@@ -71,7 +71,7 @@ class DurationHistogram:
         self._counts[0] = 0
 
     def percentile_s(self, percent: float) -> float:
-        """Upper edge of the bin in which that share of the durations ends; NaN: there are none."""
+        """Return the upper edge, s, of the bin that completes this share of the durations; NaN: there are none."""
         counts = self._counts.sum(axis=0)
         total = int(counts.sum())
         if not total:

@@ -1,6 +1,6 @@
-"""The filter's tables as the records of a scene: the rows that are relied upon, as far as the lens can place them.
+"""The filter's tables as the records of a scene: the trusted rows, as far as the lens can place them.
 
-What is nearly met may have its middle beside the picture: it is shown at the border.
+Something about to be met may have its middle beside the image: it is shown at the border.
 """
 
 import math
@@ -19,15 +19,15 @@ NAN = float("nan")
 INF = float("inf")
 REBEL = 1  # `messages.Kind`
 MAX_SUPPORT = 65535
-BEARING_SHARE = 0.25  # of an object's extent, 1 sigma of where its middle is
-X, Y = 2, 3  # fields of every record; before them are its id, and its small numbers in one
+BEARING_SHARE = 0.25  # 1 sigma of an object's middle, as a share of its extent
+X, Y = 2, 3  # fields of every record, after its id and its small numbers
 
 
 class Records:
     """Room for records of one type of ``messages``, of which ``count`` are in use.
 
-    ``words`` and ``floats`` are their fields of four bytes, as whole numbers and as others. ``owner``: of each the id
-    of the object that it belongs to, 0: none.
+    ``words`` and ``floats`` are views of their four-byte fields as integers and as floats. ``owner``: the id of the
+    object that each belongs to, 0: none.
     """
 
     def __init__(self, capacity: int, record: np.dtype[np.void]) -> None:
@@ -39,11 +39,11 @@ class Records:
         self.owner = memory_of(self.owners)
 
     def written(self) -> npt.NDArray[np.void]:
-        """Those in use."""
+        """Return the records in use."""
         return self.array[: self.count].copy().view(self.record)[:, 0]
 
     def written_owners(self) -> npt.NDArray[np.uint32]:
-        """Of those in use."""
+        """Return the owners of the records in use."""
         return self.owners[: self.count].copy()
 
 
@@ -70,7 +70,7 @@ def elevation(plane: ImagePlane, right: float, y: float) -> float:
 def add_circles(
     records: Records, table: CircleColumns, objects: ObjectColumns, kind: int, plane: ImagePlane, least_trust: float
 ) -> None:
-    """Add circles with that much trust, as ``messages.CIRCLE``."""
+    """Add circles with at least that trust, as ``messages.CIRCLE``."""
     for i in range(table.capacity):
         if not table.active[i] or table.trust[i] < least_trust or not place(records, plane, table.x[i], table.y[i]):
             continue
@@ -93,7 +93,7 @@ def add_circles(
 
 
 def add_objects(records: Records, table: ObjectColumns, plane: ImagePlane, least_trust: float) -> None:
-    """Add objects with that much trust, as ``messages.OBJECT``."""
+    """Add objects with at least that trust, as ``messages.OBJECT``."""
     for i in range(table.capacity):
         if not table.active[i] or table.trust[i] < least_trust or not place(records, plane, table.x[i], table.y[i]):
             continue

@@ -2,8 +2,8 @@
 
 At ``/usr/lib/lcf-edge`` it has a Python environment for all of ``PYTHONS`` at once. Python looks for packages in the
 folder of its own version there: what fits that version alone is in it, and a line leads to what fits all. So nothing is
-fetched, built or removed on the vehicle, also when its Debian comes to another Python. What else a package is,
-``debian/`` tells. ``lintian`` must have nothing to say, and it is tried before it is left there.
+fetched, built or removed on the vehicle, also when its Debian comes to another Python. The rest of a package is in
+``debian/``. ``lintian`` must have nothing to say, and it is tried before it is left there.
 """
 
 import os

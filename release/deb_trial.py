@@ -19,15 +19,15 @@ _GROUPS = ("etc/group", "etc/gshadow")  # which stay
 
 def try_out(machine: Machine, package: Path) -> str:
     """What was tried, in one line. Raises ``ReleaseError`` where the package does not do what it should."""
-    told = []
+    outcomes = []
     for suite in SUITES:
         with tempfile.TemporaryDirectory() as place:
             root = Path(place, "root")
             run("cp", "-a", str(installed(machine, suite, PACKAGES)), str(root))
             shutil.copy(package, root / package.name)
             (root / "dev/null").touch()  # nothing here is a device
-            told.append(f"Debian {suite}: {_tried_in(root, package.name)}")
-    return "; ".join(told)
+            outcomes.append(f"Debian {suite}: {_tried_in(root, package.name)}")
+    return "; ".join(outcomes)
 
 
 def _tried_in(root: Path, name: str) -> str:

@@ -7,13 +7,13 @@ from drivers.errors import DeviceStalledError
 LATE_INTERVALS = 2
 STALL_INTERVALS = 10
 MIN_STALL_S = 1.0
-_MAX_GAP = 1000  # pictures; a larger step of the sequence number is the device counting anew
+_MAX_GAP = 1000  # images; at a larger step the device has begun to count anew
 
 
 class Arrivals:
-    """Of a camera's stream that has just begun, at ``fps``; the first picture may take ``starting_s`` longer.
+    """Of a camera's stream that has just begun, at ``fps``; the first image may take ``starting_s`` longer.
 
-    ``seq``: the number of the last picture. ``counts``: those of the driver; ``dropped`` (the camera counted them,
+    ``seq``: the number of the last image. ``counts``: those of the driver; ``dropped`` (the camera counted them,
     nobody got them), ``late`` (older than two intervals) and ``stamped at arrival`` (the stamp was of another clock or
     impossible) are added to them.
     """
@@ -24,12 +24,12 @@ class Arrivals:
         self._name = name
         self._interval_ns = round(1e9 / fps)
         self._stall_ns = max(STALL_INTERVALS * self._interval_ns, round(MIN_STALL_S * 1e9))
-        self._waited_ns = -round(starting_s * 1e9)  # in vain, since the last usable picture
+        self._waited_ns = -round(starting_s * 1e9)  # since the last usable image
         self._stamp_ns = -1
         self._sequence: int | None = None  # as the device counts, modulo 2^32
 
     def number(self, sequence: int) -> None:
-        """Count the picture that the device calls ``sequence``."""
+        """Count the image that the device calls ``sequence``."""
         step = 1 if self._sequence is None else (sequence - self._sequence) % 2**32
         if not 0 < step <= _MAX_GAP:
             step = 1  # it does not count, or counts anew
@@ -38,9 +38,9 @@ class Arrivals:
         self.counts["dropped"] += step - 1
 
     def stamp(self, claimed_ns: int | None, queued_ns: int, now_ns: int) -> int:
-        """The device's stamp where it can be true, else now. None: it is of another clock.
+        """Return the device's stamp if it can be true, else now. None: it is of another clock.
 
-        True: after the last one, not long before the buffer was given to the camera at ``queued_ns``, and not in the
+        It must be after the last one, not long before the camera got the buffer at ``queued_ns``, and not in the
         future, give or take an interval (some drivers reckon when the frame will have ended).
         """
         earliest_ns = max(queued_ns - LATE_INTERVALS * self._interval_ns, self._stamp_ns + 1)
@@ -50,17 +50,17 @@ class Arrivals:
         return now_ns
 
     def is_late(self, stamp_ns: int, now_ns: int) -> bool:
-        """Whether a picture is older than ``LATE_INTERVALS``."""
+        """Whether an image is older than ``LATE_INTERVALS``."""
         return now_ns - stamp_ns > LATE_INTERVALS * self._interval_ns
 
     def deliver(self, stamp_ns: int, now_ns: int) -> None:
-        """A picture is good and goes to the reader."""
+        """Note that a good image goes to the reader."""
         self.counts["late"] += self.is_late(stamp_ns, now_ns)
         self._stamp_ns = stamp_ns
         self._waited_ns = 0
 
     def wait(self, waited_ns: int) -> None:
-        """Nothing usable came for so long. Raises ``DeviceStalledError`` when that is too long altogether."""
+        """Note that nothing usable came for so long. Raises ``DeviceStalledError`` when that is too long altogether."""
         self._waited_ns += waited_ns
         if self._waited_ns > self._stall_ns:
             raise DeviceStalledError(

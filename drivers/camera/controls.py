@@ -27,7 +27,7 @@ from drivers.errors import UnsupportedSettingError
 EXPOSURE_UNIT_S = 1e-4
 _AUTOMATIC, _MANUAL, _SHUTTER_FIRST, _APERTURE_FIRST = 0, 1, 2, 3  # of CID_EXPOSURE_AUTO; 0 and 3 expose by themselves
 _POWER_LINE = {0: 0, 50: 1, 60: 2}
-_REFUSALS = (*NOT_IMPLEMENTED, errno.ERANGE, errno.EACCES, errno.EBUSY)  # of a value, not of the device
+_REFUSALS = (*NOT_IMPLEMENTED, errno.ERANGE, errno.EACCES, errno.EBUSY)  # errors of a value, not of the device
 
 
 def set_exposure(node: Node, exposure_s: float | None) -> None:
@@ -42,10 +42,10 @@ def set_exposure(node: Node, exposure_s: float | None) -> None:
         return
     if _query(node, CID_EXPOSURE_AUTO) and _get(node, CID_EXPOSURE_AUTO) in {_MANUAL, _SHUTTER_FIRST}:
         modes = [mode for mode in (_AUTOMATIC, _APERTURE_FIRST) if _in_menu(node, CID_EXPOSURE_AUTO, mode)]
-        if modes:  # else it has no automatic
+        if modes:  # else it has no automatic exposure
             _set(node, "the exposure's automatic", CID_EXPOSURE_AUTO, modes[0])
     if _query(node, CID_EXPOSURE_AUTO_PRIORITY):
-        with suppress(UnsupportedSettingError):  # some cameras have it only for show
+        with suppress(UnsupportedSettingError):  # some cameras list it without supporting it
             _set(node, "the rate's priority", CID_EXPOSURE_AUTO_PRIORITY, 0)
 
 

@@ -14,7 +14,7 @@ def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
 
     A name may be a part of the camera's, in any case; whole names go first. Raises ``DriverError``, among them
     ``DeviceMissingError`` that names the cameras there are, and ``WrongDeviceError`` for a node that gives no
-    pictures, or only through libcamera, and for a name that two cameras have.
+    images, or only through libcamera, and for a name that two cameras have.
     """
     return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)
 

@@ -1,7 +1,7 @@
 """The header of a JPEG, read as the decoder reads it, so that its size is known before memory is taken for it.
 
-What the decoder would step over in another way than this is no header: between segments nothing but fill bytes may
-stand, and each segment is of a kind whose length both read alike.
+A header that the decoder might read differently is refused: only fill bytes may stand between segments, and each
+segment is of a kind whose length both read alike.
 Source: ITU-T T.81, annex B.
 """
 

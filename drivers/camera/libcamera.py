@@ -1,7 +1,7 @@
 """A camera that libcamera runs, such as those at the ribbon cable of a Raspberry Pi.
 
-libcamera is in a process of its own (``libcamera_process``), under the system's Python: its binding is built for that
-one alone, and what crashes in it ends the process and not the program, which opens the camera again. A picture is
+libcamera is in a process of its own (``libcamera_process``), under the system's Python: its binding is built only for
+that one, and a crash ends the process but not the program, which opens the camera again. An image is
 copied once, as with V4L2: the process hands over descriptors of libcamera's buffers (dma-buf), and then only tells
 which one is filled.
 Source: libcamera, ``SensorTimestamp`` of control_ids_core.yaml; Linux ``include/uapi/linux/dma-buf.h``.
@@ -49,9 +49,9 @@ COMMAND = ("/usr/bin/python3", "-I", str(Path(__file__).with_name("libcamera_pro
 """What runs libcamera: the Python for which the distribution builds its binding."""
 LOG_LEVELS = "LIBCAMERA_LOG_LEVELS"  # set in the environment: libcamera's log goes to stderr
 MAX_WAIT_S = 0.25  # of one read
-OPENING_S = 15.0  # longest; a small computer has to load everything from its card
-STARTING_S = 3.0  # until the first picture, beyond the usual; those with an exposure that is not settled are held back
-ENDING_S = 0.4  # then the process is killed; a daemon that ends has no more time
+OPENING_S = 15.0  # at most; a small computer loads everything from its card
+STARTING_S = 3.0  # until the first image, beyond the usual; those with an exposure that is not settled are held back
+ENDING_S = 0.4  # then the process is killed; an ending daemon has no more time
 _MAX_MESSAGE = 65536
 _MAX_BUFFERS = 32
 _SYNC = 0x4008_6200  # DMA_BUF_IOCTL_SYNC
@@ -130,7 +130,7 @@ class _Process:
             other.close()
 
     def wait(self, timeout_s: float) -> bool:
-        """Whether a message, or the end, has come in that time."""
+        """Wait; return whether a message, or the end, has come."""
         poller = select.poll()
         poller.register(self._socket, select.POLLIN)
         return bool(poller.poll(timeout_s * 1e3))
@@ -171,10 +171,10 @@ class _Process:
 
 
 class LibcameraCamera:
-    """A camera that delivers the newest picture, stamped by libcamera.
+    """A camera that delivers the newest image, stamped by libcamera.
 
     ``device``: the sensor's name, whole or in part ("imx219"), the camera's id, or a node in /dev that is its own.
-    The pictures show the whole field of view where the sensor has a mode for that at ``fps``. ``pixel_format``: one of
+    The images show the whole field of view where the sensor has a mode for that at ``fps``. ``pixel_format``: one of
     those that libcamera offers and ``luminance`` reads; ``auto``: the cheapest. ``exposure_s``, ``gain`` (1: none)
     and ``power_line_hz`` (0, 50, 60) lock what they name; None: automatic. Autofocus is off, the lens where it is sharp
     from near to far. ``command``: runs libcamera. Raises ``DriverError``; what is not granted raises
@@ -182,7 +182,7 @@ class LibcameraCamera:
 
     ``mode``: what was granted.
 
-    ``counts``: ``dropped`` (libcamera counted them, nobody got them), ``overtaken`` (a newer picture was there),
+    ``counts``: ``dropped`` (libcamera counted them, nobody got them), ``overtaken`` (a newer image was there),
     ``late`` (delivered, but older than two intervals), ``corrupt``, ``short`` (refused), ``stamped at arrival`` (the
     stamp was impossible).
     """
@@ -231,7 +231,7 @@ class LibcameraCamera:
         self._interval_ns = round(1e9 / fps)
 
     def read(self) -> Sequence[Frame]:
-        """The newest picture, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """The newest image, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
         began_ns = self._clock.monotonic_ns()
         frames = self._take() if self._process.wait(MAX_WAIT_S) else []
         if not frames:
@@ -261,7 +261,7 @@ class LibcameraCamera:
         stamp_ns = self._arrivals.stamp(claimed_ns, self._queued_ns[newest.index], now_ns)
         try:
             if len(filled) == len(self._memory) and (self._arrivals.is_late(stamp_ns, now_ns) or stamp_ns == now_ns):
-                # Without a free buffer the camera dropped what came after these; a fresh picture is on its way.
+                # Without a free buffer the camera dropped what came after these; a fresh image is on its way.
                 self.counts["overtaken"] += 1
                 return []
             image = self._luminance(newest)

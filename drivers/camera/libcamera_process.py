@@ -58,7 +58,7 @@ class Refused(Exception):  # noqa: N818  # it is no fault of the program
 
 
 def serve(libcamera: Any, connection: socket.socket, request: dict[str, Any]) -> None:
-    """Hand pictures over until the other end closes. Raises ``Refused``."""
+    """Hand images over until the other end closes. Raises ``Refused``."""
     manager = libcamera.CameraManager.singleton()
     if not request["device"]:
         _send(connection, "cameras", cameras=[{"name": _model(one), "id": one.id} for one in manager.cameras])
@@ -213,7 +213,7 @@ def _configuration(libcamera: Any, camera: Any, pixel_format: Any, width: int, h
 def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: Any, fallback: Any) -> Any:
     """The configuration with the sensor's smallest mode of those that see the most, at the rate that is asked for.
 
-    Left alone, libcamera takes the mode whose size is nearest, which on many sensors is a part of the picture. What a
+    Left alone, libcamera takes the mode whose size is nearest, which on many sensors is a part of the image. What a
     mode sees is only known once it is set up. ``fallback``: where modes cannot be chosen.
     """
     offers: list[tuple[int, int, Any]] = []

@@ -1,7 +1,7 @@
 """From the bytes of a buffer to grey, not by way of colours where the format allows.
 
 GREY is grey already; NV12, YU12 and their like begin with a plane of it (Y); YUYV and UYVY carry it in every second
-byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw pictures of a sensor with
+byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw images of a sensor with
 colours (Bayer) and RGB are weighted sums of their colours (ITU-R BT.601).
 Source: Linux "Video for Linux API", Image Formats; ITU-T T.81 (JPEG), annex B, for the markers.
 """
@@ -115,11 +115,11 @@ PIXEL_FORMATS = (
     "MJPG",
     *(name for _, names in _BAYER for name in names),
 )
-"""What can be read, by the four letters of V4L2: the cheapest first, raw pictures last, which nobody has exposed."""
+"""What can be read, by the four letters of V4L2: the cheapest first, raw images last, which nobody has exposed."""
 
 
 class FrameError(DriverError):
-    """One picture that cannot be used; the text says why in two or three words, for counting."""
+    """One image that cannot be used; the text says why in two or three words, for counting."""
 
 
 def least_stride(pixel_format: str, width: int) -> int:
@@ -130,7 +130,7 @@ def least_stride(pixel_format: str, width: int) -> int:
 def luminance(pixel_format: str, data: memoryview, width: int, height: int, stride: int, reduction: int = 1) -> Grey:
     """Grey of its own memory from ``data``, the filled part of a buffer; ``stride``: bytes from one row to the next.
 
-    ``reduction``: by how much larger the picture in a JPEG is, one of ``REDUCTIONS``.
+    ``reduction``: by how much larger the image in a JPEG is, one of ``REDUCTIONS``.
     Raises ``FrameError``: "short", "corrupt", "wrong size".
     """
     if pixel_format == "MJPG":
@@ -152,7 +152,7 @@ def _decode(jpeg: bytes, width: int, height: int, reduction: int) -> Grey:
         raise FrameError("corrupt")
     if (header.width, header.height) != (width * reduction, height * reduction):
         raise FrameError("wrong size")
-    end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill up what is missing and call it a picture
+    end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill up what is missing and call it an image
     if end is None or end.group() != b"\xff\xd9":
         raise FrameError("corrupt")
     try:

@@ -52,7 +52,7 @@ _GONE = select.POLLERR | select.POLLHUP | select.POLLNVAL
 
 
 class V4l2Camera:
-    """A camera that delivers the newest picture, stamped by the kernel.
+    """A camera that delivers the newest image, stamped by the kernel.
 
     ``device``: a path, a link in ``/dev/v4l/by-id`` or the camera's own name. ``pixel_format``: one of
     ``PIXEL_FORMATS``, or ``auto`` for the first of them that the camera has at that size and rate. ``exposure_s``,
@@ -60,10 +60,10 @@ class V4l2Camera:
     automatic. Raises ``DriverError``; what is not granted raises ``UnsupportedSettingError`` with what is offered.
 
     ``mode``: what was granted. ``stamped_at_exposure``: whether the kernel's stamps are of the start of exposure (after
-    the first picture; else of the end of the frame, a constant later, which belongs into the time offset between camera
+    the first image; else of the end of the frame, a constant later, which belongs into the time offset between camera
     and IMU).
 
-    ``counts``: ``dropped`` (the camera counted them, nobody got them), ``overtaken`` (a newer picture was there),
+    ``counts``: ``dropped`` (the camera counted them, nobody got them), ``overtaken`` (a newer image was there),
     ``late`` (delivered, but older than two intervals), ``corrupt``, ``short``, ``wrong size`` (refused), ``stamped at
     arrival`` (the kernel's stamp was of another clock or impossible).
     """
@@ -105,7 +105,7 @@ class V4l2Camera:
         self._arrivals = Arrivals(device, self.mode.fps, self.counts)
 
     def read(self) -> Sequence[Frame]:
-        """The newest picture, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """The newest image, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
         began_ns = self._clock.monotonic_ns()
         with as_driver_errors(self.name):
             events = self._node.poll(MAX_WAIT_S)
@@ -137,7 +137,7 @@ class V4l2Camera:
         late = self._arrivals.is_late(stamp_ns, now_ns)
         try:
             if len(filled) == len(self._memory) and (late or stamp_ns == now_ns):
-                # Without a free buffer the camera dropped what came after these; a fresh picture is on its way.
+                # Without a free buffer the camera dropped what came after these; a fresh image is on its way.
                 self.counts["overtaken"] += 1
                 return []
             image = self._luminance(newest)
@@ -150,7 +150,7 @@ class V4l2Camera:
         return [Frame(stamp_ns, self._arrivals.seq, image)]
 
     def _dequeue(self) -> Filled | None:
-        """A filled buffer, its picture counted; None: there is none."""
+        """A filled buffer, its image counted; None: there is none."""
         try:
             filled = self._buffers.dequeue(self._node)
         except BlockingIOError:

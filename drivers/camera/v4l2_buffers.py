@@ -1,6 +1,6 @@
 """The requests that differ between single-planar and multi-planar devices, as one interface.
 
-A multi-planar device (many systems on a chip) may keep the planes of a picture in memories of their own. Luminance is
+A multi-planar device (many systems on a chip) may keep the planes of an image in memories of their own. Luminance is
 in the first one of all formats that are read, so that only it is mapped.
 Source: Linux "Video for Linux API", Single- and multi-planar APIs; ``struct v4l2_plane``.
 """
@@ -43,7 +43,7 @@ class Granted:
 
 @dataclass(frozen=True, slots=True)
 class Filled:
-    """A buffer with a picture: its bytes are ``start`` to ``end`` of its memory."""
+    """A buffer with an image: its bytes are ``start`` to ``end`` of its memory."""
 
     index: int
     start: int
@@ -57,7 +57,7 @@ class Buffers(Protocol):
     """The requests; all raise ``OSError``."""
 
     def set_format(self, node: Node, pixel_format: str, width: int, height: int) -> Granted:
-        """Ask for progressive pictures; the device grants what it can."""
+        """Ask for progressive images; the device grants what it can."""
         ...
 
     def place(self, node: Node, index: int) -> tuple[int, int]:
@@ -74,10 +74,10 @@ class Buffers(Protocol):
 
 
 class SinglePlanar:
-    """One memory for each picture."""
+    """One memory for each image."""
 
     def set_format(self, node: Node, pixel_format: str, width: int, height: int) -> Granted:
-        """Ask for progressive pictures; the device grants what it can. Raises ``OSError``."""
+        """Ask for progressive images; the device grants what it can. Raises ``OSError``."""
         requested = Format(
             type=VIDEO_CAPTURE, width=width, height=height, pixelformat=fourcc(pixel_format), field=FIELD_NONE
         )
@@ -100,10 +100,10 @@ class SinglePlanar:
 
 
 class MultiPlanar:
-    """A memory for each plane of a picture; the first is what counts."""
+    """A memory for each plane of an image; the first is what counts."""
 
     def set_format(self, node: Node, pixel_format: str, width: int, height: int) -> Granted:
-        """Ask for progressive pictures; the device grants what it can. Raises ``OSError``."""
+        """Ask for progressive images; the device grants what it can. Raises ``OSError``."""
         requested = PlanesFormat(
             type=VIDEO_CAPTURE_MPLANE, width=width, height=height, pixelformat=fourcc(pixel_format), field=FIELD_NONE
         )

@@ -206,7 +206,7 @@ class Plane(ctypes.Structure):
         ("length", u32),
         ("offset", u32),  # for mmap
         ("padding_of_union", u32),
-        ("data_offset", u32),  # bytes before the picture
+        ("data_offset", u32),  # bytes before the image
         ("reserved", u32 * 11),
     )
 
@@ -387,12 +387,12 @@ class Node:
 
     @property
     def is_camera(self) -> bool:
-        """Whether it delivers pictures by itself; nodes of metadata, sound and radio do not."""
+        """Whether it delivers images by itself; nodes of metadata, sound and radio do not."""
         return self._captures and self.caps & CAP_STREAMING != 0 and not self.needs_libcamera
 
     @property
     def needs_libcamera(self) -> bool:
-        """Whether pictures come only when sensor and pipeline are run through the media controller.
+        """Whether images come only when sensor and pipeline are run through the media controller.
 
         So are cameras at the ribbon cable: the node takes sizes and formats, and then does not start.
         """
@@ -400,7 +400,7 @@ class Node:
 
     @property
     def is_signal_processor(self) -> bool:
-        """Whether it works on the pictures of others; it need not tell so, and is there without a camera as well."""
+        """Whether it works on the images of others; it need not tell so, and is there without a camera as well."""
         return self._driver in _SIGNAL_PROCESSORS
 
     @property

@@ -19,7 +19,7 @@ class Gravity:
         self._known = False
 
     def measured_g(self, samples: Iterable[ImuSample]) -> float | None:
-        """What gravity is, once, when the vehicle has rested; None: not known yet, or returned before. Units of g."""
+        """Return gravity, g, once, after the vehicle has rested; None: not known yet, or already returned."""
         if self._known:
             return None
         for sample in samples:

@@ -42,7 +42,7 @@ class Range:
     end: int = 0  # the count at its end; 0: where range and word length put it
 
     def end_of(self, full_scale: int) -> int:
-        """The count from which on an axis is saturated."""
+        """Return the count from which on an axis is saturated."""
         return self.end or min(int(full_scale * self.lsb), MAX_COUNT)
 
 
@@ -137,7 +137,7 @@ class I2cImu(ABC):
         self._wait()
         samples = self._samples()
         now_ns = self._clock.monotonic_ns()
-        # our own late wake-up is not the chip's silence
+        # a late wake-up of ours is not the chip's silence
         self._silence_s = 0.0 if samples else self._silence_s + min((now_ns - begin_ns) / 1e9, STALL_S / 4)
         missing = self._silence_s * self.rate_hz
         if (now_ns >= self._next_check_ns or missing > PATIENCE) and not self._settings_hold():
@@ -151,7 +151,7 @@ class I2cImu(ABC):
         """Let the bus go."""
         self._bus.close()
 
-    # What a chip says of itself.
+    # What each chip defines.
 
     @abstractmethod
     def _granted_rate_hz(self, rate_hz: float) -> float:
@@ -171,11 +171,11 @@ class I2cImu(ABC):
 
     @abstractmethod
     def _wait(self) -> None:
-        """Until samples are due."""
+        """Wait until samples are due."""
 
     @abstractmethod
     def _samples(self) -> list[ImuSample]:
-        """What is there now, oldest first."""
+        """Return the samples that are there now, oldest first."""
 
     # What they share.
 
@@ -186,7 +186,7 @@ class I2cImu(ABC):
         self._bus.write(self.address, register, bytes(values))
 
     def _identify(self, copy: int | None) -> str:
-        """The model that the chip says it is. ``copy``: what else may be said, by a copy of the chip."""
+        """Return the model by the chip's identity. ``copy``: another identity to accept, of a copy of the chip."""
         try:
             found = self._read(self.identity_register, 1)[0]
         except TransferError as error:

@@ -67,7 +67,7 @@ def names(interface: Interface) -> list[str]:
 
 
 def has_interface(name: str, interface: Interface) -> bool:
-    """Whether the driver is there and of that interface; "none" and "recording" are of none."""
+    """Whether the driver exists and has that interface; "none" and "recording" have none."""
     return name in DRIVERS and DRIVERS[name].interface == interface
 
 

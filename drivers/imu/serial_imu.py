@@ -20,7 +20,7 @@ from drivers.samples import ImuSample
 FIRST_BYTE_S = 4.0  # many boards start anew when their port is opened
 STALLED_S = 1.0
 MAX_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
-FRAMES_BY_CHANCE = 3  # that noise can look like
+FRAMES_BY_CHANCE = 3  # that noise can imitate
 TICKS = 2**32  # counters of most devices begin anew after so many
 MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
 MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate is set
@@ -167,7 +167,7 @@ class SerialImu:
         return self._stamps.stamps_of_steps_ns(now_ns, [step or step_by_rate for step in steps])
 
     def _step(self, reading: Reading) -> int:
-        """Units of the clock since the reading before; 0: unknown, the device's clock began anew."""
+        """Return units of the clock since the reading before; 0: unknown, the device's clock began anew."""
         if self._unit_hz != self._protocol.tick_hz or reading.ticks is None:
             return round((reading.lost + 1) * self._unit_hz / self._rate_hz)
         before, self._ticks = self._ticks, reading.ticks
@@ -178,7 +178,7 @@ class SerialImu:
 
     def _sample(self, reading: Reading, stamp_ns: int) -> ImuSample:
         gyro = reading.gyro
-        if reading.spans and self._stamps:  # the device took its own period for what it should be
+        if reading.spans and self._stamps:  # the device assumed its nominal period
             scale = self._stamps.rate_hz / self._rate_hz
             gyro = gyro[0] * scale, gyro[1] * scale, gyro[2] * scale
             stamp_ns -= round(reading.spans / self._stamps.rate_hz / 2 * 1e9)

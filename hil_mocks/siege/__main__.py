@@ -211,7 +211,8 @@ def watched(
                 figures.descriptors[process.name] = most
             figures.memory_mib = max(figures.memory_mib, daemon.resident_mib)
             time.sleep(0.5)
-        figures.frames_share = len(received) / (received[-1] - received[0] + 1 - FPS * paused_s)
+        if received:
+            figures.frames_share = len(received) / (received[-1] - received[0] + 1 - FPS * paused_s)
         for subscriber in subscribers:
             subscriber.undeclare()  # type: ignore[no-untyped-call]
     figures.waves = {attack.name: attack.waves for attack in attacks}

@@ -1,8 +1,8 @@
-"""``lcf-edge calibrate``: what the configuration must know of this camera and this IMU, measured.
+"""``lcf-edge calibrate``: measures what the configuration must know of this camera and this IMU.
 
 ``camera`` finds the lens from views of a ``target``; ``rest`` the gyro's bias and noise; ``motions`` the IMU's axes
 from motions by hand; ``alignment`` those axes and the clocks' offset (``time_offset``) from the gyro against
 ``image_rotation``; ``foe`` how the camera is mounted. ``tracks`` follows corners for the last three. ``sources``
-delivers what devices or a recording give, ``guide`` talks to the person, ``result`` is what each returns,
+delivers the data of devices or a recording, ``guide`` prompts the user, ``result`` is what each returns,
 ``report`` draws it, ``config_file`` writes it.
 """

@@ -25,9 +25,9 @@ _MIN_TURNS = 40
 _COARSE_S = 0.01
 _FINE_S = 0.002
 _FINE_REACH_S = 0.02
-_RIVAL_FROM_S = 0.1  # of the best offset: nearer, the correlation has not come down yet
+_RIVAL_FROM_S = 0.1  # from the best offset; nearer, the correlation has not fallen yet
 _ITERATIONS = 3
-_MAX_SIGMA_RADPS = 0.5  # of an interval; its corners showed nothing
+_MAX_SIGMA_RADPS = 0.5  # 1 sigma of an interval's rate; beyond, its corners showed nothing
 _MIN_CORRELATION = 0.8
 _MIN_RATE_RADPS = 0.1  # root mean square
 _OUTLIER = 3.0  # times the median error
@@ -58,13 +58,13 @@ class Alignment:
 
     @cached_property
     def residual_radps(self) -> float:
-        """Of one axis, weighted root mean square."""
+        """Difference between the camera's and the gyro's rates: weighted root mean square of one axis, rad/s."""
         squares = ((self.camera - self.gyro) ** 2).sum(axis=1)
         return float(np.sqrt(self.weights @ squares / self.weights.sum() / 3))
 
     @cached_property
     def axes_sigma_rad(self) -> float:
-        """1 sigma of the rotation about its least known axis; inf: nothing turned about another."""
+        """1 sigma of the rotation about its least known axis, rad; inf: it turned about one axis only."""
         squares = self.gyro**2
         information = (
             np.diag(self.weights @ squares.sum(axis=1, keepdims=True) * np.ones(3))
@@ -75,13 +75,13 @@ class Alignment:
 
     @cached_property
     def rates_radps(self) -> Floats:
-        """Root mean square of the gyro about each camera axis, (3,)."""
+        """Root mean square of the gyro's rates about each camera axis, (3,), rad/s."""
         rates: Floats = np.sqrt((self.gyro**2).mean(axis=0))
         return rates
 
 
 class _Gyro:
-    """Mean rates over any interval, by the integral of straight lines between samples."""
+    """Mean rates over any interval: samples are joined by straight lines and integrated."""
 
     def __init__(self, samples: Sequence[ImuSample], origin_ns: int) -> None:
         self._times_s = np.array([sample.stamp_ns - origin_ns for sample in samples]) * 1e-9
@@ -91,7 +91,7 @@ class _Gyro:
         self.first_s, self.last_s = float(self._times_s[0]), float(self._times_s[-1])
 
     def mean(self, starts_s: Floats, ends_s: Floats) -> Floats:
-        """(n, 3)"""
+        """Return the mean rates of intervals, (n, 3), rad/s."""
         angles = [
             np.interp(ends_s, self._times_s, column) - np.interp(starts_s, self._times_s, column)
             for column in self._integral.T
@@ -116,36 +116,36 @@ class _Comparison:
         self.weights = np.ones(len(self.camera))
 
     def rates(self, offset_s: float) -> Floats:
-        """Of the gyro, its own axes."""
+        """Return the gyro's mean rates in its own axes, (n, 3), rad/s."""
         return self._gyro.mean(self._starts_s - offset_s, self._ends_s - offset_s)
 
     def fit(self, offset_s: float) -> tuple[float, Floats]:
-        """Correlation and the rotation that makes it."""
+        """Return the largest correlation at this offset, and the rotation (3, 3) that gives it."""
         c, g = self._less_mean(self.camera), self._less_mean(self.rates(offset_s))
         rotation, together = best_rotation((c * self.weights[:, None]).T @ g)
         size = np.sqrt((self.weights @ (c * c).sum(axis=1)) * (self.weights @ (g * g).sum(axis=1)))
         return together / max(float(size), 1e-12), rotation
 
     def scan(self, around_s: float, reach_s: float, step_s: float) -> tuple[Floats, Floats]:
-        """Offsets and the correlation at each."""
+        """Return offsets, s, and the correlation at each."""
         steps = round(reach_s / step_s)
         offsets_s: Floats = around_s + step_s * np.arange(-steps, steps + 1, dtype=np.float64)
         return offsets_s, np.array([self.fit(offset_s)[0] for offset_s in offsets_s.tolist()])
 
     def turned(self, offset_s: float, rotation: Floats) -> tuple[Floats, Floats]:
-        """The gyro's bias in its own axes, and its rates in the camera's without it."""
+        """Return the gyro's bias in its own axes, and its rates without that in the camera's axes, rad/s."""
         rates = self.rates(offset_s)
         bias = self.weights @ (rates - self.camera @ rotation) / self.weights.sum()
         return bias, (rates - bias) @ rotation.T
 
     def weigh(self, offset_s: float) -> None:
-        """Intervals that do not fit count less from now on."""
+        """Give less weight to intervals that do not fit."""
         _, gyro = self.turned(offset_s, self.fit(offset_s)[1])
         errors = np.sqrt(((self.camera - gyro) ** 2).sum(axis=1))
         self.weights = 1 / (1 + (errors / (_OUTLIER * max(float(np.median(errors)), 1e-6))) ** 2)
 
     def peak(self, around_s: float) -> float:
-        """Where the correlation is largest, by a parabola through it."""
+        """Return the offset, s, at which the correlation is largest, by fitting a parabola."""
         for _ in range(2):
             offsets_s, correlations = self.scan(around_s, _FINE_REACH_S, _FINE_S)
             square, slope, _ = np.polyfit(offsets_s - around_s, correlations, 2)
@@ -159,7 +159,7 @@ class _Comparison:
 
 
 def align(turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float = 0.0) -> Alignment:
-    """The alignment, searched within ``SEARCH_S`` of ``around_s``. Raises ``CalibrationError``."""
+    """Return the alignment, searched within ``SEARCH_S`` of ``around_s``. Raises ``CalibrationError``."""
     turns = [turn for turn in turns if turn.sigma_radps < _MAX_SIGMA_RADPS]
     _refuse_few(turns, samples)
     both = _Comparison(turns, samples, around_s)

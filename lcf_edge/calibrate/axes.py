@@ -17,7 +17,7 @@ Floats = npt.NDArray[np.float64]
 
 
 def snapped(axes: Floats, snap_rad: float) -> tuple[Floats, tuple[str, ...]]:
-    """``axes``, or the exact ones if they are within ``snap_rad``; and what to say about it."""
+    """Return ``axes``, or the exact ones if they are within ``snap_rad``; and a line for the user about it."""
     exact, off_rad = nearest_exact(axes)
     where = f"{np.degrees(off_rad):.1f}° from exact axes (IMU: {in_words(exact)})"
     if off_rad <= snap_rad:
@@ -28,7 +28,7 @@ def snapped(axes: Floats, snap_rad: float) -> tuple[Floats, tuple[str, ...]]:
 def axes_result(
     axes: Floats, findings: tuple[str, ...], extra: dict[str, float], config: Config, paint: "Callable[[Figure], None]"
 ) -> Result:
-    """With a line about what is configured now."""
+    """Return the result for ``imu.axes``, with a line about the configured ones."""
     rows: list[list[float]] = (axes.round(6) + 0.0).tolist()
     if config.imu.axes:
         off_deg = np.degrees(angle_rad(np.array(config.imu.axes), axes))

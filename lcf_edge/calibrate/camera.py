@@ -31,9 +31,9 @@ _OUTLIER = 3.0  # times the median error of a view
 _OUTLIER_PX = 0.3
 _MAX_ERROR_PX = 1.0
 _MAX_FOCAL_SIGMA = 0.005  # of the focal length
-_MAX_CENTRE_SIGMA = 0.005  # of the picture's width
+_MAX_CENTRE_SIGMA = 0.005  # of the image's width
 _MIN_COVERAGE = 0.5  # of the cells
-_MIN_SPREAD = 0.2  # of width and height, of the middles of the board
+_MIN_SPREAD = 0.2  # share of width and height over which the board's centres must spread
 _MIN_TILT_RAD = np.radians(15)
 _MIN_TILTED = 3  # views
 
@@ -45,22 +45,22 @@ class Solution:
     intrinsics: Floats
     distortion: Floats
     sigma: Floats  # (8,)
-    tilts_rad: Floats  # of the board against the picture, each view
+    tilts_rad: Floats  # of the board against the image, each view
     residuals: tuple[Floats, ...]
 
     @property
     def errors_px(self) -> Floats:
-        """Root mean square distance of each view."""
+        """Root mean square reprojection error of each view, px."""
         return np.array([np.sqrt((view**2).sum(axis=1).mean()) for view in self.residuals])
 
     @property
     def error_px(self) -> float:
-        """The same of all corners."""
+        """Root mean square reprojection error of all corners, px."""
         return float(np.sqrt((np.concatenate(self.residuals) ** 2).sum(axis=1).mean()))
 
 
 def calibrate_camera(source: SensorSource, board: Target, model: Model, views_wanted: int, guide: Guide) -> Result:
-    """Lens by ``views_wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
+    """Return the lens from ``views_wanted`` views, or as many as a recording has. Raises ``CalibrationError``."""
     views = collect(source, board, views_wanted, guide)
     return solve(views, model)
 
@@ -93,7 +93,7 @@ def _thin_out(views: Views, views_wanted: int) -> None:
 
 
 def solve(views: Views, model: Model) -> Result:
-    """The lens, believable. Raises ``CalibrationError``."""
+    """Return a lens that can be trusted. Raises ``CalibrationError``."""
     refuse_poor(views)
     kept, dropped = list(views.kept), 0
     solution = fit(kept, views.board, views.size, model)
@@ -108,7 +108,7 @@ def solve(views: Views, model: Model) -> Result:
 
 
 def refuse_poor(views: Views) -> None:
-    """Views that cannot tell a lens. Raises ``CalibrationError``."""
+    """Refuse views that do not determine a lens. Raises ``CalibrationError``."""
     if len(views.kept) < MIN_VIEWS:
         reasons = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common(3)) or "no pictures"
         raise CalibrationError(
@@ -129,7 +129,7 @@ def refuse_poor(views: Views) -> None:
 
 
 def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
-    """A lens that does not follow from the views. Raises ``CalibrationError``."""
+    """Refuse a lens that the views do not support. Raises ``CalibrationError``."""
     if not solution.error_px < _MAX_ERROR_PX:
         raise CalibrationError(
             f"camera: corners are {solution.error_px:.2f} px from where a {model} lens would put them; check that the "
@@ -159,7 +159,7 @@ def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
 
 
 def fit(kept: list[Sighting], board: Target, size: tuple[int, int], model: Model) -> Solution:
-    """Least squares of all corners. Raises ``CalibrationError``."""
+    """Fit the lens to all corners by least squares. Raises ``CalibrationError``."""
     places = [board.places[view.numbers] for view in kept]
     corners = [view.corners for view in kept]
     try:
@@ -194,7 +194,7 @@ def _fit_equidistant(places: list[Pixels], corners: list[Pixels], size: tuple[in
         shown.append(points.reshape(-1, 2))
         lens, pose = np.asarray(slopes)[:, :8], np.asarray(slopes)[:, 8:14]
         across = lens.T @ pose
-        normal += lens.T @ lens - across @ np.linalg.solve(pose.T @ pose, across.T)  # the pose is not asked for
+        normal += lens.T @ lens - across @ np.linalg.solve(pose.T @ pose, across.T)  # eliminates the pose
         free += len(slopes) - 6
     errors = np.concatenate([(a - b).ravel() for a, b in zip(corners, shown, strict=True)])
     sigma = np.sqrt(np.diag(np.linalg.inv(normal)) * (errors @ errors) / max(free, 1))

@@ -1,4 +1,4 @@
-"""Camera and IMU watched together: what turns and samples they give, for ``by_camera`` and ``time_offset``."""
+"""Camera and IMU watched together: the turns and samples they give, for ``by_camera`` and ``time_offset``."""
 
 from dataclasses import dataclass, field
 
@@ -25,7 +25,7 @@ class Watched:
     turns: list[Turn] = field(default_factory=list)
     samples: list[ImuSample] = field(default_factory=list)
     guessed: bool = False
-    brisk_s: float = 0.0  # of turning
+    brisk_s: float = 0.0  # of turning fast enough
 
     def add(self, turned: Turn) -> None:
         """One interval."""
@@ -35,7 +35,7 @@ class Watched:
 
 
 def watch(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Watched:
-    """Everything from ``source``; live for ``seconds``, 20 unless given. Raises what the source raises."""
+    """Return all turns and samples of ``source``; live for ``seconds`` (20). Raises what ``source`` raises."""
     if source.live:
         seconds = seconds or LIVE_S
         guide.say(

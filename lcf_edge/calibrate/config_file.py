@@ -16,14 +16,14 @@ from lcf_edge.errors import ConfigError
 
 
 def as_toml(table: str, values: Mapping[str, Value]) -> str:
-    """The lines of the configuration."""
+    """Return the values as lines of TOML."""
     document = tomlkit.document()
     document[table] = dict(values)
     return tomlkit.dumps(document).strip()
 
 
 def check_writable(path: Path) -> None:
-    """Refuse before work begins. Raises ``ConfigError``."""
+    """Refuse a file that cannot be written, before any measurement. Raises ``ConfigError``."""
     if not path.is_file():
         raise ConfigError(f"{path}: no such file to write to; name yours with -c, or make an empty one")
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
@@ -35,7 +35,7 @@ def write(path: Path, table: str, values: Mapping[str, Value]) -> None:
 
     Raises ``ConfigError``, with the file as it was, when it cannot be written or would not be valid.
     """
-    target = path.resolve()  # a link stays one
+    target = path.resolve()  # a symbolic link is kept
     try:
         document = tomlkit.parse(target.read_text(encoding="utf-8"))
         section = document.setdefault(table, tomlkit.table())
@@ -62,7 +62,7 @@ def _replace(target: Path, text: str) -> None:
             reason = str(error).removeprefix(f"{new}: ")
             raise ConfigError(f"{target}: left as it was, it would not be valid: {reason}") from error
         owner = target.stat()
-        with suppress(PermissionError):  # only root may give it to others
+        with suppress(PermissionError):  # only root may change the owner
             os.chown(new, owner.st_uid, owner.st_gid)
         shutil.copymode(target, new)
         new.replace(target)

@@ -1,6 +1,6 @@
 """How the camera is mounted: where a straight drive's focus of expansion lies, once rotation is taken out.
 
-Each interval between pictures has a rotation of its own, all have one direction of travel t in common. A corner's ray
+Each interval between images has a rotation of its own, all have one direction of travel t in common. A corner's ray
 x, after x', then obeys x' · (t × R x) = 0. The distance from that line is made small over all intervals together:
 for each t the rotations are those that fit best, so only t's two slopes remain (variable projection, Gauss-Newton,
 Cauchy weights). No gyro is needed: its bias would move the focus by degrees.
@@ -35,14 +35,14 @@ LIVE_S = 20.0
 _MIN_MOTION_PX = 4.0
 _MAX_FRAMES = 5
 _MIN_INTERVALS = 12
-_MIN_PARALLAX_RAD = 0.004  # median flow that rotation does not explain: else it stands still
+_MIN_PARALLAX_RAD = 0.004  # median flow that rotation does not explain; below, the vehicle stands
 _STRAIGHT_RADPS = 0.06  # mean over _STRAIGHT_S
 _STRAIGHT_S = 1.0
 _MIN_STRAIGHT = 0.6  # of the intervals
 _ITERATIONS = 12
-_SCALE_SHARES = (8.0, 4.0, 2.0)  # of the robust fit, from coarse to fine
+_SCALE_SHARES = (8.0, 4.0, 2.0)  # scales of the robust fit, from coarse to fine
 _MIN_SCALE = 1e-4
-_MAX_SLOPE = 1.0  # of the direction of travel; beyond it lies outside of most pictures
+_MAX_SLOPE = 1.0  # of the direction of travel; beyond, it lies outside most images
 _PIECES = 5
 _MAX_SIGMA_RAD = np.radians(0.5)
 _SETTLED = 1e-6
@@ -57,7 +57,7 @@ class Focus:
     place: Floats  # (n, 2) rays
     flow: Floats  # (n, 2) without rotation
     intervals: int
-    left_out: int  # that turned
+    left_out: int  # intervals in which the vehicle turned
     pieces: Floats  # (m, 2) slopes of parts of the drive
 
     @property
@@ -143,7 +143,7 @@ def find_focus(tracked: Sequence[Tracks]) -> Focus:
 
 
 def _straight(tracked: Sequence[Tracks], rotations: Sequence[Floats]) -> npt.NDArray[np.bool_]:
-    """(n,) whether the mean rate of turning is small around each interval."""
+    """Return, (n,), whether the mean turning rate around each interval is small."""
     times_s = np.array([tracks.end_ns - tracked[0].start_ns for tracks in tracked]) * 1e-9
     lengths_s = np.array([tracks.dt_s for tracks in tracked])
     angles = np.array([cv2.Rodrigues(rotation)[0][1, 0] for rotation in rotations])
@@ -186,7 +186,7 @@ def _linearised(tracks: Tracks, rotation: Floats, slope: Floats) -> tuple[Floats
     """Distances from the line through the focus (n,), and their slopes by t (n, 2) and by the rotation (n, 3)."""
     place = _turned(tracks.before, rotation)
     flow = tracks.after - place
-    arm = (place + tracks.after) / 2 - slope  # from the focus, half-way
+    arm = (place + tracks.after) / 2 - slope  # from the focus to the middle of the flow vector
     length = np.maximum(np.hypot(*arm.T), 0.02)[:, None]
     normal = np.stack([-arm[:, 1], arm[:, 0]], axis=1) / length
     errors = np.einsum("ni,ni->n", normal, flow)

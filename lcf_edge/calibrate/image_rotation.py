@@ -1,8 +1,8 @@
-"""How the camera turned between two pictures, by what it saw.
+"""How the camera turned between two images, from the images.
 
 With small rotations δ a ray (x, y, 1) moves by B δ, B = [[-xy, 1 + x², -y], [-(1 + y²), xy, x]] (Longuet-Higgins &
 Prazdny 1980). Driving moves it too, along the line through the focus of expansion. So errors along that line and across
-it are weighted apart, robustly: near corners count across it alone, far ones both ways.
+it are weighted separately and robustly: near corners count only across it, far ones both ways.
 """
 
 from dataclasses import dataclass
@@ -32,7 +32,7 @@ class Turn:
 
 
 def turn(tracks: Tracks, travel: Floats = FORWARD) -> Turn:
-    """The rotation over ``tracks``, driving along ``travel`` (3,), camera axes, if at all."""
+    """Return the rotation over ``tracks``; ``travel``: (3,), direction of travel in camera axes, if it drives."""
     rotation: Floats = np.eye(3)
     rays = np.column_stack([tracks.before, np.ones(len(tracks.before))])
     for _ in range(_ITERATIONS):
@@ -57,6 +57,6 @@ def turn(tracks: Tracks, travel: Floats = FORWARD) -> Turn:
 
 
 def motion_field(place: Floats) -> Floats:
-    """B, (n, 2, 3), at x/z, y/z (n, 2)."""
+    """Return B, (n, 2, 3), at rays x/z, y/z, (n, 2)."""
     x, y = place.T
     return np.stack([np.stack([-x * y, 1 + x * x, -y], axis=1), np.stack([-(1 + y * y), x * y, x], axis=1)], axis=1)

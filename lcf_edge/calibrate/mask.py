@@ -1,8 +1,8 @@
-"""The vehicle's own parts in view: what never moves in the picture while the vehicle drives and turns.
+"""The vehicle's own parts in view: what never moves in the image while the vehicle drives and turns.
 
-Of every pixel the grey gradient is averaged over the drive. Where something stands still in the picture the mean is as
-long as the root mean square of the gradients; where the world passes they come and go, and point anywhere. A plain
-surface has no gradients: it is an own part when it reaches the border of the picture and its rim stands still.
+The grey gradient of every pixel is averaged over the drive. Where something stands still in the image, the mean is as
+long as the root mean square of the gradients; where the world passes, they change and point anywhere. A plain surface
+has no gradients: it belongs to the vehicle when it reaches the border of the image and its rim stands still.
 """
 
 from collections.abc import Callable, Sequence
@@ -28,22 +28,22 @@ Polygon = list[list[float]]
 
 LIVE_S = 30.0
 
-_APART_S = 0.2  # pictures that are closer tell the same again
+_APART_S = 0.2  # images closer together show the same
 _MIN_FRAMES = 20
 _SMOOTH_PX = 1.0
-_STILL = 0.8  # mean gradient to the root mean square
+_STILL = 0.8  # least ratio of the mean gradient to the root mean square
 _TEXTURED = 6.0  # root mean square of the gradients; by Sobel's weights, 8 are one grey level a px
-_PASSES = 0.5  # of the textured pixels must move, else it stood
-_WALLED = 0.7  # of a plain surface's rim must stand still
-_CLOSED_SHARE = 0.02  # of the picture's width: gaps that are closed
-_MIN_SHARE = 0.001  # of the picture
+_PASSES = 0.5  # least share of the textured pixels that must move, else the vehicle stood
+_WALLED = 0.7  # least share of a plain surface's rim that must stand still
+_CLOSED_SHARE = 0.02  # of the image's width: gaps that are closed
+_MIN_SHARE = 0.001  # of the image
 _MAX_SHARE = 0.6
 _SMOOTHED_PX = 2.0  # by which a polygon may miss the outline
 _GROWN_PX = 2
 
 
 class Stillness:
-    """How much of every pixel's gradient stays over the pictures of a drive."""
+    """How constant every pixel's gradient is over the images of a drive."""
 
     def __init__(self, height: int, width: int) -> None:
         self.frames = 0
@@ -51,7 +51,7 @@ class Stillness:
         self._squares = np.zeros((height, width), np.float32)
 
     def add(self, image: Grey) -> None:
-        """Take the next picture."""
+        """Take the next image, (height, width)."""
         smooth = cv2.GaussianBlur(image, (0, 0), _SMOOTH_PX)
         gx, gy = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
         self._sum[0] += gx
@@ -60,11 +60,11 @@ class Stillness:
         self.frames += 1
 
     def textured(self) -> Marked:
-        """Where there is something to see, still or not."""
+        """Pixels with texture, still or not; (height, width)."""
         return np.asarray(self._squares >= _TEXTURED**2 * self.frames)
 
     def still(self) -> Marked:
-        """Where it never moves."""
+        """Pixels that never move; (height, width)."""
         along, down = self._sum
         return np.asarray(along**2 + down**2 > _STILL**2 * self.frames * self._squares) & self.textured()
 
@@ -97,7 +97,7 @@ def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, 
 
 
 def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
-    """``camera.mask`` as given, px of the source's pictures. Raises ``CalibrationError``."""
+    """``camera.mask`` as given, px of the source's images. Raises ``CalibrationError``."""
     image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
     guide.end()
     if image is None:
@@ -126,7 +126,7 @@ def own_parts(stillness: Stillness) -> Marked:
 
 
 def _enclosed(still: Marked, plain: Marked) -> Marked:
-    """Plain surfaces at the border of the picture whose rim stands still."""
+    """Plain surfaces at the border of the image whose rim stands still."""
     count, label = cv2.connectedComponents(plain.astype(np.uint8), connectivity=4)
     rim = np.zeros(still.shape, np.bool_)
     around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
@@ -140,7 +140,7 @@ def _enclosed(still: Marked, plain: Marked) -> Marked:
 
 
 def _solid(marked: Marked) -> Marked:
-    """Without gaps and specks; what does not reach the border of the picture is no part of the vehicle."""
+    """Remove gaps, specks, and what does not reach the border of the image: it is no part of the vehicle."""
     height, width = marked.shape
     reach = 2 * round(_CLOSED_SHARE * width / 2) + 1
     round_brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))

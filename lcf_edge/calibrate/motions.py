@@ -1,7 +1,7 @@
-"""The IMU's axes from motions by hand: at rest up is known, and each motion turns about an axis of the vehicle.
+"""The IMU's axes from motions by hand: gravity gives up, and each motion turns about a known axis of the vehicle.
 
-The person is led through the steps; each ends when it stands still again. A hand is good to some 10°, so an IMU that
-sits square is recognised as such. Vehicle axes: x right, y down, z ahead.
+The user is led through the steps; each ends when the vehicle stands still again. A hand is accurate to some 10°, so an
+IMU that sits square is recognised as such. Vehicle axes: x right, y down, z ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,8 +27,8 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-_WINDOW_S = 0.6  # that it must stand still at the end of a step
-_REST_S = 4.0  # and before the first
+_WINDOW_S = 0.6  # for which it must stand still at the end of a step
+_REST_S = 4.0  # the same before the first step
 _EVERY_S = 0.1
 _STILL_GYRO_RADPS = 0.06
 _STILL_GYRO_STD_RADPS = 0.05
@@ -36,12 +36,12 @@ _STILL_ACCEL_STD_MPS2 = 0.4
 _LEVEL_RAD = np.radians(10)
 _MAX_SATURATED_S = 0.02
 _MAX_MISFIT_RAD = np.radians(25)
-_UP_WEIGHT = 4.0  # gravity is better known than a hand's axis
+_UP_WEIGHT = 4.0  # weight of gravity, which is known better than a hand's axis
 
 
 @dataclass(frozen=True)
 class Step:
-    """What to do; how far it turns, at least; about which axis of the vehicle, None: back to level; does it tilt."""
+    """A motion: what to do, least angle, axis of the vehicle (None: back to level), whether it tilts."""
 
     prompt: str
     name: str
@@ -98,11 +98,11 @@ class Motions:
 
     @property
     def name(self) -> str:
-        """Of the present step."""
+        """Name of the present step."""
         return STEPS[self._step].name if self.rest else "rest on level ground"
 
     def add(self, sample: ImuSample) -> bool:
-        """Take a sample; whether a step ended with it. Raises ``CalibrationError``."""
+        """Take a sample. Return whether it ended a step. Raises ``CalibrationError``."""
         if self.samples and self.rest:
             self._turn(self.samples[-1], sample, self.rest)
         self.samples.append(sample)
@@ -119,7 +119,7 @@ class Motions:
 
     @property
     def turned_rad(self) -> float:
-        """In the present step so far."""
+        """Angle turned in the present step so far, rad."""
         return float(np.linalg.norm(cv2.Rodrigues(self._rotation)[0]))
 
     def _begin(self) -> bool:
@@ -221,7 +221,7 @@ def axes_of(rest: Rest, turns: dict[str, Floats]) -> tuple[Floats, dict[str, flo
 
 
 def camera_from_vehicle(camera: Camera) -> Floats:
-    """The vehicle's axes to the camera's, by its mounting."""
+    """Return the rotation (3, 3) from the vehicle's axes to the camera's, by the configured mounting."""
     pitch = cv2.Rodrigues(np.array([-camera.pitch_rad, 0.0, 0.0]))[0]
     yaw = cv2.Rodrigues(np.array([0.0, -camera.yaw_rad, 0.0]))[0]
     rotation: Floats = np.asarray(pitch @ yaw, np.float64)
@@ -242,7 +242,7 @@ def _still(window: Sequence[ImuSample], rest: Rest | None) -> bool:
 
 
 def _between(one: Floats, other: Floats) -> float:
-    """Angle between two vectors."""
+    """Return the angle between two vectors, rad."""
     cosine = one @ other / (np.linalg.norm(one) * np.linalg.norm(other))
     return float(np.arccos(np.clip(cosine, -1, 1)))
 

@@ -19,7 +19,7 @@ AXIS_COLOURS = (RED, GREEN, BLUE)  # x, y, z
 
 
 def check_report(path: Path, suffixes: Sequence[str] = SUFFIXES) -> None:
-    """Refuse before work begins. Raises ``UsageError``, ``SinkError``."""
+    """Refuse a file that cannot be written, before any measurement. Raises ``UsageError``, ``SinkError``."""
     if importlib.util.find_spec("matplotlib") is None:
         raise UsageError(f"{path}: a picture needs Matplotlib: pip install 'lcf-edge[plot]'")
     check_output(path, tuple(suffixes))
@@ -35,7 +35,7 @@ def save_report(result: Result, path: Path) -> None:
 
 
 def save_figure(figure: "Figure", path: Path) -> None:
-    """Write it. Raises ``SinkError``."""
+    """Write the figure to a file. Raises ``SinkError``."""
     try:
         figure.savefig(path)
     except OSError as error:
@@ -43,7 +43,7 @@ def save_figure(figure: "Figure", path: Path) -> None:
 
 
 def plain(axes: "Axes", title: str) -> None:
-    """A plot of curves as all of them look."""
+    """Give a plot of curves the look that all of them share."""
     axes.set_title(title, loc="left")
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)

@@ -27,11 +27,11 @@ GRAVITY_MPS2 = 9.81
 _MIN_S = 3.0
 _MIN_SAMPLES = 100
 _PIECE_S = 0.5
-_MOVED_RADPS = 0.02  # the mean of a piece off that of all
+_MOVED_RADPS = 0.02  # by which the mean of a piece may differ from that of all
 _MOVED_MPS2 = 0.2
-_QUIET_RADPS = 0.05  # 1 sigma of a sample; more is no noise
+_QUIET_RADPS = 0.05  # 1 sigma of a sample; more is motion, not noise
 _QUIET_MPS2 = 0.5
-_GRAVITY_ERROR = 0.08  # more, and the daemon does not believe that it stands
+_GRAVITY_ERROR = 0.08  # relative; beyond, the daemon does not recognise rest
 _GRAVITY_DOUBT = 0.02
 _MIN_NOISE_RADPS = 0.001
 _FRAME_NS = 50_000_000
@@ -39,7 +39,7 @@ _FRAME_NS = 50_000_000
 
 @dataclass(frozen=True)
 class Rest:
-    """Of samples that stand still, IMU axes.
+    """What samples at rest show, in the IMU's axes.
 
     ``bias_radps``, ``noise_radps`` (1 sigma of a sample), ``wander_radps`` (of means over half a second),
     ``force_mps2`` (specific, so it points up), ``shake_mps2`` (1 sigma): (3,) each.
@@ -55,18 +55,18 @@ class Rest:
 
     @property
     def gravity_mps2(self) -> float:
-        """As this accelerometer shows it."""
+        """Length of gravity as this accelerometer measures it, m/s²."""
         return float(np.linalg.norm(self.force_mps2))
 
     @property
     def gyro_noise_radps(self) -> float:
-        """``imu.gyro_noise_radps``: of its worst axis, noise and wander together, two digits, rounded up."""
+        """``imu.gyro_noise_radps``: noise and wander of its worst axis, rounded up to two digits."""
         worst = max(float(np.hypot(self.noise_radps, self.wander_radps).max()), _MIN_NOISE_RADPS)
         step = 10.0 ** (np.floor(np.log10(worst)) - 1)
         return float(f"{ceil(worst / step - 1e-6) * step:.2g}")
 
     def findings(self) -> tuple[str, ...]:
-        """What to say about it."""
+        """Return lines for the user."""
         off = self.gravity_mps2 / GRAVITY_MPS2 - 1
         doubt = "; more than a good accelerometer has" if abs(off) > _GRAVITY_DOUBT else ""
         return (
@@ -95,7 +95,7 @@ def calibrate_rest(source: SensorSource, seconds: float | None, guide: Guide) ->
 
 
 def measure(samples: Sequence[ImuSample]) -> Rest:
-    """What samples at rest tell. Raises ``CalibrationError`` when they were not at rest, or are too few."""
+    """Measure samples taken at rest. Raises ``CalibrationError`` when they are too few or were not at rest."""
     seconds = (samples[-1].stamp_ns - samples[0].stamp_ns) * 1e-9 if samples else 0.0
     if seconds < _MIN_S or len(samples) < _MIN_SAMPLES:
         raise CalibrationError(
@@ -132,7 +132,7 @@ def measure(samples: Sequence[ImuSample]) -> Rest:
 
 
 def _refuse_unrecognised(samples: Sequence[ImuSample], rest: Rest) -> None:
-    """The daemon itself must see that this is rest, else it learns neither bias nor gravity."""
+    """Raise ``CalibrationError`` if the daemon would not recognise this as rest, and learn neither bias nor gravity."""
     estimator = EgoMotionEstimator(Config().imu, Vehicle())
     next_ns = samples[0].stamp_ns
     for sample in samples:
@@ -149,7 +149,7 @@ def _refuse_unrecognised(samples: Sequence[ImuSample], rest: Rest) -> None:
 
 
 def painter(samples: Sequence[ImuSample], rest: Rest) -> "Callable[[Figure], None]":
-    """Gyro and accelerometer over the rest."""
+    """Return a function that plots gyro and accelerometer over time."""
 
     def paint(figure: "Figure") -> None:
         times_s = np.array([sample.stamp_ns - samples[0].stamp_ns for sample in samples]) * 1e-9

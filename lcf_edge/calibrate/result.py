@@ -13,12 +13,12 @@ Value = str | int | float | list[float] | list[list[float]] | list[list[list[flo
 
 
 class CalibrationError(LcfError):
-    """Data that do not tell what is asked of them; the text says why and what to do."""
+    """The data do not determine the result; the text says why and what to do."""
 
 
 @dataclass(frozen=True)
 class Result:
-    """``findings``: lines that tell whether to believe it; ``values``: keys of one ``table`` of the configuration."""
+    """``findings``: lines by which to judge the result; ``values``: keys of one ``table`` of the configuration."""
 
     findings: tuple[str, ...]
     table: str

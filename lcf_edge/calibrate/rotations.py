@@ -17,7 +17,7 @@ EXACT = tuple(
 
 
 def best_rotation(product_matrix: Floats) -> tuple[Floats, float]:
-    """R, in SO(3), that makes Σ bᵀ R a largest, for Σ b aᵀ (3, 3); and that sum."""
+    """Return the rotation R (3, 3) that maximises Σ bᵀ R a, given Σ b aᵀ (3, 3); and that sum."""
     u, s, vt = np.linalg.svd(product_matrix)
     sign = np.array([1.0, 1.0, np.sign(np.linalg.det(u @ vt)) or 1.0])
     rotation: Floats = np.asarray((u * sign) @ vt, np.float64)
@@ -25,12 +25,12 @@ def best_rotation(product_matrix: Floats) -> tuple[Floats, float]:
 
 
 def angle_rad(one: Floats, other: Floats) -> float:
-    """Between two rotations."""
+    """Return the angle between two rotations (3, 3), rad."""
     return float(2 * np.arcsin(min(1.0, float(np.linalg.norm(one - other)) / np.sqrt(8))))
 
 
 def nearest_exact(rotation: Floats) -> tuple[Floats, float]:
-    """The closest of ``EXACT``, and how far it is, rad."""
+    """Return the closest of ``EXACT``, and how far it is, rad."""
     nearest = max(EXACT, key=lambda exact: float(np.trace(exact @ rotation.T)))
     return nearest, angle_rad(nearest, rotation)
 

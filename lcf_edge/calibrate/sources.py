@@ -1,4 +1,4 @@
-"""Pictures and inertial samples, from the devices of the configuration or from a recording; samples in the IMU's axes.
+"""Images and inertial samples, from the devices of the configuration or from a recording; samples in the IMU's axes.
 
 The stamps are the devices' own: ``imu.time_offset_s`` is not yet in them.
 """
@@ -32,17 +32,17 @@ _POLL_S = 0.2
 
 
 class SensorSource(Protocol):
-    """``live``: a person can still do something; ``film``: pictures follow each other closely."""
+    """Where data come from. ``live``: the user can still act; ``film``: images follow each other closely."""
 
     live: bool
     film: bool
 
     def items(self) -> Iterator[Item]:
-        """What comes, each kind in the order of its stamps. Raises ``DriverError``, ``RecordingError``."""
+        """Yield images and samples, each kind in stamp order. Raises ``DriverError``, ``RecordingError``."""
         ...
 
     def lens(self, width: int, height: int) -> Lens | None:
-        """That of its pictures, None: nobody knows. Raises ``ConfigError``."""
+        """Return the lens of its images; None: unknown. Raises ``ConfigError``."""
         ...
 
 
@@ -60,7 +60,7 @@ class RecordedSource:
             raise RecordingError(f"{path}: no inertial samples in it; name a recording with an IMU")
 
     def items(self) -> Iterator[Item]:
-        """In the recording's order of delivery; what was skipped is reported at the end."""
+        """Yield in the recording's order of delivery; report at the end what was skipped."""
         for item in self._recording:
             if isinstance(item, Frame | ImuSample):
                 yield item
@@ -68,7 +68,7 @@ class RecordedSource:
             self._guide.say(f"skipped: {count} {reason}")
 
     def lens(self, width: int, height: int) -> Lens | None:
-        """The configuration's, else the recording's own."""
+        """Return the configured lens, else the recording's own."""
         configured = _configured_lens(self._config, width, height)
         if configured is None and self._recording.lens is not None:
             return self._recording.lens.scaled(width, height)
@@ -87,7 +87,7 @@ class LiveSource:
         self._camera, self._imu = camera, imu
 
     def items(self) -> Iterator[Item]:
-        """In the order of arrival, for ever."""
+        """Yield in the order of arrival, without end."""
         with ExitStack() as stack:
             devices: list[Device[Any]] = []
             for is_needed, open_device in ((self._camera, open_camera), (self._imu, open_imu)):
@@ -98,17 +98,17 @@ class LiveSource:
             yield from _merged(devices)
 
     def lens(self, width: int, height: int) -> Lens | None:
-        """The configuration's."""
+        """Return the configured lens."""
         return _configured_lens(self._config, width, height)
 
 
 def in_imu_axes(config: Config) -> Config:
-    """``config`` with which devices and recordings deliver samples in the IMU's own axes."""
+    """Return ``config`` changed so that samples come in the IMU's own axes."""
     return msgspec.structs.replace(config, imu=msgspec.structs.replace(config.imu, axes=_AS_IT_COMES))
 
 
 def for_a_while(items: Iterator[Item], seconds: float | None, kind: type[Item]) -> Iterator[Item]:
-    """``items`` until ``seconds`` have passed by the stamps of ``kind``; None: all of them."""
+    """Yield ``items`` until ``seconds`` have passed by the stamps of ``kind``; None: all of them."""
     end_ns: float | None = None
     for item in items:
         if seconds is not None and isinstance(item, kind):
@@ -123,7 +123,7 @@ def _configured_lens(config: Config, width: int, height: int) -> Lens | None:
 
 
 def _merged(devices: list[Device[Any]]) -> Iterator[Item]:
-    """What several devices deliver, each read in a thread of its own. Raises ``DriverError``."""
+    """Yield what several devices deliver, each read in its own thread. Raises ``DriverError``."""
     arrived: queue.Queue[Item | DriverError] = queue.Queue(_MAX_WAITING)
     ended = threading.Event()
 

@@ -1,4 +1,4 @@
-"""The calibration board: how it is named, found in a picture, and printed."""
+"""The calibration board: how it is named, found in an image, and printed."""
 
 import re
 from dataclasses import dataclass
@@ -23,18 +23,18 @@ _SPELLING = re.compile(
     r"(?P<kind>checkerboard|charuco):(?P<columns>\d{1,2})x(?P<rows>\d{1,2}):(?P<square>\d{1,3}(?:\.\d+)?)mm"
     r"(?::(?P<marker>\d{1,3}(?:\.\d+)?)mm)?(?::(?P<dictionary>[4-7]X[4-7]_(?:50|100|250|1000)))?"
 )
-_MIN_CORNERS = 8  # of a ChArUco board that is partly in the picture
+_MIN_CORNERS = 8  # of a ChArUco board that is partly in the image
 _MARKER_SHARE = 0.75  # of a square
 _MM_PER_INCH = 25.4
-_PIXELS_PER_SQUARE = 64  # eight to a bit of the usual markers
+_PIXELS_PER_SQUARE = 64  # eight for each bit of the usual markers
 _PRINT_DPI = 300
-_REFINE_PX = (2, 6)  # half the window
+_REFINE_PX = (2, 6)  # least and largest half window of the refinement
 _REFINE_UNTIL = (cv2.TERM_CRITERIA_EPS + cv2.TERM_CRITERIA_MAX_ITER, 40, 0.001)
 
 
 @dataclass(frozen=True)
 class Sighting:
-    """A board in a picture: corners in px, float32 (n, 2), their numbers (n,), and how sharp it is."""
+    """A board in an image: corners, float32 (n, 2), px, their numbers (n,), and how sharp it is."""
 
     corners: Floats
     numbers: npt.NDArray[np.intp]
@@ -54,7 +54,7 @@ class Target:
 
     @classmethod
     def parse(cls, text: str) -> "Target":
-        """As ``checkerboard:9x6:25mm`` or ``charuco:8x6:30mm[:22mm[:5X5_100]]``. Raises ``UsageError``."""
+        """Parse ``checkerboard:9x6:25mm`` or ``charuco:8x6:30mm[:22mm[:5X5_100]]``. Raises ``UsageError``."""
         found = _SPELLING.fullmatch(text)
         if found is None:
             raise UsageError(
@@ -75,7 +75,7 @@ class Target:
 
     @property
     def name(self) -> str:
-        """As ``parse`` reads it."""
+        """Name of the board, as ``parse`` reads it."""
         text = f"{self.kind}:{self.columns}x{self.rows}:{1000 * self.square_m:g}mm"
         return text + (f":{1000 * self.marker_m:g}mm:{self.dictionary}" if self.kind == "charuco" else "")
 
@@ -86,20 +86,20 @@ class Target:
 
     @cached_property
     def places(self) -> Floats:
-        """(corners, 3) of all corners on the board, m."""
+        """Return the places of all corners on the board, (n, 3), m."""
         count = self.columns * self.rows if self.kind == "checkerboard" else (self.columns - 1) * (self.rows - 1)
         row, column = np.divmod(np.arange(count), self.corner_columns)
         return (np.stack([column, row, np.zeros(count)], axis=1) * self.square_m).astype(np.float32)
 
     def find(self, image: Grey) -> Sighting | None:
-        """The board in a picture (height, width); None: it is not there."""
+        """Return the board found in an image (height, width); None: there is none."""
         corners, numbers = self._find_checkerboard(image) if self.kind == "checkerboard" else self._find_charuco(image)
         if len(corners) < min(_MIN_CORNERS, len(self.places)):
             return None
         return Sighting(corners, numbers, self._edge_px(image, corners, numbers))
 
     def draw(self, pixels_per_square: int) -> Grey:
-        """The board without margin."""
+        """Return an image of the board without margin."""
         if self.kind == "charuco":
             size = (self.columns * pixels_per_square, self.rows * pixels_per_square)
             return np.asarray(self._charuco.generateImage(size), np.uint8)
@@ -145,12 +145,12 @@ class Target:
         grid = corners.reshape(self.rows, self.columns, 2)
         side_px = min(float(np.hypot(*np.moveaxis(np.diff(grid, axis=axis), 2, 0)).min()) for axis in (0, 1))
         window = int(np.clip(side_px / 4, *_REFINE_PX))
-        cv2.cornerSubPix(image, corners, (window, window), (-1, -1), _REFINE_UNTIL)  # half the noise of the search
+        cv2.cornerSubPix(image, corners, (window, window), (-1, -1), _REFINE_UNTIL)  # halves the noise of the search
         return np.asarray(corners, np.float32).reshape(-1, 2), np.arange(len(self.places))
 
     def _find_charuco(self, image: Grey) -> tuple[Floats, npt.NDArray[np.intp]]:
         corners, numbers, _, _ = self._detector.detectBoard(image)
-        found = np.asarray(numbers)  # of None where there is no board
+        found = np.asarray(numbers)  # an array of None where there is no board
         if found.ndim == 0:
             return np.empty((0, 2), np.float32), np.empty(0, np.intp)
         return np.asarray(corners, np.float32).reshape(-1, 2), found.reshape(-1).astype(np.intp)

@@ -39,13 +39,13 @@ def calibrate_time(source: SensorSource, config: Config, seconds: float | None, 
 
 
 def beside(alignment: Alignment, by_s: float = 0.05) -> float:
-    """The correlation off the peak: how sharp it is."""
+    """Return the correlation beside the peak, which says how sharp the peak is."""
     both = [alignment.offset_s - by_s, alignment.offset_s + by_s]
     return float(np.interp(both, alignment.offsets_s, alignment.correlations).max())
 
 
 def guessed(watched: Watched) -> tuple[str, ...]:
-    """A line where the lens is not known."""
+    """Return a line for the user if the lens is only guessed."""
     return ("the lens is guessed; better: lcf-edge calibrate camera first",) if watched.guessed else ()
 
 
@@ -54,7 +54,7 @@ def _rates(alignment: Alignment) -> str:
 
 
 def painter(alignment: Alignment) -> "Callable[[Figure], None]":
-    """Rates of both over time, and the correlation over the offset."""
+    """Return a function that plots both rates over time, and the correlation over the offset."""
 
     def paint(figure: "Figure") -> None:
         grid = figure.add_gridspec(3, 2, width_ratios=(3, 2))

@@ -1,4 +1,4 @@
-"""Corners followed from picture to picture (Shi & Tomasi; pyramidal Lucas-Kanade, there and back again)."""
+"""Corners followed from image to image (Shi & Tomasi; pyramidal Lucas-Kanade, there and back again)."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ _MIN_CORNER_PX = 8.0
 _THERE_AND_BACK_PX = 0.7
 _WINDOW_PX = (21, 21)
 _LEVELS = 4
-_MAX_S = 0.5  # between two pictures
+_MAX_S = 0.5  # between two images
 
 
 @dataclass(frozen=True)
@@ -33,14 +33,14 @@ class Tracks:
 
     @property
     def dt_s(self) -> float:
-        """Between the two pictures."""
+        """Time between the two images, s."""
         return (self.end_ns - self.start_ns) * 1e-9
 
 
 class Tracker:
-    """Follows corners; ``left_out`` counts intervals that gave none, by reason.
+    """Follows corners; ``left_out`` counts unusable intervals by reason.
 
-    The next interval begins when the median corner has moved ``least_motion_px``, after ``most_frames`` pictures at
+    The next interval begins when the median corner has moved ``least_motion_px``, after ``most_frames`` images at
     the latest.
     """
 

@@ -1,4 +1,4 @@
-"""Which pictures of a board are worth keeping, and where it should be held next."""
+"""Which images of a board are worth keeping, and where it should be held next."""
 
 from collections import Counter
 from dataclasses import dataclass, field
@@ -15,20 +15,20 @@ Floats = npt.NDArray[np.float64]
 CELLS = (8, 6)  # across and down, of the coverage
 
 _MAX_EDGE_PX = 5.0
-_MAX_MOTION_PX = 1.0  # between two pictures of a film
-_MAX_INTERVAL_S = 1.0  # finding a board takes a small computer most of that
-_MIN_CORNER_SHIFT = 0.08  # of the picture's width, that the board's corners are from where they were in any other view
-_MIN_CORNER_SHIFT_OF_IMAGES = 0.01  # somebody chose these
+_MAX_MOTION_PX = 1.0  # between two images of a film
+_MAX_INTERVAL_S = 1.0  # a small computer takes most of that to find a board
+_MIN_CORNER_SHIFT = 0.08  # of the image's width, that the board's corners are from where they were in any other view
+_MIN_CORNER_SHIFT_OF_IMAGES = 0.01  # the same among single images, which the user chose
 _SIDES = (("upper", "middle", "lower"), ("left", "middle", "right"))
-_TILTED = 1.12  # ratio of opposite sides
-_MIN_TILTED = 0.5  # share of the views
+_TILTED = 1.12  # least ratio of opposite sides of a tilted board
+_MIN_TILTED = 0.5  # least share of the views
 
 
 @dataclass
 class Views:
-    """Sightings of a board in pictures of one size; ``left_out`` counts the others by reason.
+    """Sightings of a board in images of one size; ``left_out`` counts the others by reason.
 
-    ``film``: pictures follow each other closely, so that a board in motion is seen to move.
+    ``film``: images follow each other closely, so that a board in motion is seen to move.
     """
 
     board: Target
@@ -40,7 +40,7 @@ class Views:
     _before: tuple[int, Sighting] | None = None
 
     def consider(self, frame: Frame) -> str:
-        """Keep the board in ``frame``, or return the reason why not; "" when it is kept."""
+        """Keep the view of ``frame`` and return "", or return the reason why it is not kept."""
         self.size = frame.image.shape[1], frame.image.shape[0]
         sighting = self.board.find(frame.image)
         before, self._before = self._before, None if sighting is None else (frame.stamp_ns, sighting)
@@ -65,7 +65,7 @@ class Views:
         return ""
 
     def covered(self) -> npt.NDArray[np.bool_]:
-        """(down, across) cells of the picture in which a corner was seen."""
+        """Return, (rows, columns), the cells of the image in which a corner was seen."""
         sighting = np.zeros(CELLS[::-1], np.bool_)
         for view in self.kept:
             column, row = (np.clip(view.corners / self.size, 0, 0.999) * CELLS).astype(int).T
@@ -73,7 +73,7 @@ class Views:
         return sighting
 
     def wish(self) -> str:
-        """What the next view should be like."""
+        """Return a prompt for the next view."""
         tilted = sum(_foreshortening(outline) > _TILTED for outline in self._outlines)
         if len(self.kept) >= 4 and tilted < _MIN_TILTED * len(self.kept):
             return "tilt it, by 30 to 45°, another way than before"
@@ -81,13 +81,13 @@ class Views:
         for view in self.kept:
             column, row = np.clip(view.corners.mean(axis=0) / self.size * 3, 0, 2.999).astype(int)
             views_in[row, column] += 1
-        views_in[1, 1] += 1  # the middle comes by itself
+        views_in[1, 1] += 1  # the middle needs no prompt
         row, column = np.unravel_index(np.argmin(views_in), views_in.shape)
         where = f"{_SIDES[0][row]} {_SIDES[1][column]}".replace("middle middle", "middle")
         return f"hold it in the {where} of the picture, so near that it fills a third of it"
 
     def _outline(self, sighting: Sighting) -> Floats | None:
-        """(4, 2) where the board's outer corners are, or would be; None: too few to tell."""
+        """Return where the board's outer corners are, or would be, (4, 2) px; None: too few corners are seen."""
         places = self.board.places[:, :2]
         homography = np.asarray(cv2.findHomography(places[sighting.numbers], sighting.corners)[0])
         if homography.shape != (3, 3):
@@ -99,7 +99,7 @@ class Views:
 
 
 def _stands(sighting: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
-    """Whether the corners are where they were in the picture before."""
+    """Whether the corners are where they were in the image before."""
     if before is None or stamp_ns - before[0] > _MAX_INTERVAL_S * 1e9:
         return False
     _, now, then = np.intersect1d(sighting.numbers, before[1].numbers, return_indices=True)
@@ -108,7 +108,7 @@ def _stands(sighting: Sighting, before: tuple[int, Sighting] | None, stamp_ns: i
 
 
 def _foreshortening(outline: Floats) -> float:
-    """Ratio of opposite sides, the larger by the smaller."""
+    """Return the largest ratio of opposite sides, the longer by the shorter."""
     sides = np.hypot(*(np.roll(outline, -1, axis=0) - outline).T)
     ratio = np.maximum(sides[:2], sides[2:]) / np.maximum(np.minimum(sides[:2], sides[2:]), 1e-6)
     return float(ratio.max())

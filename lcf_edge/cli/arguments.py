@@ -12,10 +12,10 @@ from lcf_edge.recording.pace import FASTEST, SLOWEST
 
 
 class _Parser(argparse.ArgumentParser):
-    """Wrong usage is a ``UsageError``, one line like every other, with the help of the command that was typed."""
+    """Turns wrong usage into a ``UsageError``: one line that refers to the help of the command."""
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """A command refuses what it does not know, before the whole program can."""
+        """Let the command itself refuse unknown arguments, before the whole program does."""
         known, unknown = super().parse_known_args(args, namespace)
         if unknown:
             self.error(f"unrecognized arguments: {' '.join(unknown)}")
@@ -286,7 +286,7 @@ def _number(least: float, most: float) -> Callable[[str], float]:
             number = float(text)
         except ValueError:
             number = math.nan
-        if not least <= number <= most:  # NaN neither
+        if not least <= number <= most:  # also refuses NaN
             raise argparse.ArgumentTypeError(f"{text}: write a number between {least:g} and {most:g}")
         return number
 

@@ -1,7 +1,7 @@
 """``lcf-edge bench``: how fast the filter is on this computer, on a drive that it renders itself.
 
 Half of the time as fast as it can, half at the rate of a camera, where caches go cold and the processor's governor may
-slow down between two frames. No camera, no Zenoh: what is measured is what ``Pipeline.process`` does.
+slow down between two frames. No camera, no Zenoh: only ``Pipeline.process`` is measured.
 """
 
 import os
@@ -45,17 +45,17 @@ class Measured:
 
     @property
     def frames_a_second(self) -> float:
-        """That one core can do."""
+        """Frames that one core can process in a second."""
         return 1 / self.cpu_s
 
     @property
     def share_of_a_core(self) -> float:
-        """That a camera of ``CAMERA_HZ`` asks for."""
+        """Share of a core that a camera of ``CAMERA_HZ`` needs."""
         return CAMERA_HZ * self.cpu_s
 
 
 def bench(seconds: float, say: Say) -> None:
-    """Measure for so long and tell, with one line at the end that can be sent in."""
+    """Measure for ``seconds`` and print a report, with one line at the end that can be sent in."""
     cv2.setNumThreads(1)  # as the daemon
     drive = Drive()
     fast = measure(drive, seconds / 2, rate_hz=None)
@@ -81,7 +81,7 @@ class Drive:
         self._lens = Lens.from_config(self._config.camera, drive.lens.width, drive.lens.height)
 
     def steps(self) -> Iterator[tuple[bool, Callable[[], PipelineScene]]]:
-        """Without end: each frame as what is to be done about it, and whether the tables are filled."""
+        """Yield without end: each frame as a call that processes it, and whether the tables are filled."""
         while True:
             pipeline, samples, frames = Pipeline(self._config, self._lens), list[ImuSample | SpeedSample](), 0
             for event in self._events:
@@ -103,7 +103,7 @@ def _step(pipeline: Pipeline, samples: Sequence[ImuSample | SpeedSample], frame:
 
 
 def measure(drive: Drive, seconds: float, rate_hz: float | None) -> Measured:
-    """Run for so long, or until one frame counts; ``rate_hz``: as a camera delivers, None: without a pause."""
+    """Run for so long, until one frame counts at least; ``rate_hz``: of the camera, None: without pauses."""
     stages_us: list[tuple[int, int, int]] = []
     corners: list[int] = []
     cpu_s: list[float] = []
@@ -124,7 +124,7 @@ def measure(drive: Drive, seconds: float, rate_hz: float | None) -> Measured:
 
 @dataclass(frozen=True, slots=True)
 class Computer:
-    """What was measured on, in words of one line."""
+    """The computer that was measured, each part in one line."""
 
     board: str
     machine: str
@@ -133,13 +133,13 @@ class Computer:
 
     @classmethod
     def this(cls) -> "Computer":
-        """The one that this runs on."""
+        """Return the computer that this runs on."""
         software = f"Python {platform.python_version()}, NumPy {version('numpy')}, OpenCV {cv2.__version__}"
         return cls(_board(), platform.machine(), os.cpu_count() or 1, software)
 
 
 def _board() -> str:
-    """Model of the board, or of its processor where there is no device tree."""
+    """Return the board's model, or the processor's where there is no device tree."""
     for name, pattern in (
         ("/sys/firmware/devicetree/base/model", r"([^\0]+)"),
         ("/proc/cpuinfo", r"^model name\s*: (.+)$"),
@@ -154,7 +154,7 @@ def _board() -> str:
 
 
 def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
-    """What a user reads; the last line says all of it in short."""
+    """Return the lines for the user; the last one sums up."""
     compiled = "uncompiled" if uncompiled() else "compiled"
     where = f"{computer.board}, {computer.machine}, {computer.cores} cores"
     short = " ".join(
@@ -176,7 +176,7 @@ def report(computer: Computer, fast: Measured, paced: Measured) -> list[str]:
 
 
 def _figures(measured: Measured) -> list[tuple[float, float]]:
-    """Median and 99th percentile of each stage."""
+    """Return a line with median and 99th percentile of each stage."""
     middle, slow = np.percentile(measured.stages_ms, (50, 99), axis=0)
     return [*zip(middle.tolist(), slow.tolist(), strict=True)]
 

@@ -21,12 +21,12 @@ from lcf_edge.calibrate.target import PRINT_SUFFIXES, Target
 from lcf_edge.calibrate.time_offset import calibrate_time
 from lcf_edge.config import DEFAULT_PATH, Config
 
-SNAP_BY_HAND_DEG = 15.0  # a hand's motion is good to no more
+SNAP_BY_HAND_DEG = 15.0  # a motion by hand is no more accurate
 
 
 @dataclass(frozen=True)
 class Task:
-    """What all have in common: where from, where to. ``file``: the configuration, None: the usual one."""
+    """What all calibrations share: where data come from and go to. ``file``: configuration; None: the usual one."""
 
     config: Config
     file: Path | None

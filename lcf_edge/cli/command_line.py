@@ -1,4 +1,4 @@
-"""The command line: runs a command with what ``arguments`` read, prints; every error is one line on standard error.
+"""The command line: runs a command, prints its results, and every error as one line on standard error.
 
 Exit status: 0 done, 1 failed at run time, 2 wrong usage or configuration, 130 interrupted, 141 the reader
 of the output went away. What a command needs is imported when it runs, so that ``--help`` is quick.
@@ -36,10 +36,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run one command. Return the exit status."""
     limit_opencv()
     for closed in ("stdout", "stderr"):
-        if getattr(sys, closed) is None:  # by the shell, as in >&-
+        if getattr(sys, closed) is None:  # closed by the shell, as with >&-
             setattr(sys, closed, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115
     if isinstance(sys.stdout, io.TextIOWrapper):
-        sys.stdout.reconfigure(errors="backslashreplace")  # where there are no Greek letters
+        sys.stdout.reconfigure(errors="backslashreplace")  # a terminal may lack Greek letters
     try:
         try:
             arguments = parser().parse_args(argv)
@@ -104,7 +104,7 @@ def _pace(arguments: argparse.Namespace) -> "Pace":
 
 
 def _shown(arguments: argparse.Namespace) -> "DaemonAddress | Replayed":
-    """A recording, if one is named, else a daemon. Raises ``UsageError``: what is for one is given to the other."""
+    """Return the named recording, else the daemon. Raises ``UsageError`` for options of the other one."""
     from lcf_edge.recording.pace import Pace  # noqa: PLC0415
 
     pace = _pace(arguments)
@@ -239,12 +239,12 @@ _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
 
 
 def _say(text: str) -> None:
-    """One line on standard error, in which nothing is left that a terminal would obey."""
+    """Print one line on standard error, without control characters."""
     print(printable(" ".join(text.split()), 2000), file=sys.stderr)
 
 
 def _tell(*lines: str) -> None:
-    """Lines on standard output, flushed: what cannot be written is noticed here, not at the very end."""
+    """Print lines on standard output and flush, so that a failure is noticed here, not at exit."""
     try:
         sys.stdout.writelines(f"{line}\n" for line in lines)
         sys.stdout.flush()
@@ -256,5 +256,5 @@ def _tell(*lines: str) -> None:
 
 
 def _abandon_stdout() -> None:
-    """Let the interpreter's last flush go nowhere."""
+    """Send the interpreter's last flush nowhere."""
     os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())

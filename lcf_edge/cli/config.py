@@ -1,4 +1,4 @@
-"""``lcf-edge config``: the effective configuration and the memory that it asks for."""
+"""``lcf-edge config``: the effective configuration and the memory that it needs."""
 
 from lcf_edge.config import Config, to_toml
 from lcf_edge.lens import Lens
@@ -6,7 +6,7 @@ from lcf_edge.pipeline import Pipeline
 
 
 def report(config: Config) -> str:
-    """The configuration as TOML, then comment lines with the bytes of each table and in all.
+    """Return the configuration as TOML, then comment lines with the bytes of each table and their sum.
 
     The whole is valid TOML. Raises ``ConfigError`` when the camera's intrinsics cannot be used.
     """

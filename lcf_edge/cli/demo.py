@@ -1,4 +1,4 @@
-"""``lcf-edge demo``: the whole way, on a drive that it renders itself.
+"""``lcf-edge demo``: everything from image to subscriber, on a drive that it renders itself.
 
 A rendered drive is written as a recording, replayed through the real pipeline, published over Zenoh on
 loopback and received in a second process. Rendering has a process of its own, and drawing comes after the
@@ -55,7 +55,7 @@ Output = TypeVar("Output", SizePlot, VideoSink)
 
 
 def demo(folder: Path, seconds: float, say: Say) -> None:
-    """Run the demo into ``folder`` and tell each stage and the outcome. Raises ``LcfError``."""
+    """Run the demo into ``folder`` and report each stage and the outcome. Raises ``LcfError``."""
     drive = _drive(seconds)
     _prepare(folder)
     say(f"1/5 rendering {seconds:g} s of a drive past objects and walkers: {folder / 'recording'}")
@@ -124,7 +124,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
 
 
 def _unless_missing(what: str, make: Callable[[], Output], say: Say) -> Output | None:
-    """An output, or None and a word about it where the library that it needs is missing."""
+    """Return an output, or None with a message where its library is missing."""
     try:
         return make()
     except UsageError as error:
@@ -133,14 +133,14 @@ def _unless_missing(what: str, make: Callable[[], Output], say: Say) -> Output |
 
 
 def peak_resident_mib() -> float:
-    """Most memory that this process ever held, MiB; unlike ``ru_maxrss`` it does not know what started it."""
+    """Return the peak resident memory of this process, MiB; unlike ``ru_maxrss`` without that of its parent."""
     status = Path("/proc/self/status").read_text(encoding="ascii")
     peak = re.search(r"^VmHWM:\s+(\d+) kB", status, re.MULTILINE)
     return int(peak[1]) / 1024 if peak else float("nan")
 
 
 def _drive(seconds: float) -> scenes.Drive:
-    """Clutter on both sides, a walker from each side, and a cart that comes towards the vehicle."""
+    """Return a drive with clutter on both sides, a walker from each side, and an oncoming cart."""
     drive = scenes.make("two_crossing", SEED, seconds=seconds)
     contact_s, speed_mps = seconds + 0.8, 1.2
     ahead_m = float(drive.speed.integral(np.array([contact_s]))[0])
@@ -159,9 +159,9 @@ def _prepare(folder: Path) -> None:
 
 
 def _render(drive: scenes.Drive, folder: Path) -> None:
-    """In a process of its own: its textures are no memory of the filter."""
+    """Render in a process of its own, so that textures do not count as memory of the filter."""
     context = get_context("spawn")
-    ignore = (signal.SIGINT, signal.SIG_DFL)  # interrupted, it ends without a word
+    ignore = (signal.SIGINT, signal.SIG_DFL)  # it ends silently when interrupted
     try:
         with ProcessPoolExecutor(1, context, initializer=signal.signal, initargs=ignore) as pool:
             pool.submit(scenes.write, drive, folder).result()
@@ -172,7 +172,7 @@ def _render(drive: scenes.Drive, folder: Path) -> None:
 
 
 def _open_link() -> tuple[zenoh.Session, str]:
-    """A session that listens on the usual port, or on a free one when that is busy, and its endpoint."""
+    """Return a session that listens on the usual port, or a free one if that is in use, and its endpoint."""
     default = Zenoh()
     try:
         return open_session(default), default.listen[0]
@@ -204,7 +204,7 @@ def _finish(subscriber: subprocess.Popen[str], sent: int) -> Received:
 
 
 def _draw(recording: Recording, config: Config, folder: Path, drawn: list[int], video: VideoSink | None) -> None:
-    """The same input gives the same output: a second run draws what the first one found."""
+    """Draw by a second run: the same input gives the same output."""
     with video or nullcontext():
         for frame, outcome in run(recording, config):
             panels = draw(frame.image, outcome.scene, outcome.view())
@@ -230,7 +230,7 @@ def _found_line(threat: FoundThreat) -> str:
 
 
 def _live_lines(folder: Path, endpoint: str) -> tuple[str, str]:
-    """Two lines for a shell."""
+    """Return the two commands that show the demo live."""
     python = min(sys.executable, os.path.relpath(sys.executable), key=len)
     code = (
         "from lcf_edge.client import scenes; "

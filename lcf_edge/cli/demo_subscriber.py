@@ -1,6 +1,6 @@
 """The demo's second process: subscribes to scenes and counts them.
 
-``python -m lcf_edge.cli.demo_subscriber ENDPOINT KEY``; a line on standard input tells how many scenes
+``python -m lcf_edge.cli.demo_subscriber ENDPOINT KEY``; a line on standard input says how many scenes
 were sent, then one JSON line with a ``Received`` goes to standard output.
 """
 
@@ -18,11 +18,11 @@ _LAST_ON_THE_WAY_S = 3.0
 
 
 class Received(msgspec.Struct):
-    """What a subscriber got."""
+    """What a subscriber received."""
 
     scenes: int = 0
     bytes: int = 0
-    broken: int = 0  # not decodable, or not announced as a scene
+    broken: int = 0  # not decodable, or not encoded as a scene
     circles: int = 0
 
 

@@ -18,18 +18,18 @@ Tell = Callable[[str], None]
 
 _COLOURS = {Severity.OK: "32", Severity.WARN: "33", Severity.FAIL: "31"}
 _WIDE = len("configuration")
-_LONGEST = 4096  # a path may be
+_LONGEST = 4096  # characters of a path
 
 
 class UnfitError(LcfError):
-    """Something that was looked at does not work."""
+    """A check found something that does not work."""
 
 
 def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, tell: Tell) -> None:
-    """Look at everything and tell each finding as it is found.
+    """Run all checks and report each finding as it is found.
 
-    Raises ``UnfitError`` when something failed, and ``ConfigError`` for a configuration that cannot be used, after what
-    can be said without it.
+    Raises ``UnfitError`` when something failed, and ``ConfigError`` for an unusable configuration, after the checks
+    that do not need one.
     """
     context = context_of(path, settings)
     coloured = sys.stdout.isatty() and not os.environ.get("NO_COLOR")
@@ -46,7 +46,7 @@ def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, tell: T
 
 
 def line(finding: Finding, *, coloured: bool = False) -> str:
-    """A finding for people; its remedy below it, in a line of its own that can be pasted."""
+    """Return a finding as text; its remedy on a line of its own that can be pasted."""
     level = finding.level.value
     shown = f"\x1b[{_COLOURS[finding.level]}m{level:<4}\x1b[0m" if coloured else f"{level:<4}"
     text = f"{shown}  {finding.subject:<{_WIDE}}  {printable(finding.text, _LONGEST)}"

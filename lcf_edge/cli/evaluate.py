@@ -30,7 +30,7 @@ class Work:
 def evaluate(question: Question, folder: Path, work: Work, warn: Say) -> list[str]:
     """Evaluate recordings into a folder. Return the summary, line by line.
 
-    Raises ``UsageError``, ``ConfigError``, ``SinkError``, and ``LcfError`` when not one recording could be read.
+    Raises ``UsageError``, ``ConfigError``, ``SinkError``, and ``LcfError`` when no recording could be read.
     """
 
     def outcomes(tasks: Sequence[Task]) -> Iterator[Outcome]:
@@ -75,7 +75,7 @@ def _numbers(rows: list[RecordingRow], before: list[RecordingRow] | None) -> lis
 
 
 def _figures(total: Numbers) -> dict[str, tuple[str, str]]:
-    """Each number, and what it counts."""
+    """Return lines with each number and what it counts."""
     figures = {}
     if total.due:
         figures["found"] = f"{total.found} of {total.due}", "sightings of threats"

@@ -10,7 +10,7 @@ from lcf_edge.messages import Cause, Kind, Scene
 from lcf_edge.rendered.scenes import ObjectTruth, Truth
 
 GRACE_S = 0.3
-"""What threatens in sight for less is not asked for."""
+"""Threats in sight for less need not be found."""
 
 
 @dataclass(slots=True)
@@ -18,7 +18,7 @@ class FoundThreat:
     """One threat of the drive."""
 
     name: str
-    since_ns: int  # a threat, and in sight
+    since_ns: int  # from when it is a threat in sight
     last_ns: int
     found_ns: int | None = None
     found_seq: int | None = None
@@ -26,18 +26,18 @@ class FoundThreat:
 
     @property
     def latency_s(self) -> float | None:
-        """From when it threatens in sight to the first circle on it; None: never found."""
+        """Time from when it is a threat in sight to the first circle on it, s; None: never found."""
         return None if self.found_ns is None else (self.found_ns - self.since_ns) / 1e9
 
 
 def trusted_rebels(scene: Scene, trust: float) -> list[tuple[float, float, Cause]]:
-    """Centre (px) and cause of each rebel circle with at least ``trust``."""
+    """Return centre (px) and cause of each rebel circle with at least ``trust``."""
     rows = scene.circles[(scene.circles["kind"] == Kind.REBEL) & (scene.circles["trust"] >= trust)]
     return [(float(row["x"]), float(row["y"]), Cause(row["cause"])) for row in rows]
 
 
 def findings(truths: Iterable[Truth], rebels: Mapping[int, Sequence[tuple[float, float, Cause]]]) -> list[FoundThreat]:
-    """Each threat that was in sight for ``GRACE_S`` or longer.
+    """Return each threat that was in sight for ``GRACE_S`` or longer.
 
     ``rebels``: ``trusted_rebels`` by frame number.
     """

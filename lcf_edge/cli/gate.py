@@ -1,4 +1,4 @@
-"""``lcf-edge gate``: before the daemon's TLS port."""
+"""``lcf-edge gate``: stands in front of the daemon's TLS port."""
 # ruff: noqa: PLC0415
 
 import os

@@ -1,4 +1,4 @@
-"""Another package with the name of ours: Python takes whichever it finds first."""
+"""Other packages of the same name as ours: Python imports the first that it finds."""
 
 from importlib.util import find_spec
 from pathlib import Path
@@ -7,7 +7,7 @@ _HERE = Path(__file__).parents[2]
 
 
 def namesake(package: str) -> str:
-    """The folder of a foreign ``package`` that would be imported in place of ours; empty: ours would be."""
+    """Return the folder of a foreign ``package`` that would be imported instead of ours; empty: none."""
     spec = find_spec(package)
     folder = Path(spec.origin).parent if spec and spec.origin else _HERE / package
     return "" if folder.resolve() == (_HERE / package).resolve() else str(folder)

@@ -12,11 +12,11 @@ from lcf_edge.sinks import cannot_write, check_output
 
 
 def record(file: Path, seconds: float | None, path: Path | None, settings: Sequence[str]) -> str:
-    """Record until a signal ends it, or for so long from the first picture on. Return the summary.
+    """Record until a signal ends it, or for so long from the first image on. Return the summary.
 
-    ``file``: a name that ends in ``.mcap`` is a file's, one without an ending a folder's. Raises ``UsageError`` for one
-    that is there already or is none, ``SinkError`` for one that cannot be written, ``LcfError`` when not one picture
-    was recorded, and what ``run`` raises.
+    ``file``: a name that ends in ``.mcap`` is a file's, one without an ending a folder's. Raises ``UsageError`` for a
+    name that exists or cannot be used, ``SinkError`` for one that cannot be written, ``LcfError`` when no image was
+    recorded, and what ``run`` raises.
     """
     if file.exists():
         raise UsageError(f"{file}: is there already; name another file, or remove it")
@@ -45,7 +45,7 @@ def _make(folder: Path) -> None:
 
 
 def _finish(folder: Path) -> None:
-    """Say in the folder what its files hold together; remove it when there are none."""
+    """Write the folder's metadata; remove the folder when it is empty."""
     from lcf_edge.recording.write.bag import write_metadata  # noqa: PLC0415  # what reads takes memory while it records
 
     try:

@@ -1,4 +1,4 @@
-"""``lcf-edge replay``: the pipeline over a recording, with what a user wants written."""
+"""``lcf-edge replay``: the pipeline over a recording, and the outputs that the user asks for."""
 
 import math
 import os
@@ -44,7 +44,7 @@ def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) 
     """Run the pipeline over a recording. Return the summary, line by line.
 
     ``warn`` gets the recording's warnings, also when the replay fails. Raises ``RecordingError`` for a
-    recording without a single usable frame, ``SinkError`` for an output that cannot be written,
+    recording without a usable frame, ``SinkError`` for an output that cannot be written,
     ``PublishError``, ``UsageError``.
     """
     recording = open_recording(path, config)
@@ -81,7 +81,7 @@ def _run(recording: Recording, config: Config, outputs: Outputs, pace: Pace, sum
 def _sinks(recording: Recording, config: Config, outputs: Outputs) -> Iterator[Sink]:
     """Open each output that is wanted."""
     if outputs.publish:
-        from lcf_edge.sinks.scenes import SceneSink  # noqa: PLC0415  # else no network is started
+        from lcf_edge.sinks.scenes import SceneSink  # noqa: PLC0415  # starts the network, so only when wanted
 
         yield SceneSink(config)
     if outputs.results is not None:
@@ -93,7 +93,7 @@ def _sinks(recording: Recording, config: Config, outputs: Outputs) -> Iterator[S
 
 
 def _terminal_columns() -> int:
-    """Width of the terminal behind standard error; 80 where it is unknown, as on a serial line."""
+    """Return the width of the terminal at standard error; 80 where unknown, as on a serial line."""
     try:
         return os.get_terminal_size(sys.stderr.fileno()).columns or 80
     except OSError:
@@ -101,7 +101,7 @@ def _terminal_columns() -> int:
 
 
 def frame_rate(recording: Recording, config: Config) -> float:
-    """Return the rate for a video, frames/s, by a glance at the first frames. Raises ``RecordingError``."""
+    """Return the rate for a video, frames/s, by the stamps of the first frames. Raises ``RecordingError``."""
     frames = (item.stamp_ns for item in recording if isinstance(item, Frame))
     intervals_s = np.diff(list(islice(frames, 9))) / 1e9
     rate = 1 / np.median(intervals_s) if len(intervals_s) else config.camera.fps
@@ -109,7 +109,7 @@ def frame_rate(recording: Recording, config: Config) -> float:
 
 
 def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[Frame, Outcome]]:
-    """Each picture and what it gave, when it is due; in a loop lap after lap, each with a filter that begins anew."""
+    """Yield each frame with its outcome, when it is due; in a loop lap after lap, each with an empty filter."""
     for lap in count():
         if lap and not pace.loop:
             return
@@ -125,13 +125,13 @@ def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[F
 
 
 def _next_asked_for(frame: Frame) -> bool:
-    """Wait for a line on standard input; False: it has ended."""
+    """Wait for a line on standard input. Return False at its end."""
     sys.stderr.write(f"picture {frame.seq}: Enter lets it come, Ctrl-D ends\n")
     sys.stderr.flush()
     return sys.stdin.readline() != ""
 
 
 def _refuse_input(recording: Path, output: Path | str | None) -> None:
-    """An output must not take the place of the recording."""
+    """Raise ``UsageError`` if an output would overwrite the recording."""
     if output not in {None, "-"} and Path(output).exists() and Path(output).samefile(recording):
         raise UsageError(f"{output}: is the recording itself; name another file to write")

@@ -21,7 +21,7 @@ def run(
     destination: "Destination | None" = None,
     seconds: float | None = None,
 ) -> "list[Sink]":
-    """Run until a signal ends it, or for so long. Return its sinks, whose work is done.
+    """Run until a signal ends it, or for ``seconds``. Return its sinks, closed.
 
     ``destination``: of a recording; None: as the configuration says. Raises ``ConfigError``, ``PublishError`` at the
     start, ``LcfError`` later.

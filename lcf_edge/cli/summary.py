@@ -11,7 +11,7 @@ from lcf_edge.config import Memory
 from lcf_edge.messages import Cause, Kind, ObjectClass, PipelineScene
 
 _DEFAULT_MEMORY = Memory()
-_NEARLY = 0.98  # of its capacity: a row may have gone by itself since the table was full
+_NEARLY = 0.98  # of its capacity; a row may have been removed since the table was full
 
 
 class Summary:
@@ -24,12 +24,12 @@ class Summary:
         self.evicted = 0
         self._capacities = {key: rows for key, rows in asdict(memory).items() if key != "budget_mib"}
         self._full: Counter[str] = Counter()  # frames in which rows were evicted, by the table that was full
-        self._evicting = 0  # of those
+        self._evicting = 0  # of these frames
         self._rebel_rows = 0
         self._object_rows = 0
-        self._objects: dict[int, ObjectClass] = {}  # the last class of each
+        self._objects: dict[int, ObjectClass] = {}  # last class, by id
         self._normal: set[int] = set()
-        self._rebels: dict[int, Cause] = {}  # the last cause of each
+        self._rebels: dict[int, Cause] = {}  # last cause, by id
         self._notes: Counter[str] = Counter()
         self._stamps_ns: list[int] = []
         self._times_us: list[tuple[int, int, int]] = []
@@ -58,7 +58,7 @@ class Summary:
         self._times_us.append((scene.timing.detect, scene.timing.filter, scene.timing.total))
 
     def lines(self, skipped: Mapping[str, int] | None = None) -> list[str]:
-        """What a user reads, after one frame at least.
+        """Return the lines for the user, after one frame at least.
 
         ``skipped``: what the recording left out, and how often.
         """
@@ -91,14 +91,14 @@ class Summary:
         return lines
 
     def _remedy(self) -> str:
-        """The keys of the tables that were full."""
+        """Return the keys of the tables that were full."""
         keys = " and ".join(f"memory.{key} ({self._capacities[key]})" for key in sorted(self._full))
         fewer = ", or lower filter.corners_target" if "corners" in self._full else ""
         return f"raise {keys}{fewer}"
 
 
 def _by_name(seen: Iterable[IntEnum], names: type[IntEnum]) -> str:
-    """How many of each, in brackets; nothing where there are none."""
+    """Return how many there are of each, in brackets; empty: none."""
     counts = Counter(seen)
     named = ", ".join(f"{counts[one]} {one.name.lower().replace('_', ' ')}" for one in names if counts[one])
     return f" ({named})" if named else ""

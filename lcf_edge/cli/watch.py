@@ -23,17 +23,17 @@ PLAIN_LINES = 100
 
 
 def watch_lines(address: DaemonAddress, tell: Callable[[str], None]) -> None:
-    """One JSON object a scene, until interrupted. Raises ``PublishError``."""
+    """Print one JSON object a scene, until interrupted. Raises ``PublishError``."""
     with closing(scenes(address.endpoint, scene_key(address.prefix), config_file=address.config_file)) as arriving:
         for scene in arriving:
             tell(msgspec.json.encode(scene_fields(scene)).decode())
 
 
 def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) -> None:
-    """The table, until q is pressed or Ctrl-C; where standard output is no terminal, plain text for ``tell``.
+    """Show the table until q or Ctrl-C; where standard output is no terminal, pass plain text to ``tell``.
 
-    Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``watch`` or when the terminal goes
-    away.
+    Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``watch`` or when the terminal is
+    closed.
     """
     try:
         from rich.console import Console
@@ -73,4 +73,4 @@ def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) ->
 
 
 def _ignore(_: bytes) -> None:
-    """No key does anything to a daemon."""
+    """Ignore keys: a daemon is only watched."""

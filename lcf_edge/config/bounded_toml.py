@@ -1,4 +1,4 @@
-"""TOML of a size and depth that a configuration can have; what is larger is refused before it is parsed.
+"""TOML of bounded size and depth; what is larger is refused before it is parsed.
 
 The parser's memory grows with the square of a key's depth: 40 kB of dots would take more than a gigabyte.
 """
@@ -8,10 +8,10 @@ import tomllib
 from typing import Any
 
 MAX_BYTES = 2**16
-DEEPEST = 4  # tables or lists in each other, and parts of a dotted key
+DEEPEST = 4  # nested tables or lists, and parts of a dotted key
 
-# Strings and comments, whose dots and brackets count for nothing. As TOML 1.0 has them: where a string is not ended
-# here, the parser ends too.
+# Strings and comments, whose dots and brackets do not count, by TOML 1.0: a string that does not end here is an error
+# for the parser too.
 _TEXT = re.compile(
     r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'
     r"|'''.*?'''(?:'{0,2})"
@@ -20,17 +20,17 @@ _TEXT = re.compile(
     r"|#[^\n]*",
     re.DOTALL,
 )
-_LONG_NUMBER = re.compile(r"\b0[xob]\w{1000}")  # decimal ones the parser refuses by itself
+_LONG_NUMBER = re.compile(r"\b0[xob]\w{1000}")  # the parser itself refuses decimal ones
 _BRACKET = re.compile(r"[\[\]{}]")
 _DEEP_KEY = re.compile(rf"[\w-](?:[ \t]*\.[ \t]*[\w-]+){{{DEEPEST}}}")
 
 
 class TomlError(ValueError):
-    """No TOML that can be taken; the text says why."""
+    """TOML that is refused; the text says why."""
 
 
 def parse(text: str) -> dict[str, Any]:
-    """The tables of ``text``. Raises ``TomlError``."""
+    """Parse ``text``. Raises ``TomlError``."""
     if len(text) > MAX_BYTES:
         raise TomlError(f"more than {MAX_BYTES // 1024} KiB")
     skeleton = _TEXT.sub(lambda found: "" if found[0].startswith("#") else "s", text)

@@ -1,7 +1,7 @@
 """Configuration: typed tables with the unit in each name, from TOML and ``--set``.
 
-``load`` reads a file (or the defaults), applies ``KEY=VALUE`` settings, and returns one ``Config`` that
-is checked whole: an unknown key, a wrong type or an impossible value is a ``ConfigError`` that names the key.
+``load`` reads a file (or the defaults), applies ``KEY=VALUE`` settings, and returns one ``Config``,
+checked as a whole: an unknown key, a wrong type or an impossible value is a ``ConfigError`` that names the key.
 """
 
 import math
@@ -24,14 +24,14 @@ DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 MIN_HEIGHT_M = 0.001
 MAX_POLYGONS, MAX_POINTS = 64, 256  # of a mask
 
-_SHOWN = 60  # characters of a key that is not known
-_MAX_QUOTED = 300  # of anything else that somebody wrote
+_SHOWN = 60  # characters of an unknown key
+_MAX_QUOTED = 300  # characters of any other text from the user
 
-# Every number has bounds far beyond what is sensible, within which nothing overflows, divides by zero or takes memory
-# that was not reckoned with.
+# Every number has bounds far beyond what is sensible, within which nothing overflows, divides by zero or takes
+# unexpected memory.
 Metres = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
 Pixels = Annotated[float, msgspec.Meta(ge=0.001, le=10_000)]
-Gate = Annotated[float, msgspec.Meta(ge=0.001, le=60)]  # px; the pairs in reach grow with its square
+Gate = Annotated[float, msgspec.Meta(ge=0.001, le=60)]  # px; the number of pairs within it grows with its square
 Seconds = Annotated[float, msgspec.Meta(ge=0.001, le=3600)]
 Radians = Annotated[float, msgspec.Meta(ge=0.001, le=3.15)]
 Ratio = Annotated[float, msgspec.Meta(ge=0.001, le=1_000_000)]
@@ -72,7 +72,7 @@ class Camera(Table, frozen=True):
     recording: str = ""  # what driver = "recording" replays
     width: Side = 640
     height: Side = 480
-    fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # asked of the camera; of pictures without stamps
+    fps: Annotated[float, msgspec.Meta(ge=0.001, le=10_000)] = 20.0  # requested; also the rate of images without stamps
     format: PixelFormat = "auto"
     exposure_s: Annotated[float, msgspec.Meta(ge=1e-6, le=100)] | None = None  # not given: the camera's own automatic
     gain: Annotated[int, msgspec.Meta(ge=-(2**31), le=2**31 - 1)] | None = (
@@ -92,22 +92,22 @@ class Camera(Table, frozen=True):
     left_m: Offset = 0.0
     mask: list[
         list[list[Annotated[float, msgspec.Meta(ge=-20_000, le=40_000)]]]
-    ] = []  # own parts in view: polygons of x, y in px of a picture of width x height
+    ] = []  # own parts in view: polygons of x, y in px of an image of width x height
 
 
 class Imu(Table, frozen=True):
-    """How the IMU's samples become the camera's axes."""
+    """Which IMU there is, and how its samples are turned into the camera's axes."""
 
     driver: ImuDriver = "none"
     bus: Annotated[int, msgspec.Meta(ge=0, le=255)] = 1  # /dev/i2c-N
     address: Annotated[int, msgspec.Meta(ge=0, le=0x77)] = 0  # 0: the chip's usual one
     identity: Annotated[int, msgspec.Meta(ge=0, le=255)] | None = (
-        None  # of a copy of the chip, as the error that refuses it names it
+        None  # of a copy of the chip, as named by the error that refuses it
     )
     port: str = "/dev/ttyUSB0"  # path or /dev/serial/by-id/...
     baud: Annotated[int, msgspec.Meta(ge=0, le=4_000_000)] = 0  # 0: the protocol's usual one
     device: str = ""  # of driver = "iio": the chip's name or iio:deviceN; empty: the first with a gyro
-    firmware: str = "/lib/firmware/bmi270-init-data.fw"  # what a bmi270 must be given at every start
+    firmware: str = "/lib/firmware/bmi270-init-data.fw"  # what is loaded into a bmi270 at every start
     recording: str = ""  # what driver = "recording" replays
     rate_hz: Annotated[float, msgspec.Meta(ge=10, le=1000)] = 200.0
     gyro_range_dps: Literal[250, 500, 1000, 2000] = 500
@@ -120,7 +120,7 @@ class Imu(Table, frozen=True):
 
 
 class Vehicle(Table, frozen=True):
-    """What the vehicle is."""
+    """Size and speed of the vehicle."""
 
     half_width_m: Metres = 0.3
     height_m: Metres = 2.0  # what passes above this is no threat
@@ -148,9 +148,9 @@ class Filter(Table, frozen=True):
     )
     bl_min_px: Gate = 3.0
     bs_px: Pixels = 64.0  # BS_λ, largest radius of a circle
-    scene_depth_m: Metres = 4.0  # depth of a new landmark that no circle knows
+    scene_depth_m: Metres = 4.0  # depth of a new landmark outside all circles
     appearance_max: Annotated[float, msgspec.Meta(ge=0.001, le=255)] = (
-        28.0  # mean absolute grey difference that still is the same corner
+        28.0  # largest mean absolute grey difference of the same corner
     )
     appearance_share: Annotated[float, msgspec.Meta(ge=0.001, le=100)] = (
         0.25  # and as a share of the corner's own contrast
@@ -174,7 +174,7 @@ class Filter(Table, frozen=True):
     focus_sigma_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = 6.0  # uncertainty of O
     ground_margin: Share = 0.2  # share by which the ground may be misjudged
     pitch_sigma_rad: Annotated[float, msgspec.Meta(ge=0, le=1.5)] = 0.008
-    patches: Annotated[int, msgspec.Meta(ge=0, le=64)] = 6  # of the picture near the path, followed for seconds
+    patches: Annotated[int, msgspec.Meta(ge=0, le=64)] = 6  # of the image near the path, followed for seconds
     psi_life_s: Seconds = 0.3  # ψ expires and the region is looked at again
 
 
@@ -211,30 +211,30 @@ class Memory(Table, frozen=True):
 
 
 class Zenoh(Table, frozen=True):
-    """How the Zenoh session is opened. By default: loopback only, nobody is scouted."""
+    """How the Zenoh session is opened. By default: loopback only, no scouting."""
 
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
     listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
-    gossip: bool = False  # connect to the peers that another names, as rmw_zenoh does
-    config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above go on top
+    gossip: bool = False  # connect to the peers of peers, as rmw_zenoh does
+    config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above override it
 
 
 class Publish(Table, frozen=True):
-    """What goes out, and under which names."""
+    """What is published, and under which names."""
 
     prefix: str = "lcf"
     frame_id: str = "camera"
     robot: str = "rover"
-    preview_hz: Annotated[float, msgspec.Meta(ge=0, le=100)] = 5.0  # at most, while somebody looks; 0: none
-    annotations: bool = False  # for Foxglove: what is drawn over the picture
+    preview_hz: Annotated[float, msgspec.Meta(ge=0, le=100)] = 5.0  # at most, while somebody subscribes; 0: none
+    annotations: bool = False  # for Foxglove: what is drawn over the image
     points: bool = False  # PointCloud2 of what will be met: for Nav2
     markers: bool = False  # MarkerArray of the objects: for RViz
     detections: bool = False  # Detection2DArray and Detection3DArray
     speed_limit: bool = False  # TwistStamped, and Nav2's SpeedLimit
     transform: bool = False  # where the camera sits: /tf_static
     base_frame: str = "base_link"  # of the vehicle, on the ground
-    ros2: bool = False  # the same samples also as rmw_zenoh names them
+    ros2: bool = False  # also publish the samples under the names of rmw_zenoh
     ros2_domain: Annotated[int, msgspec.Meta(ge=0, le=232)] = 0  # ROS_DOMAIN_ID
     ros2_type_hash: Literal["RIHS01", "TypeHashNotSupported"] = "RIHS01"  # the other one: Humble
 
@@ -246,16 +246,16 @@ class Record(Table, frozen=True):
     folder: str = "/var/lib/lcf-edge"
     format: Literal["jpeg", "png"] = "jpeg"  # png: without loss, some five times as large
     jpeg_quality: Annotated[int, msgspec.Meta(ge=1, le=100)] = 80
-    ttc_s: Seconds = 1.5  # what is met sooner is a threat
-    before_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 2.0  # that are saved of what came before a threat
+    ttc_s: Seconds = 1.5  # contacts sooner than this are threats
+    before_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 2.0  # saved from before a threat
     after_s: Annotated[float, msgspec.Meta(ge=0, le=3600)] = 5.0
     buffer_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = (
         2.0  # of memory: what waits for the disk, or for a threat
     )
-    file_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = 512.0  # then the next file begins,
-    file_s: Annotated[float, msgspec.Meta(gt=0, le=1800)] = 900.0  # or after this: its index lies in memory
-    total_mib: Mebibytes = 4096.0  # of all files in the folder; the oldest give way
-    free_mib: Annotated[float, msgspec.Meta(ge=0, le=1e9)] = 512.0  # that are left free on the disk
+    file_mib: Annotated[float, msgspec.Meta(ge=1, le=4095)] = 512.0  # size at which the next file begins
+    file_s: Annotated[float, msgspec.Meta(gt=0, le=1800)] = 900.0  # and its age: its index is in memory
+    total_mib: Mebibytes = 4096.0  # of all files in the folder; the oldest are removed
+    free_mib: Annotated[float, msgspec.Meta(ge=0, le=1e9)] = 512.0  # left free on the disk
 
 
 class Metrics(Table, frozen=True):
@@ -290,8 +290,8 @@ def load(path: Path | None = None, settings: Sequence[str] = (), *, filled: bool
     """Read a configuration.
 
     ``path``: a TOML file, or a recording of ``lcf-edge record``; None: ``DEFAULT_PATH`` when it exists, else the
-    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). ``filled``: a file
-    that is away or empty is refused, whichever it is. Raises ``ConfigError``.
+    defaults. ``settings``: ``KEY=VALUE`` with dotted keys and TOML values (a bare word is a string). ``filled``: a
+    missing or empty file is refused. Raises ``ConfigError``.
     """
     file = _read(path or DEFAULT_PATH, needed=filled or path is not None, filled=filled)
     _typed(file, str(path or DEFAULT_PATH))
@@ -305,7 +305,7 @@ def load(path: Path | None = None, settings: Sequence[str] = (), *, filled: bool
 
 
 def is_filled(path: Path) -> bool:
-    """Whether there is a file, with anything but blanks in it."""
+    """Whether the file exists and holds more than white space."""
     try:
         return bool(_start_of(path).strip())
     except OSError:
@@ -335,7 +335,7 @@ def _start_of(path: Path) -> bytes:
 
 
 def _attached(path: Path) -> bytes:
-    from lcf_edge.config.attached import attached_configuration  # noqa: PLC0415  # a vehicle reads none
+    from lcf_edge.config.attached import attached_configuration  # noqa: PLC0415  # only needed for recordings
 
     return attached_configuration(path)
 
@@ -359,7 +359,7 @@ def _apply(tree: dict[str, Any], setting: str) -> None:
 
 
 def _typed(tree: dict[str, Any], origin: str) -> Config:
-    """The tree with the defaults for what it does not say; refuses unknown keys and wrong types."""
+    """Fill in defaults; refuse unknown keys and wrong types."""
     _refuse_unknown(tree, Config, "", origin)
     section = tree.get("filter")
     if isinstance(section, dict) and section.get("profile") == "paper":
@@ -382,7 +382,7 @@ def _refuse_unknown(tree: dict[str, Any], table: type[msgspec.Struct], prefix: s
 
 
 def _hint(name: str, prefix: str) -> str:
-    """The closest valid key, also of another table."""
+    """Return the closest valid key, also of another table."""
     keys = [(field.name, "") for field in msgspec.structs.fields(Config)]
     keys += [
         (field.name, f"{table.name}.")
@@ -391,7 +391,7 @@ def _hint(name: str, prefix: str) -> str:
     ]
 
     def closeness(key: tuple[str, str]) -> float:
-        same_table = 0.2  # a wrong table is a rarer slip than a wrong letter
+        same_table = 0.2  # a wrong table is rarer than a wrong letter
         return SequenceMatcher(None, name, key[0]).ratio() + same_table * (key[1] == prefix)
 
     closest = max(keys, key=closeness)
@@ -399,7 +399,7 @@ def _hint(name: str, prefix: str) -> str:
 
 
 def _check(config: Config, origin: str) -> None:
-    """What a type alone cannot say."""
+    """Refuse what types alone cannot exclude."""
     camera, filters = config.camera, config.filter
     for table, values in msgspec.to_builtins(config).items():
         for key, value in values.items():
@@ -465,7 +465,7 @@ def _check_endpoints(zenoh: Zenoh, origin: str) -> None:
 
 
 def _numbers(value: Any) -> Iterator[float]:
-    """The numbers in a value, lists of lists included."""
+    """Yield the numbers in a value, also in nested lists."""
     if isinstance(value, list):
         for item in value:
             yield from _numbers(item)
@@ -492,7 +492,7 @@ def to_toml(config: Config) -> str:
 
 
 def _to_toml(value: Any) -> str:
-    """JSON of what a key can hold is TOML; what a terminal might obey, and TOML forbids in part, is escaped."""
+    """Write a value as JSON, which is TOML for all that a key can hold; control characters are escaped."""
     text = msgspec.json.encode(value).decode()
     return "".join(letter if letter.isprintable() else _escaped(letter) for letter in text)
 

@@ -1,4 +1,4 @@
-"""Zenoh's endpoints, as ``tcp/127.0.0.1:7447``: what is wrong with one, before Zenoh waits for it for ever."""
+"""Zenoh's endpoints, as ``tcp/127.0.0.1:7447``: what is wrong with one, because Zenoh would wait for it forever."""
 
 import re
 
@@ -8,7 +8,7 @@ _EXAMPLE = "write for example tcp/127.0.0.1:7447"
 
 
 def fault(endpoint: str) -> str:
-    """What is wrong, with the remedy; empty: nothing. What stands behind ``#`` may be keys and is not shown."""
+    """Return what is wrong, with the remedy; empty: nothing. What follows ``#`` may be a secret and is not shown."""
     shown = endpoint.partition("#")[0]
     protocol, slash, address = shown.partition("?")[0].partition("/")
     if not (protocol and slash and address):

@@ -16,7 +16,7 @@ _MIN_ALIKE = 0.75
 
 
 def why(tree: dict[str, Any], key: str, table: type[msgspec.Struct]) -> str:
-    """What ``key`` (``imu.driver``, ``camera.mask[0][1]``) of ``table`` must be, and what it is in ``tree``."""
+    """Return what ``key`` (``imu.driver``, ``camera.mask[0][1]``) of ``table`` must be, and its value in ``tree``."""
     value: Any = tree
     kind: inspect.Type = inspect.type_info(table)
     for name, place in re.findall(r"(\w+)|\[(\d+)\]", key):
@@ -31,12 +31,12 @@ def why(tree: dict[str, Any], key: str, table: type[msgspec.Struct]) -> str:
         kind = _given(kind)
     if isinstance(kind, inspect.LiteralType):
         return _none_of(value, kind.values)
-    secret = isinstance(kind, inspect.ListType) and isinstance(value, str)  # an endpoint, perhaps with keys
+    secret = isinstance(kind, inspect.ListType) and isinstance(value, str)  # an endpoint, perhaps with secrets
     return f"{_expected(kind)} is needed, not {'a text' if secret else _quoted(value)}"
 
 
 def _given(kind: inspect.Type) -> inspect.Type:
-    """Without the None of a key that need not be there."""
+    """Return the type without the None of an optional key."""
     if isinstance(kind, inspect.UnionType):
         return next(each for each in kind.types if not isinstance(each, inspect.NoneType))
     return kind
@@ -72,7 +72,7 @@ def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:
 
 
 def _quoted(value: Any) -> str:
-    """Numbers and texts; of what is larger, and may hold an endpoint's keys, only what it is."""
+    """Quote numbers and texts; of anything larger, which may hold an endpoint's secrets, name only the type."""
     match value:
         case list():
             return "a list"

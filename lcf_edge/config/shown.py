@@ -1,4 +1,4 @@
-"""The configuration as it is shown to others: without what Zenoh endpoints carry behind ``#``, which may be keys."""
+"""The configuration as it is shown to others: without what follows ``#`` in Zenoh endpoints, which may be secrets."""
 
 import msgspec
 
@@ -6,7 +6,7 @@ from lcf_edge.config import Config, to_toml
 
 
 def shown(config: Config) -> str:
-    """As TOML."""
+    """Return it as TOML."""
     zenoh = config.zenoh
     bare = msgspec.structs.replace(
         zenoh,

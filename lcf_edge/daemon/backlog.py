@@ -1,4 +1,4 @@
-"""A queue between two threads that is bounded in bytes: who puts never waits, what does not fit is counted."""
+"""A queue between two threads, bounded in bytes: ``put`` never waits, what does not fit is counted."""
 
 import threading
 from collections import deque
@@ -8,9 +8,9 @@ Item = TypeVar("Item")
 
 
 class Backlog(Generic[Item]):
-    """Holds items in order. ``bytes``: that they take; ``dropped``: how many items did not fit.
+    """Holds items in order. ``bytes``: what they take; ``dropped``: how many items did not fit.
 
-    Into an empty one anything fits.
+    Anything fits into an empty one.
     """
 
     def __init__(self, limit_bytes: int) -> None:
@@ -22,7 +22,7 @@ class Backlog(Generic[Item]):
         self._changed = threading.Condition()
 
     def put(self, item: Item, size_bytes: int, reserve_bytes: int = 0) -> bool:
-        """Append an item if it leaves ``reserve_bytes`` free. Return whether."""
+        """Append an item if it leaves ``reserve_bytes`` free. Return whether it did."""
         with self._changed:
             fits = not self._items or self.bytes + size_bytes <= self.limit_bytes - reserve_bytes
             if fits:
@@ -34,7 +34,7 @@ class Backlog(Generic[Item]):
             return fits
 
     def take(self, most_bytes: int, timeout_s: float) -> list[Item]:
-        """Items from the front that together take no more than ``most_bytes``, one at least; empty: none in time."""
+        """Remove and return items from the front: ``most_bytes`` at most, but at least one; empty: none in time."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._closed, timeout_s)
             taken: list[Item] = []
@@ -47,13 +47,13 @@ class Backlog(Generic[Item]):
             return taken
 
     def close(self) -> None:
-        """Nobody waits any more; what it holds can still be taken."""
+        """End all waits; what it holds can still be taken."""
         with self._changed:
             self._closed = True
             self._changed.notify_all()
 
     @property
     def ended(self) -> bool:
-        """Closed, and all taken."""
+        """Whether it is closed, and all was taken."""
         with self._changed:
             return self._closed and not self._items

@@ -3,13 +3,13 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-_PI_THROTTLED = {  # bits of the Raspberry Pi firmware's get_throttled that are of the present
+_PI_THROTTLED = {  # bits of the Raspberry Pi firmware's get_throttled that describe the present
     0x1: "under-voltage",
     0x2: "frequency capped",
     0x4: "throttled",
     0x8: "soft temperature limit",
 }
-_CPU_COOLING = ("cpufreq", "processor", "cpu")  # how cooling devices that slow the processor are named
+_CPU_COOLING = ("cpufreq", "processor", "cpu")  # names of cooling devices that slow the processor
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +44,7 @@ def _found(sys: Path, pattern: str) -> list[Path]:
 def _text(file: Path) -> str:
     try:
         return file.read_text(encoding="ascii", errors="replace").strip()
-    except OSError:  # also of a zone that is switched off
+    except OSError:  # for example, a zone that is switched off
         return ""
 
 

@@ -1,11 +1,11 @@
-"""Two clocks: the one that devices wait on, whose waits a stop cuts short, and the system's, with its steps noticed."""
+"""Two clocks: one for devices, whose waits a stop cuts short, and the system's, whose steps are noticed."""
 
 import threading
 import time
 from collections.abc import Callable
 
 STEP_NS = 1_000_000
-"""The two clocks run at one rate; a difference between them that changes by more is a step."""
+"""The two clocks run at the same rate; a larger change of the difference between them is a step."""
 
 _TRIES = 5
 _GOOD_BRACKET_NS = 20_000
@@ -18,7 +18,7 @@ class StoppableClock:
         self._stopped = threading.Event()
 
     def monotonic_ns(self) -> int:
-        """Now, ns."""
+        """Return the time now, ns."""
         return time.monotonic_ns()
 
     def sleep_s(self, seconds: float) -> None:
@@ -26,7 +26,7 @@ class StoppableClock:
         self._stopped.wait(max(seconds, 0.0))
 
     def stop(self) -> None:
-        """End all waits, those to come too."""
+        """End all waits, also future ones."""
         self._stopped.set()
 
     @property
@@ -51,7 +51,7 @@ class SystemTime:
         self._offset_ns, _ = self._measured()
 
     def notice(self) -> int:
-        """The step of the system clock since the last call, ns; 0: none."""
+        """Return the step of the system clock since the last call, ns; 0: none."""
         offset_ns, error_ns = self._measured()
         step_ns = offset_ns - self._offset_ns
         if abs(step_ns) <= STEP_NS + error_ns:
@@ -61,15 +61,15 @@ class SystemTime:
         return step_ns
 
     def system_ns(self, monotonic_ns: int) -> int:
-        """A monotonic time on the system clock."""
+        """Convert a monotonic time, ns, to the system clock."""
         return monotonic_ns + self._offset_ns
 
     def monotonic_ns(self, system_ns: int) -> int:
-        """A time of the system clock on the monotonic one."""
+        """Convert a time of the system clock, ns, to the monotonic one."""
         return system_ns - self._offset_ns
 
     def _measured(self) -> tuple[int, int]:
-        """Offset and how far it may be wrong, ns, by the closest of a few readings of both clocks."""
+        """Return the offset and its largest error, ns, from the closest of a few readings of both clocks."""
         best = (0, 2**63)
         for _ in range(_TRIES):
             before_ns = self._monotonic_ns()

@@ -1,4 +1,4 @@
-"""What makes the scenes worse than they could be, in words."""
+"""What degrades the scenes, in words."""
 
 from collections.abc import Iterator
 
@@ -6,7 +6,7 @@ from drivers.samples import Frame
 from lcf_edge.config import Config
 from lcf_edge.messages import PipelineScene
 
-DARK = 25  # mean grey level of a dark picture
+DARK = 25  # mean grey level of a dark image
 _BLIND_S = 0.5  # without corners
 
 _WORDS = {
@@ -19,7 +19,7 @@ _WORDS = {
     "speed drifts": "speed comes from the accelerometer alone and drifts",
 }
 
-_WORDS_OF_A_RECORDING = {  # which has no cable
+_WORDS_OF_A_RECORDING = {  # without mentioning a cable
     "imu gap": "inertial samples are missing between two pictures of the recording, or where it begins again",
     "gyro stuck": "the gyro of the recording repeats one value without noise: it is not used",
 }
@@ -34,7 +34,7 @@ class Degradation:
         self._leap_px = config.filter.leap_px
         self._depth_m = config.filter.scene_depth_m
         self._last_ns: int | None = None
-        self._corners_ns: int | None = None  # when there were some
+        self._corners_ns: int | None = None  # when there last were some
 
     def add(self, frame: Frame, scene: PipelineScene) -> None:
         """Take a frame and what it gave."""
@@ -56,9 +56,9 @@ class Degradation:
         yield from (self._words[note] for note in scene.notes if note in self._words)
 
     def _too_slow(self, scene: PipelineScene, interval_s: float) -> Iterator[str]:
-        """What stands at ``filter.scene_depth_m`` and the edge of the picture moves x V dt / Z in a frame."""
+        """Something still at depth ``filter.scene_depth_m`` and the image's edge moves by x V dt / Z in a frame."""
         moved_px = scene.image_width / 2 * abs(scene.vehicle_speed) * interval_s / self._depth_m
-        if moved_px > self._leap_px:  # NaN is not
+        if moved_px > self._leap_px:  # false for NaN
             yield (
                 f"frame rate too low for the motion: the scenery moves {moved_px:.0f} px from frame to frame, "
                 f"{self._leap_px:.0f} can be followed; drive slower or raise camera.fps"

@@ -1,4 +1,4 @@
-"""File descriptors in reserve: strangers who use up all others do not keep devices and files from being opened."""
+"""File descriptors in reserve, so that strangers who use up all others cannot keep devices and files from opening."""
 
 import os
 import threading
@@ -12,7 +12,7 @@ LENT = 12  # at a time: a device or a file needs two or three, a camera of libca
 class Reserve:
     """Holds ``RESERVED`` descriptors back, of which some are lent while a device or a file is opened.
 
-    ``short``: at the last ``check`` no other was left. ``shortages``: how often that began.
+    ``short``: at the last ``check`` no others were left. ``shortages``: how often that began.
     """
 
     def __init__(self) -> None:
@@ -25,7 +25,7 @@ class Reserve:
 
     @contextmanager
     def lent(self) -> Iterator[None]:
-        """A few descriptors are free within, whoever uses up the others. What is kept open is replaced when it can."""
+        """Within, a few descriptors are free, even if all others are used up; refill the reserve when possible."""
         with self._lock:
             self._borrowers += 1
             for number in self._open[:LENT]:
@@ -39,7 +39,7 @@ class Reserve:
                 self._fill()
 
     def check(self) -> None:
-        """Look whether others have used up all that are not reserved."""
+        """Check whether all descriptors that are not reserved are used up."""
         with self._lock:
             if not self._borrowers:
                 self._fill()
@@ -48,13 +48,13 @@ class Reserve:
         self.short = short
 
     def close(self) -> None:
-        """Give them back; the reserve is not used again."""
+        """Release the reserve; it is not used again."""
         with self._lock:
             while self._open:
                 os.close(self._open.pop())
 
     def _fill(self) -> None:
-        with suppress(OSError):  # others have them all; the next check tries again
+        with suppress(OSError):  # none is left; the next check tries again
             while len(self._open) < RESERVED:
                 self._open.append(os.open(os.devnull, os.O_RDONLY | os.O_CLOEXEC))
 

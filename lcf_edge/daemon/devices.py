@@ -16,7 +16,7 @@ from lcf_edge.devices import open_camera, open_imu, open_speed
 
 
 def readers(config: Config, mail: Mail, clock: StoppableClock, reserve: Reserve) -> list[Reader[Any]]:
-    """Of the camera, which comes first, of the IMU if there is one, of a stand-in recording's odometry; not started."""
+    """Return readers, not started: of the camera, of the IMU if there is one, of a stand-in recording's odometry."""
 
     def reader(name: str, open_device: Callable[[Config, Clock], Any], put: Callable[[Sequence[Any]], object]) -> Any:
         def opened(at: Clock) -> Any:

@@ -1,4 +1,4 @@
-"""The thread that waits for the disk, so that no other does: messages go from the backlog to files."""
+"""The thread that waits for the disk, so that no other must: messages go from the backlog to files."""
 
 import errno
 import threading
@@ -18,19 +18,19 @@ from lcf_edge.recording.write.messages import IMAGES, RecordedMessage
 from lcf_edge.recording.write.recording_file import CHUNK_BYTES, RecordingFile
 
 SYNC_S = 0.5
-"""So much of a recording a power cut costs, and what the disk takes to write it."""
+"""A power cut loses this much of a recording, plus the time the disk takes to write it."""
 
 RETRY_S = 2.0
 _TAKEN_BYTES = CHUNK_BYTES // 4
-_LACK_OF_ROOM = {errno.ENOSPC, errno.EDQUOT}  # the file can go on once there is some
+_LACK_OF_ROOM = {errno.ENOSPC, errno.EDQUOT}  # the file can be continued once there is room
 
 
 class EndOfFile:
-    """Among the messages: what comes next goes into a new file."""
+    """Placed among the messages: what follows goes into a new file."""
 
 
 class DiskWriter(threading.Thread):
-    """Writes what comes out of ``backlog``, until that is closed and empty. A disk that fails costs messages, no more.
+    """Writes what comes out of ``backlog``, until that is closed and empty. A disk that fails costs only messages.
 
     For others to read: ``trouble`` (why nothing is written; None: all is well), ``file``, ``counts``,
     ``written_bytes``.
@@ -58,7 +58,7 @@ class DiskWriter(threading.Thread):
 
     @property
     def written_bytes(self) -> int:
-        """Of all files."""
+        """Bytes written into all files."""
         file = self.file
         return self._finished_bytes + (file.size_bytes if file else 0)
 
@@ -91,7 +91,7 @@ class DiskWriter(threading.Thread):
         self.counts["pictures"] += message.topic is IMAGES
 
     def _made_ready(self) -> RecordingFile | None:
-        """The file to go on with, a new one if need be; None: the disk does not let us, and is asked again later."""
+        """Return the file to continue, or a new one; None: the disk refuses, and is tried again later."""
         if self.trouble and time.monotonic_ns() < self._retry_at_ns:
             return None
         try:
@@ -109,7 +109,7 @@ class DiskWriter(threading.Thread):
 
     def _begun(self) -> RecordingFile:
         now_ns = time.monotonic_ns()
-        offset_ns = self._system_time.system_ns(0)  # held for the whole file, whoever sets the clock meanwhile
+        offset_ns = self._system_time.system_ns(0)  # the same for the whole file, even if the clock is set meanwhile
         path = self._destination.next(now_ns + offset_ns)
         self._check_room()
         self._attached = self.config
@@ -119,14 +119,14 @@ class DiskWriter(threading.Thread):
         return file
 
     def _config_text(self) -> str:
-        """What is attached. That a command asked for this one file is not a wish to record whenever it is used."""
+        """Return the configuration to attach; without ``record.when`` of a file that a command asked for."""
         config = self.config
         if isinstance(self._destination, Named):
             config = msgspec.structs.replace(config, record=msgspec.structs.replace(config.record, when="never"))
         return shown(config)
 
     def _sync(self) -> None:
-        """Have on the disk what is due."""
+        """Sync what is due."""
         file, now_ns = self.file, time.monotonic_ns()
         if file is None or self.trouble or (now_ns < self._sync_at_ns and file.unwritten_bytes < CHUNK_BYTES):
             return
@@ -147,7 +147,7 @@ class DiskWriter(threading.Thread):
             self._end_file()
 
     def _check_room(self) -> None:
-        """Raises ``OSError`` when others need what is left of the disk."""
+        """Raise ``OSError`` if no more of the disk may be used."""
         least_mib = self.config.record.free_mib
         if least_mib and free_mib(self._destination.folder) < least_mib:
             raise OSError(errno.ENOSPC, f"less than record.free_mib = {least_mib:g} MiB are free")

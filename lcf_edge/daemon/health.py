@@ -28,7 +28,7 @@ _SILENT_INTERVALS = 10
 
 
 class Health:
-    """Looks at all parts; changes none, but for the window of the latency."""
+    """Reads the state of all parts; changes nothing but the window of the latency."""
 
     def __init__(
         self,
@@ -50,7 +50,7 @@ class Health:
         self._turned_s = time.monotonic()
 
     def statuses(self, config: Config, memory: MemoryWatch) -> list[DeviceStatus]:
-        """One for each part."""
+        """Return a status for each part."""
         if time.monotonic() - self._turned_s > LATENCY_TURN_S:
             self._turned_s = time.monotonic()
             for durations in (self._loop.latency, self._loop.detect, self._loop.filter):
@@ -59,7 +59,7 @@ class Health:
         return [*devices, self._pipeline(config), _memory(memory), self._board(), self._published()]
 
     def line(self, memory: MemoryWatch) -> str:
-        """Rate, objects, circles, memory, and the camera's error if it has one."""
+        """Return one line: rate, objects, circles, memory, and the camera's error if it has one."""
         camera = self._readers[0]
         scene = self._loop.scene
         rate_hz = camera.intervals.rate_hz

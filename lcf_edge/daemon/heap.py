@@ -1,4 +1,4 @@
-"""What of the process's memory stays resident: one heap for all threads, and nothing that only the start needed."""
+"""Keeps resident memory small: one heap for all threads, and nothing that only the start needed."""
 
 import ctypes
 import re
@@ -10,27 +10,27 @@ _MADV_DONTNEED = 4  # Linux, mman-common.h
 _MAPPING = re.compile(
     r"^([0-9a-f]+)-([0-9a-f]+) r-[x-]p \S+ \S+ \S+ +/.*?^Anonymous: +(\d+) kB$", re.MULTILINE | re.DOTALL
 )
-"""In ``smaps``: a file's, private, not to be written; begin, end, and how much of it has been written all the same."""
+"""In ``smaps``, a private read-only mapping of a file: begin, end, and how much of it was written nevertheless."""
 
 
 def use_one_heap() -> bool:
-    """For this process, before it has threads: glibc would give each its own, which keeps what it has once been given.
+    """Call before the process has threads: glibc would give each thread a heap, which never shrinks.
 
     Return whether the C library has such a setting.
     """
-    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # not every C library has it
+    mallopt = getattr(ctypes.CDLL(None), "mallopt", None)  # not in every C library
     return mallopt is not None and mallopt(_M_ARENA_MAX, 1) == 1
 
 
 def trim() -> None:
     """Give free memory back to the system, where the C library can; 1 ms."""
-    release = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none, and gives back by itself
+    release = getattr(ctypes.CDLL(None), "malloc_trim", None)  # musl has none, and returns memory by itself
     if release is not None:
         release(0)
 
 
 def leave_start(smaps: Path = Path("/proc/self/smaps")) -> None:
-    """Give back what is free, and the code and constants of libraries: what is used of them comes back by itself."""
+    """Release free memory, and code and constants of libraries; what is used of these is loaded again."""
     trim()
     advise = ctypes.CDLL(None).madvise
     for start, length in as_in_files(smaps.read_text("utf-8", "replace")):
@@ -38,7 +38,7 @@ def leave_start(smaps: Path = Path("/proc/self/smaps")) -> None:
 
 
 def as_in_files(smaps: str) -> Iterator[tuple[int, int]]:
-    """Address and length of every mapping that holds what its file holds, and cannot be made to hold anything else."""
+    """Yield address and length of every read-only mapping that is unchanged from its file."""
     for start, end, written_kib in _MAPPING.findall(smaps):
         if written_kib == "0":
             yield int(start, 16), int(end, 16) - int(start, 16)

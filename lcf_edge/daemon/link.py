@@ -1,4 +1,4 @@
-"""What the daemon asks of its link to the outside."""
+"""What the daemon needs from its link to the outside."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -11,11 +11,11 @@ from lcf_edge.messages import Scene
 
 
 class Link(Protocol):
-    """Never blocks, never raises; what went wrong is in ``counts``. Stamps are of the system clock."""
+    """Never blocks, never raises; failures are counted in ``counts``. Stamps are of the system clock."""
 
     @property
     def counts(self) -> Counter[str]:
-        """What happened so far, by part."""
+        """Counts so far, by part."""
         ...
 
     def put_scene(self, scene: Scene) -> None:
@@ -27,46 +27,46 @@ class Link(Protocol):
         ...
 
     def has_preview_subscriber(self) -> bool:
-        """Whether somebody looks, and the next picture is due."""
+        """Whether somebody subscribes, and the next preview is due."""
         ...
 
     def put_preview(self, jpeg: bytes, stamp_ns: int) -> None:
-        """Publish a picture."""
+        """Publish a preview."""
         ...
 
     def take_speeds(self) -> list[tuple[int, SpeedSample]]:
-        """When each speed since the last call arrived, and the speed with its sender's stamp."""
+        """Return the speeds since the last call, each with its arrival (monotonic, ns) and its sender's stamp."""
         ...
 
     def show_config(self, config: Config) -> None:
-        """What to answer when somebody asks for the configuration."""
+        """Set the answer to queries for the configuration."""
         ...
 
     most_sessions: int
-    """That can be at a time."""
+    """Largest number of sessions at a time."""
 
     @property
     def sessions(self) -> int:
-        """Others that are connected now."""
+        """Number of peers connected now."""
         ...
 
     @property
     def charged_mib(self) -> float:
-        """Growth of the process's memory that was laid to peers so far."""
+        """Growth of the process's memory that was charged to peers so far, MiB."""
         ...
 
     def charge(self, grown_mib: float) -> None:
-        """Lay growth since the last call to the peers that have sent something meanwhile."""
+        """Charge growth since the last call, MiB, to the peers that have sent something meanwhile."""
         ...
 
     def cut(self, charge_mib: float) -> int:
-        """Cut connections to which that much is laid. Return how many."""
+        """Cut connections that are charged with that much, MiB, or more. Return how many."""
         ...
 
     def renew(self) -> bool:
-        """Drop all that peers have declared, and everybody for a moment; False: there is no session now, call again."""
+        """Reopen the session, which drops all that peers have declared; False: there is no session now, call again."""
         ...
 
     def close(self) -> None:
-        """End it, within a bounded time."""
+        """Close it, in bounded time."""
         ...

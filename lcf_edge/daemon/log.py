@@ -1,4 +1,4 @@
-"""Logs: one line an event on standard error, as journald or a terminal likes it, never a flood."""
+"""Logs: one line an event on standard error, for journald or a terminal, never a flood."""
 
 import faulthandler
 import logging
@@ -13,9 +13,9 @@ from lcf_edge.printable import printable
 
 LOGGER = logging.getLogger("lcf_edge")
 
-AT_ONCE = 5  # lines of one kind, then
-EACH_S = 10.0  # one more in this time
-KINDS = 256  # that are remembered
+AT_ONCE = 5  # lines of one kind at first
+EACH_S = 10.0  # then one in this time
+KINDS = 256  # of lines that are remembered
 MAX_LINE_CHARACTERS = 500  # of a library's
 
 _PRIORITIES = {logging.DEBUG: 7, logging.INFO: 6, logging.WARNING: 4, logging.ERROR: 3}
@@ -23,21 +23,21 @@ _LEVELS = {"debug": logging.DEBUG, "info": logging.INFO, "warning": logging.WARN
 
 
 def start(level: str, stream: TextIO | None = None, environment: Mapping[str, str] = os.environ) -> None:
-    """Log to ``stream`` (standard error) what is of ``level`` (error, warning, info, debug) or worse."""
+    """Log to ``stream`` (standard error) at ``level`` (error, warning, info, debug) and above."""
     stream = stream or sys.stderr
     handler = logging.StreamHandler(stream)
     handler.setFormatter(_Line(journal=_is_journal(stream, environment)))
     handler.addFilter(NoFlood())
-    logging.raiseExceptions = False  # a log that cannot be written is nobody's error
+    logging.raiseExceptions = False  # a log that cannot be written must not raise
     LOGGER.handlers[:] = [handler]
     LOGGER.propagate = False
     set_level(level)
 
 
 def take_over_standard_error() -> None:
-    """Log what libraries write to standard error by themselves, line by line, as a libjpeg does of every bad picture.
+    """Log what libraries write to standard error by themselves, line by line, as a libjpeg does of every bad image.
 
-    Python's own messages, also those of a crash (``PYTHONFAULTHANDLER``), go where they went before.
+    Python's own messages, also those of a crash (``PYTHONFAULTHANDLER``), still go to the old standard error.
     """
     ours = os.fdopen(os.dup(2), "w", encoding="utf-8", errors="backslashreplace", buffering=1)
     reading, writing = os.pipe()
@@ -57,7 +57,7 @@ def _log_lines(reading: int) -> None:
 
 
 def set_level(level: str) -> None:
-    """Log what is of ``level`` or worse."""
+    """Log at ``level`` and above."""
     LOGGER.setLevel(_LEVELS[level])
 
 
@@ -89,13 +89,13 @@ class _Line(logging.Formatter):
 class NoFlood(logging.Filter):
     """Lets ``AT_ONCE`` lines of a kind through, then one in ``EACH_S`` that says how many were not written.
 
-    Lines are of one kind when they have one message before its arguments are put in.
+    Lines are of one kind if they have the same message before its arguments are inserted.
     """
 
     def __init__(self, monotonic_s: Callable[[], float] = time.monotonic) -> None:
         super().__init__()
         self._monotonic_s = monotonic_s
-        self._kinds: dict[str, tuple[float, float, int]] = {}  # lines that may come, since when, not written
+        self._kinds: dict[str, tuple[float, float, int]] = {}  # lines still allowed, since when, lines not written
 
     def filter(self, record: logging.LogRecord) -> bool:
         now_s = self._monotonic_s()

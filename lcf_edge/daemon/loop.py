@@ -26,11 +26,11 @@ from lcf_edge.messages import PipelineScene
 from lcf_edge.meters import DurationHistogram
 from lcf_edge.pipeline import Pipeline
 
-FRAME_WAIT_S = 0.25  # then the loop turns without one
-IMU_WAIT_S = 4e-3  # for the sample after a frame; the last one is held beyond
-TRIALS = 4  # pictures for a new pipeline
+FRAME_WAIT_S = 0.25  # then the loop turns without a frame
+IMU_WAIT_S = 4e-3  # for the sample after a frame; then the last one is held
+TRIALS = 4  # images for a new pipeline
 CLUTTER_PX = 16
-IMU_SILENT_NS = 50_000_000  # an IMU that is this late is away, and not waited for
+IMU_SILENT_NS = 50_000_000  # an IMU this late is not waited for
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,7 +43,7 @@ class Mail:
 
 
 def try_out(pipeline: Pipeline, width: int, height: int) -> None:
-    """Let a pipeline take some pictures of clutter that moves, as the next ones might be."""
+    """Let a pipeline process some images of moving clutter, to see whether it works."""
     across, down = -(-width // CLUTTER_PX) + TRIALS, -(-height // CLUTTER_PX)
     clutter = _scattered(down * across).reshape(down, across)
     image = clutter.repeat(CLUTTER_PX, axis=0).repeat(CLUTTER_PX, axis=1)
@@ -54,7 +54,7 @@ def try_out(pipeline: Pipeline, width: int, height: int) -> None:
 
 
 def _scattered(number: int) -> npt.NDArray[np.uint8]:
-    """Greys without order; a generator of NumPy's would be loaded by a reload, for which descriptors may be short."""
+    """Return random grey levels; NumPy's generator would be loaded at a reload, when descriptors may be short."""
     mixed = np.arange(number, dtype=np.uint32) * np.uint32(2654435761)
     mixed = (mixed ^ (mixed >> np.uint32(15))) * np.uint32(2246822519)
     return (mixed >> np.uint32(24)).astype(np.uint8)
@@ -65,8 +65,8 @@ class Loop(threading.Thread):
 
     For others to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last), ``evicted``,
     ``latency`` (from the frame's stamp until the first of ``outputs`` has its scene) and in it ``detect`` and
-    ``filter``, ``degradation``. ``first_scene`` is called once. Raises ``ConfigError`` for pictures that the lens of
-    the configuration does not fit.
+    ``filter``, ``degradation``. ``first_scene`` is called once. Raises ``ConfigError`` for images that the
+    configured lens does not fit.
     """
 
     def __init__(
@@ -87,10 +87,10 @@ class Loop(threading.Thread):
         self.latency, self.detect, self.filter = DurationHistogram(), DurationHistogram(), DurationHistogram()
         self.degradation = Degradation(config)
         self._config = config
-        self._pipeline: Pipeline | None = None  # its size is that of the first frame
+        self._pipeline: Pipeline | None = None  # for the size of the first frame
         self._shape: tuple[int, int] | None = None
         self._next: tuple[Config, Pipeline] | None = None
-        self._refused_before: Counter[str] = Counter()  # by earlier pipelines
+        self._refused_before: Counter[str] = Counter()  # counted by earlier pipelines
         self._mail = mail
         self._link = link
         self._outputs = outputs
@@ -106,16 +106,16 @@ class Loop(threading.Thread):
 
     @property
     def gyro_bias(self) -> GyroBias | None:
-        """As far as it is known; None before the first picture."""
+        """The gyro's bias, as far as it is known; None before the first frame."""
         return self._pipeline.gyro_bias if self._pipeline else None
 
     @property
     def mounting(self) -> Mounting | None:
-        """How the camera is mounted, as far as it is learnt; None before the first picture."""
+        """How the camera is mounted, as far as it is learnt; None before the first frame."""
         return self._pipeline.mounting if self._pipeline else None
 
     def rebuild(self, config: Config) -> None:
-        """From the next frame on, a new pipeline with empty tables, once another like it has taken pictures.
+        """Use a new pipeline with empty tables from the next frame on, after a trial of another like it.
 
         Whatever it raises, the old one goes on. Raises ``LcfError``.
         """
@@ -144,7 +144,7 @@ class Loop(threading.Thread):
             return
         pipeline = self._pipeline_for(frame)
         imu_by_s = time.monotonic() + IMU_WAIT_S
-        look = pipeline.look(frame)  # meanwhile the IMU's next sample comes
+        look = pipeline.look(frame)  # meanwhile the IMU's next sample arrives
         self._await_imu(frame, imu_by_s)
         self._feed(pipeline)
         scene = pipeline.follow(look)
@@ -161,7 +161,7 @@ class Loop(threading.Thread):
         self.degradation.add(frame, scene)
 
     def _pipeline_for(self, frame: Frame) -> Pipeline:
-        """The one in use, or a new one: asked for by ``rebuild``, or because the pictures have another size."""
+        """Return the pipeline in use, or a new one: after ``rebuild``, or when the images have another size."""
         height, width = frame.image.shape
         pipeline = self._pipeline
         if self._next is not None:

@@ -1,4 +1,4 @@
-"""What lies between two threads: the newest of a kind, or a fixed ring of samples. Every loss is counted."""
+"""What is passed between two threads: the newest item, or a fixed ring of samples. Every loss is counted."""
 
 import threading
 from collections import deque
@@ -37,21 +37,21 @@ class Newest(Generic[Item]):
             self._arrived.notify()
 
     def take(self, timeout_s: float) -> Item | None:
-        """The item, as soon as there is one; None: none came in time."""
+        """Wait for the item and return it; None: none came in time."""
         with self._arrived:
             self._arrived.wait_for(lambda: self._item is not None or self._closed, timeout_s)
             item, self._item = self._item, None
             return item
 
     def close(self) -> None:
-        """Nobody waits any more."""
+        """End all waits."""
         with self._arrived:
             self._closed = True
             self._arrived.notify_all()
 
 
 class SampleRing(Generic[Sample]):
-    """Holds the latest ``capacity`` samples. ``overtaken``: how many left before anybody took them."""
+    """Holds the latest ``capacity`` samples. ``overtaken``: how many were lost before anybody took them."""
 
     def __init__(self, capacity: int) -> None:
         self.overtaken = 0
@@ -71,7 +71,7 @@ class SampleRing(Generic[Sample]):
     def wait_until(self, stamp_ns: int, timeout_s: float, silent_ns: int) -> bool:
         """Wait for a sample of ``stamp_ns`` or later; False: it did not come in time.
 
-        Does not wait when the newest is more than ``silent_ns`` older: the sensor is away.
+        Does not wait when the newest is more than ``silent_ns`` older: the sensor is silent.
         """
         with self._arrived:
             newest_ns = self._newest_ns
@@ -80,7 +80,7 @@ class SampleRing(Generic[Sample]):
             return self._arrived.wait_for(lambda: (self._newest_ns or 0) >= stamp_ns, timeout_s)
 
     def take(self) -> list[Sample]:
-        """All that it holds, oldest first."""
+        """Remove and return all samples, oldest first."""
         with self._arrived:
             samples = list(self._samples)
             self._samples.clear()

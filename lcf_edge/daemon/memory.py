@@ -13,7 +13,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
 
 PROGRAM_MIB = 68.0
-"""Python, NumPy, OpenCV, an open Zenoh session and the program, without tables and pictures."""
+"""MiB of Python, NumPy, OpenCV, an open Zenoh session and the program, without tables and images."""
 
 SHED_AT = 0.9  # of the budget
 GROWN_MIB = 1.0
@@ -22,25 +22,25 @@ _MIB = 2**20
 
 _FRAME_BYTES_A_PIXEL = 12  # buffers of the driver (2 bytes, 4 of them), one waiting, one in work, scratch
 RECORDER_MIB = 6.0
-"""The format's library, a chunk on its way to the disk and the index of a file, without ``record.buffer_mib``."""
+"""MiB of the format's library, a chunk on its way to the disk and a file's index, without ``record.buffer_mib``."""
 
-_CORNER_BYTES = 1500  # of one corner's way through detection and matching
+_CORNER_BYTES = 1500  # work space for one corner in detection and matching
 
 
 class ResidentMemory:
-    """Measures the resident memory of this process, MiB; needs no more than the one descriptor that it holds."""
+    """Measures the resident memory of this process, MiB, by one descriptor that it keeps open."""
 
     def __init__(self, statm: Path = _STATM) -> None:
         self._file = os.open(statm, os.O_RDONLY | os.O_CLOEXEC)
         self._close = weakref.finalize(self, os.close, self._file)
 
     def __call__(self) -> float:
-        """Measure."""
+        """Return the resident memory, MiB."""
         return int(os.pread(self._file, 128, 0).split()[1]) * os.sysconf("SC_PAGE_SIZE") / _MIB
 
 
 def needs_mib(config: Config) -> dict[str, float]:
-    """What each part of the program needs, MiB, without the preview, which goes first. Raises ``ConfigError``."""
+    """Return what each part needs, MiB, without the preview, which is given up first. Raises ``ConfigError``."""
     camera = config.camera
     pixels = camera.width * camera.height
     table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
@@ -62,7 +62,7 @@ _REMEDIES = {
 
 
 def check_budget(config: Config) -> None:
-    """Refuse a configuration that cannot keep to its budget. Raises ``ConfigError`` that says what to lower."""
+    """Refuse a configuration that needs more than its budget. Raises ``ConfigError`` that says what to lower."""
     needs = needs_mib(config)
     needed_mib = sum(needs.values())
     limit_mib = SHED_AT * config.memory.budget_mib
@@ -86,10 +86,10 @@ class Shedding:
 
 
 class MemoryWatch:
-    """Gives up a thing when more than ``SHED_AT`` of the budget is resident, and the next when that was not enough.
+    """Gives up something when more than ``SHED_AT`` of the budget is resident, and more if that was not enough.
 
-    Memory that is let go seldom goes back to the system: it was enough unless ``GROWN_MIB`` more are resident, or more
-    than the budget.
+    Freed memory seldom returns to the system: it was enough unless ``GROWN_MIB`` more are resident, or more than the
+    budget.
     ``resident_mib``: at the last ``check``. ``shed``: what was given up; it stays so until a restart.
     """
 

@@ -8,7 +8,7 @@ from collections.abc import Mapping
 
 
 class Notifier:
-    """Tells the service manager; never blocks, never fails.
+    """Informs the service manager; never blocks, never fails.
 
     ``watchdog_s``: within which it wants ``alive``; None: it does not watch this process.
     """
@@ -24,11 +24,11 @@ class Notifier:
         self.watchdog_s = int(microseconds) / 1e6 if mine and microseconds.isdecimal() else None
 
     def ready(self) -> None:
-        """The start, or a reload, is over."""
+        """Say that the start, or a reload, is over."""
         self._send("READY=1")
 
     def status(self, text: str) -> None:
-        """One line for ``systemctl status``."""
+        """Set the line of ``systemctl status``."""
         self._send(f"STATUS={' '.join(text.split())}")
 
     def alive(self) -> None:
@@ -37,20 +37,20 @@ class Notifier:
             self._send("WATCHDOG=1")
 
     def reloading(self) -> None:
-        """A reload begins; ``ready`` ends it."""
+        """Say that a reload begins; ``ready`` ends it."""
         self._send(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
     def stopping(self) -> None:
-        """The end begins."""
+        """Say that the daemon is ending."""
         self._send("STOPPING=1")
 
     def close(self) -> None:
-        """Let the socket go."""
+        """Close the socket."""
         if self._socket is not None:
             self._socket.close()
             self._socket = None
 
     def _send(self, message: str) -> None:
         if self._socket is not None:
-            with contextlib.suppress(OSError):  # nobody listens any more, or reads too slowly
+            with contextlib.suppress(OSError):  # nobody listens, or the reader is too slow
                 self._socket.sendto(message.encode(), socket.MSG_DONTWAIT, self._address)

@@ -14,7 +14,7 @@ from lcf_edge.sinks.sink import Sink
 
 
 class Outputs:
-    """Hands on to each sink. One that fails is left out from then on, and the diagnostics tell why."""
+    """Passes everything on to each sink. One that fails is left out from then on; the diagnostics say why."""
 
     def __init__(self, sinks: Sequence[Sink]) -> None:
         self._sinks = tuple(sinks)
@@ -22,12 +22,12 @@ class Outputs:
         self._errors: dict[str, SinkError] = {}
 
     def start(self) -> None:
-        """Start the threads of those that have some."""
+        """Start the threads of the sinks."""
         for sink in self._sinks:
             sink.start()
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> int:
-        """Hand a frame and its scene to each. Return when the first had it, monotonic ns."""
+        """Pass a frame and its scene to each. Return when the first had it, monotonic ns."""
         first_ns: int | None = None
         for sink in self._working:
             try:
@@ -39,32 +39,32 @@ class Outputs:
         return first_ns or time.monotonic_ns()
 
     def put_sample(self, sample: ImuSample | SpeedSample) -> None:
-        """Hand a sample to each."""
+        """Pass a sample to each."""
         for sink in self._working:
             sink.put_sample(sample)
 
     def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
-        """Hand each how the parts of the daemon are, as of ``stamp_ns`` of the monotonic clock."""
+        """Pass the status of each part of the daemon to each sink, as of ``stamp_ns`` of the monotonic clock."""
         for sink in self._working:
             sink.put_diagnostics(stamp_ns, statuses)
 
     def show_config(self, config: Config) -> None:
-        """Tell each the configuration after a reload."""
+        """Pass the configuration to each after a reload."""
         for sink in self._working:
             sink.show_config(config)
 
     def statuses(self) -> list[DeviceStatus]:
-        """Return how each is, of those that have something to tell."""
+        """Return the statuses of the sinks that have one."""
         working = [sink.status() for sink in self._working]
         failed = [DeviceStatus(name, Level.ERROR, str(error)) for name, error in self._errors.items()]
         return [*(status for status in working if status is not None), *failed]
 
     def sheddings(self) -> list[Shedding]:
-        """Return what they can give up when memory is short, in order."""
+        """Return what the sinks can give up when memory is short, in order."""
         return [Shedding(sink.sheds, sink.shed) for sink in self._sinks if sink.sheds]
 
     def close(self) -> None:
-        """Nothing more comes. Returns soon; ``join`` waits for the rest."""
+        """Close all sinks. Returns soon; ``join`` waits for the rest."""
         for sink in self._sinks:
             try:
                 sink.close()
@@ -73,7 +73,7 @@ class Outputs:
                     self._leave_out(sink, error)
 
     def join(self, timeout_s: float) -> None:
-        """Wait until all have ended; those that do not in time are left behind, and named in the log."""
+        """Wait until all have ended; those that do not in time are abandoned, and named in the log."""
         deadline_s = time.monotonic() + timeout_s
         for sink in self._sinks:
             if not sink.join(max(deadline_s - time.monotonic(), 0)):

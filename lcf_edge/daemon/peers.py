@@ -1,8 +1,8 @@
 """Memory that peers make the daemon keep: given back before anything of its own is given up.
 
-Zenoh has no limit for what peers declare. So memory over the mark is first looked for with them: what is free goes back
-to the system; the connections to which much growth is laid are cut; and when that does not help, because something
-stays behind when a peer goes, the session is opened anew.
+Zenoh has no limit for what peers declare. So above the mark, peers are dealt with first: free memory is returned to
+the system; the connections that are charged with much growth are cut; and if that does not help, because something
+stays behind when a peer goes, the session is reopened.
 """
 
 import time
@@ -14,11 +14,11 @@ from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.memory import SHED_AT
 
 CHECK_S = 0.05
-LOOK_S = 0.25  # at connections, which takes longer than measuring the memory
-LOOK_AT_MIB = 1.0  # that the memory has grown, without waiting
-CUT_AT_MIB = 1.0  # that is laid to one connection
-EFFECT_S = 0.5  # of a cut, or a renewal
-RENEW_AT_MIB = 4.0  # that was laid to all since the last renewal
+LOOK_S = 0.25  # between looks at connections, which take longer than measuring memory
+LOOK_AT_MIB = 1.0  # growth of memory after which it looks at once
+CUT_AT_MIB = 1.0  # charged to one connection
+EFFECT_S = 0.5  # that a cut or a renewal takes to have an effect
+RENEW_AT_MIB = 4.0  # charged to all since the last renewal
 RENEW_EACH_S = 10.0
 
 
@@ -37,17 +37,17 @@ class PeersMemory:
         self._resident_mib = measure_mib()  # at the last look
         self._looked_s = now_s()
         self._acted_s = self._renewed_s = -RENEW_EACH_S
-        self._within_s = now_s()  # the budget, last
-        self._charged_before_mib = 0.0  # the last renewal
+        self._within_s = now_s()  # when memory was last within the budget
+        self._charged_before_mib = 0.0  # charged before the last renewal
         self._without_session = False
 
     @property
     def blamed(self) -> bool:
-        """Much is laid to peers, or the effect of what was done about it is to be waited for."""
+        """Whether peers are charged with much, or the effect of acting on them is still awaited."""
         return self._acted or self._laid_to_peers_mib > RENEW_AT_MIB
 
     def check(self, budget_mib: float) -> None:
-        """Measure, and act on more than ``SHED_AT`` of the budget; each ``CHECK_S``."""
+        """Measure, and act above ``SHED_AT`` of the budget; called each ``CHECK_S``."""
         resident_mib = self._measure_mib()
         if resident_mib < self._resident_mib + LOOK_AT_MIB and self._now_s() < self._looked_s + LOOK_S:
             return
@@ -66,9 +66,9 @@ class PeersMemory:
             self._act()
 
     def _act(self) -> None:
-        """On peers, as far as much is laid to them."""
+        """Act on peers, if they are charged with much."""
         now_s = self._now_s()
-        exceeded = now_s >= self._within_s + EFFECT_S  # whatever was cut meanwhile
+        exceeded = now_s >= self._within_s + EFFECT_S  # in spite of cuts
         much = self._laid_to_peers_mib > RENEW_AT_MIB
         number = 0 if much and exceeded else self._link.cut(CUT_AT_MIB)
         if number:
@@ -80,7 +80,7 @@ class PeersMemory:
             self._renew()
 
     def _renew(self) -> None:
-        if not self._without_session or not self._acted:  # now and then, while it fails
+        if not self._without_session or not self._acted:  # while it fails, only now and then
             self._acted_s = self._renewed_s = self._now_s()
             self._without_session = not self._link.renew()
             self._trim()
@@ -93,5 +93,5 @@ class PeersMemory:
 
     @property
     def _laid_to_peers_mib(self) -> float:
-        """Since the last renewal."""
+        """Charged to peers since the last renewal."""
         return self._link.charged_mib - self._charged_before_mib

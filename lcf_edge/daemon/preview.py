@@ -1,4 +1,4 @@
-"""The preview: the overlay drawn beside the pipeline, one at a time, while somebody looks."""
+"""The preview: the overlay drawn beside the pipeline, one at a time, while somebody subscribes."""
 
 import threading
 from collections.abc import Callable
@@ -16,7 +16,7 @@ from lcf_edge.sinks.sink import Sink
 JPEG_QUALITY = 70
 WIDEST_PX = 1920  # both panels: a message may not be larger than 1 MiB
 _WAKE_S = 0.25
-_ENDS_WITHIN_S = 0.3  # a picture that is being drawn
+_ENDS_WITHIN_S = 0.3  # for an image that is being drawn
 
 
 class Previewer(Sink):
@@ -34,7 +34,7 @@ class Previewer(Sink):
         self._thread = threading.Thread(target=self._run, name=self.name, daemon=True)
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:
-        """Have this drawn, if a preview is wanted now."""
+        """Have this frame drawn, if a preview is wanted now."""
         if not (self._off or self._drawing) and self._link.has_preview_subscriber():
             self._drawing = True
             self._next.put((frame, scene, view()))
@@ -44,21 +44,21 @@ class Previewer(Sink):
         self._thread.start()
 
     def show_config(self, config: Config) -> None:  # noqa: ARG002
-        """Draw again, if that was given up."""
+        """Draw again, if drawing was given up."""
         self._off = False
 
     def shed(self) -> None:
-        """Draw nothing any more."""
+        """Stop drawing."""
         self._off = True
 
     def close(self) -> None:
-        """Draw nothing more; what is being drawn may still go out."""
+        """Draw nothing more; what is being drawn may still be sent."""
         self._closing = True
         self._next.close()
         self.join(_ENDS_WITHIN_S)
 
     def join(self, timeout_s: float) -> bool:
-        """Wait until nothing is drawn; False: it still is."""
+        """Wait until nothing is being drawn; False: something still is."""
         if self._thread.ident is not None:
             self._thread.join(timeout_s)
         return not self._thread.is_alive()
@@ -72,8 +72,8 @@ class Previewer(Sink):
 
     def _draw(self, frame: Frame, scene: PipelineScene, view: View) -> None:
         try:
-            from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # nobody may ever look
-        except OSError:  # no descriptor is left; the next one may find one
+            from lcf_edge.sinks.overlay import draw  # noqa: PLC0415  # loaded only if somebody subscribes
+        except OSError:  # no descriptor is left; perhaps for the next one
             return
         image = draw(frame.image, scene, view)
         height, width = image.shape[:2]

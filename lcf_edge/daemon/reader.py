@@ -1,4 +1,4 @@
-"""One thread a device: keeps it open, passes on what it delivers, and knows how it does."""
+"""One thread a device: keeps it open, passes on what it delivers, and knows its state."""
 
 import threading
 from collections import Counter
@@ -21,7 +21,7 @@ _COUNTS_EACH_NS = 500_000_000
 class Reader(threading.Thread, Generic[Record]):
     """Reads a device until ``clock`` is stopped; then closes it.
 
-    ``name``: of the device's part in the program ("camera"). Of the last moment, for others to read: ``error`` (why
+    ``name``: of the device's part in the program ("camera"). For others to read: ``error`` (why
     nothing comes; None: nothing is known to be wrong), ``away_since_ns`` (monotonic; None: it delivers), ``counts``,
     ``intervals``.
     """
@@ -33,7 +33,7 @@ class Reader(threading.Thread, Generic[Record]):
         deliver: Callable[[Sequence[Record]], object],
         clock: StoppableClock,
     ) -> None:
-        super().__init__(name=name, daemon=True)  # one that hangs in its driver does not keep the process
+        super().__init__(name=name, daemon=True)  # a hanging driver does not keep the process alive
         self.error: DriverError | None = None
         self.away_since_ns: int | None = clock.monotonic_ns()
         self.counts: Counter[str] = Counter()

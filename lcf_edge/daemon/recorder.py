@@ -1,7 +1,7 @@
 """The recorder: what the pipeline took and made, encoded in one thread and written in another.
 
-What it is given is never waited for: it lies in an inbox of fixed size, then, encoded, in a backlog of fixed size or
-in the ring of the last seconds. What does not fit is dropped and counted, pictures before all else.
+Whoever gives it something never waits: that goes into an inbox of fixed size, then, encoded, into a backlog of fixed
+size or the ring of the last seconds. What does not fit is dropped and counted, images first.
 """
 
 import threading
@@ -33,11 +33,11 @@ from lcf_edge.sinks.sink import Sink
 
 INBOX_BYTES = 2 * MIB
 SHED_BYTES = MIB  # of the backlog, when memory is short
-_RESERVE = 1 / 8  # of inbox and backlog is kept free of pictures
+_RESERVE = 1 / 8  # of inbox and backlog is reserved for what is no image
 _SAMPLE_BYTES = 512
 _STATUSES_BYTES = 8192
 _WAKE_S = 0.25
-_PROBABLE = 0.5  # that an object is met
+_PROBABLE = 0.5  # least probability that an object is met
 
 
 class Recorder(Sink):
@@ -55,7 +55,7 @@ class Recorder(Sink):
         self._inbox: Backlog[Record] = Backlog(INBOX_BYTES)
         self._backlog: Backlog[RecordedMessage | EndOfFile] = Backlog(self._buffer_bytes)
         self._ring = Ring(config.record.before_s)
-        self._saving_until_ns: int | None = None  # a threat is, or was just, there
+        self._saving_until_ns: int | None = None  # while there is a threat, and shortly after
         self._events = 0
         self._unfit = 0
         self._encoder = Encoder(config, known_lens)
@@ -77,7 +77,7 @@ class Recorder(Sink):
         self._inbox.put(Statuses(stamp_ns, statuses), _STATUSES_BYTES)
 
     def show_config(self, config: Config) -> None:
-        """What is in effect from now on; it goes into the file."""
+        """Take the configuration that is now in effect; it is attached to the file."""
         self._encoder.config = self._disk.config = config
         self._backlog.limit_bytes = self._buffer_bytes
 
@@ -109,11 +109,11 @@ class Recorder(Sink):
 
     @property
     def frames(self) -> int:
-        """That were written."""
+        """Frames that were written."""
         return self._disk.counts["pictures"]
 
     def status(self) -> DeviceStatus:
-        """How it is, for the diagnostics."""
+        """Return its status, for the diagnostics."""
         disk = self._disk
         file, trouble = disk.file, disk.trouble
         idle = "waits for a threat" if self._when == "threat" else "waits for something to record"
@@ -135,7 +135,7 @@ class Recorder(Sink):
         return DeviceStatus("recorder", Level.WARN if trouble else Level.OK, message, values)
 
     def summary(self) -> str:
-        """What was recorded, in one line."""
+        """Return in one line what was recorded."""
         disk = self._disk
         counts = disk.counts
         files = "one file" if counts["files"] == 1 else f"{counts['files']} files"
@@ -157,7 +157,7 @@ class Recorder(Sink):
         self._backlog.close()
 
     def _watch(self, record: Record) -> None:
-        """Save what the ring keeps when a threat appears; end the file when it is over."""
+        """Save the ring when a threat appears; end the file when the threat is over."""
         if self._when != "threat":
             return
         if isinstance(record, FrameAndScene) and _threatens(record.scene, self._ttc_s):

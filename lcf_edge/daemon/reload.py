@@ -24,22 +24,22 @@ OTHER_KEYS: Mapping[str, frozenset[str]] = {
     "memory": frozenset({"budget_mib"}),
     "log": frozenset({"level"}),
 }
-"""A change of these costs nothing."""
+"""A change of these takes effect at once."""
 
 
 def changed(old: Config, new: Config) -> set[str]:
-    """Keys, dotted, that differ."""
+    """Return the dotted keys that differ."""
     before, after = msgspec.to_builtins(old), msgspec.to_builtins(new)
     return {f"{table}.{key}" for table, keys in after.items() for key in keys if keys[key] != before[table][key]}
 
 
 def wants_pipeline(keys: set[str]) -> set[str]:
-    """Of ``keys`` those that make a new pipeline."""
+    """Return those of ``keys`` that make a new pipeline."""
     return {key for key in keys if _in(PIPELINE_KEYS, key)}
 
 
 def wants_restart(keys: set[str]) -> set[str]:
-    """Of ``keys`` those that cannot change while the daemon runs."""
+    """Return those of ``keys`` that need a restart."""
     return {key for key in keys if not _in(PIPELINE_KEYS, key) and not _in(OTHER_KEYS, key)}
 
 
@@ -49,7 +49,7 @@ def _in(tables: Mapping[str, frozenset[str]], key: str) -> bool:
 
 
 def merged(old: Config, new: Config) -> Config:
-    """``new``, but with the values of ``old`` where only a restart could change them."""
+    """Return ``new`` with the values of ``old`` for keys that need a restart."""
     tables: dict[str, Any] = {}
     for key in wants_restart(changed(old, new)):
         table, _, name = key.partition(".")
@@ -62,7 +62,7 @@ Signature = tuple[int, int, int] | None
 
 
 def signature(path: Path) -> Signature:
-    """What changes when a file is written or replaced; None: there is none."""
+    """Return something that changes when the file is written or replaced; None: there is no file."""
     try:
         status = path.stat()
     except OSError:

@@ -9,7 +9,7 @@ from lcf_edge.sinks.sink import Sink
 
 
 class LinkedScenes(Sink):
-    """Publishes each scene on ``link``, which is closed by others."""
+    """Publishes each scene on ``link``, which it does not close."""
 
     name = "scenes"
 

@@ -1,4 +1,4 @@
-"""The main thread: starts the others, keeps house once a second, minds signals, and ends it all in order."""
+"""The main thread: starts the others, does what is due once a second, obeys signals, and ends all in order."""
 
 import gc
 import math
@@ -38,18 +38,18 @@ if TYPE_CHECKING:  # most daemons record nothing
 
 TICK_S = 1.0
 ENDS_WITHIN_S = 0.7  # all threads together; the link has its own limit
-WRITTEN_WITHIN_S = 1.9  # all, with the sinks, which write the last while the link closes
+WRITTEN_WITHIN_S = 1.9  # all, with the sinks, which write their last data while the link closes
 
 
 class InternalError(LcfError):
-    """A mistake in the program."""
+    """A bug in the program."""
 
 
 class Service:
     """One run of the daemon. ``path`` and ``settings`` are read again at a reload.
 
-    ``config`` is one that ``check_budget`` let pass; ``notifier`` tells systemd how it goes. ``destination``: of what
-    ``config.record`` wants recorded; None: its folder. ``seconds``: end so long after the start is over; None: never.
+    ``config`` is one that ``check_budget`` let pass; ``notifier`` informs systemd. ``destination``: of
+    recordings by ``config.record``; None: its folder. ``seconds``: end so long after the start is over; None: never.
     ``sinks``: where its scenes go.
     """
 
@@ -110,7 +110,7 @@ class Service:
                 for thread in (self._loop, *self._readers):
                     thread.start()
                 gc.collect()
-                gc.freeze()  # what is here now stays: later collections need not look at it
+                gc.freeze()  # objects that exist now stay: later collections skip them
                 while not self._ending:
                     self._do_next()
             finally:
@@ -128,7 +128,7 @@ class Service:
 
     @contextmanager
     def signals_minded(self) -> Iterator[None]:
-        """SIGTERM and SIGINT end, SIGHUP reloads; in the main thread only."""
+        """Handle signals: SIGTERM and SIGINT end, SIGHUP reloads; in the main thread only."""
         handlers = {
             signal.SIGTERM: lambda *_: self.stop("SIGTERM"),
             signal.SIGINT: lambda *_: self.stop("SIGINT"),
@@ -143,7 +143,7 @@ class Service:
 
     @contextmanager
     def _failures_noticed(self) -> Iterator[None]:
-        """What a thread raises ends the daemon, in one line."""
+        """Within, an exception in any thread ends the daemon, with one line."""
 
         def notice(failed: threading.ExceptHookArgs) -> None:
             self._to_do.put(partial(self._fail, _error_of(failed)))
@@ -169,7 +169,7 @@ class Service:
                 self._tick()
 
     def _check_peers(self) -> None:
-        if self._ready:  # what a start takes is not theirs
+        if self._ready:  # memory taken by the start is not charged to peers
             self._peers.check(self._memory.budget_mib)
 
     def _tick(self) -> None:
@@ -178,7 +178,7 @@ class Service:
             self._memory.check()
         self._check_descriptors()
         self._check_ready()
-        if self._loop.turns != self._turns:  # the watchdog lives on the pipeline's progress
+        if self._loop.turns != self._turns:  # the watchdog is fed only while the pipeline makes progress
             self._turns = self._loop.turns
             self._notifier.alive()
         statuses = [*self._health.statuses(self._config, self._memory), *self._outputs.statuses()]
@@ -197,7 +197,7 @@ class Service:
             LOGGER.warning("link: connections use up all file descriptors but the reserved; docs/network.md: Strangers")
 
     def _check_ready(self) -> None:
-        """Frames flow, or the reason why not has been reported."""
+        """Report readiness once frames flow, or once the reason why not was logged."""
         if not self._ready and (self._loop.frames or self._readers[0].error):
             self._ready = True
             leave_start()
@@ -219,18 +219,22 @@ class Service:
         path = self._path or DEFAULT_PATH
         self._signature = signature(path)
         self._filled = self._filled or is_filled(path)
+        done = False
         try:
             with self._reserve.lent():
-                self._take(load(self._path, self._settings, filled=self._filled))  # an editor may have just emptied it
+                self._take(load(self._path, self._settings, filled=self._filled))  # an editor may just have emptied it
+            done = True
         except LcfError as error:
             LOGGER.error("reload: %s; the old configuration stays", error)
-        except Exception as error:  # noqa: BLE001  # a mistake in the program: what runs must go on all the same
+        except Exception as error:  # noqa: BLE001  # a bug must not end what runs
             LOGGER.error("reload: internal error: %r; please report it; the old configuration stays", error)
+        if not done and self._reserve.short:  # others may have taken the lent descriptors
+            self._signature = None  # so it is tried again with the next tick
         if self._ready:
             self._notifier.ready()
 
     def _take(self, requested: Config) -> None:
-        """Go on with ``requested``, as far as that can change now. Raises ``LcfError``; then nothing has changed."""
+        """Apply those keys of ``requested`` that can change now. Raises ``LcfError``; then nothing has changed."""
         config = merged(self._config, requested)
         keys, refused = changed(self._config, config), wants_restart(changed(self._config, requested))
         check_budget(config)
@@ -269,7 +273,7 @@ class Service:
         self._ending = True
 
     def _close(self) -> None:
-        """Devices first, then what lives on them, then the link, while the sinks write the last."""
+        """Close devices first, then the pipeline, then the link, while the sinks write their last data."""
         self._notifier.stopping()
         self._clock.stop()
         self._loop.wake()
@@ -289,7 +293,7 @@ class Service:
 
 
 def _error_of(failed: threading.ExceptHookArgs) -> LcfError:
-    """A failure as one line."""
+    """Return a failure as one line."""
     if isinstance(failed.exc_value, LcfError):
         return failed.exc_value
     name = failed.thread.name if failed.thread else "a thread"

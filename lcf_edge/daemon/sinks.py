@@ -1,7 +1,7 @@
 """The sinks that a daemon has.
 
-A new one is a file with a ``Sink`` and a line here; its part in diagnostics, reloads, the memory that is given up and
-the end of the daemon follows from the methods of the class.
+A new one is a file with a ``Sink`` and a line here; the methods of the class say what it does in diagnostics, at
+reloads, when memory is short and at the end.
 """
 
 from typing import TYPE_CHECKING
@@ -19,9 +19,9 @@ if TYPE_CHECKING:  # most daemons record nothing
 
 
 def sinks(config: Config, link: Link, system_time: SystemTime, destination: "Destination | None" = None) -> list[Sink]:
-    """Return the daemon's sinks by ``config``, not started: in the order in which each frame reaches them.
+    """Return the daemon's sinks by ``config``, not started, in the order in which each frame reaches them.
 
-    Memory is given up in this order too. ``destination``: of what is recorded; None: ``record.folder``.
+    Memory is given up in the same order. ``destination``: of recordings; None: ``record.folder``.
     """
     outputs: list[Sink] = [LinkedScenes(link), Previewer(link)]
     if config.record.when != "never":

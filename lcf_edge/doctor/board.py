@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from lcf_edge.daemon.board import read_board
 from lcf_edge.doctor.finding import Context, Finding, ok, warn
 
-HOT_C = 80.0  # where a Raspberry Pi begins to slow down
-_OWN_GOVERNORS = ("intel_pstate", "amd-pstate-epp")  # there "powersave" is not slow
+HOT_C = 80.0  # at which a Raspberry Pi begins to slow down
+_OWN_GOVERNORS = ("intel_pstate", "amd-pstate-epp")  # with these, "powersave" is not slow
 _MIB = 2**20
 
 
@@ -48,7 +48,7 @@ def _disk(context: Context) -> Iterator[Finding]:
     record = context.config.record
     try:
         room = os.statvfs(record.folder)
-    except OSError:  # the recorder makes it, or it leads into a folder of root's
+    except OSError:  # the recorder creates it, or only root may look
         return
     free_mib = room.f_bavail * room.f_frsize / _MIB
     summary = f"{free_mib / 1024:.1f} GiB are free in {record.folder}"

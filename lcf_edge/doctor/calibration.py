@@ -1,4 +1,4 @@
-"""What the filter must know about the vehicle, and does not."""
+"""What the filter must know about the vehicle and is not configured."""
 
 import math
 from collections.abc import Iterator
@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from lcf_edge.doctor.finding import Context, Finding, edit, ok, warn
 
 _MOUNTING = ("camera.height_m", "camera.pitch_rad")
-_MOUNTED = "camera_{}"  # in the diagnostics
+_MOUNTED = "camera_{}"  # values of the diagnostics
 _MOUNTING_SIGMAS = 3.0  # and
 _MOUNTING_RAD = math.radians(1)  # by which the mounting may differ from what is configured
 
@@ -23,7 +23,7 @@ def check(context: Context) -> Iterator[Finding]:
 def _lens(context: Context) -> Iterator[Finding]:
     camera = context.config.camera
     if camera.driver == "recording" and not camera.intrinsics:
-        return  # it may bring its own
+        return  # a recording may have its own
     if not camera.intrinsics:
         yield warn(
             "calibration",
@@ -60,7 +60,7 @@ def _mounting(context: Context) -> Iterator[Finding]:
 
 
 def _learnt_mounting(context: Context) -> Iterator[Finding]:
-    """What the daemon that runs has seen of the mounting while driving."""
+    """Compare the configured mounting with what a running daemon has learnt while driving."""
     status = context.daemon.statuses.get("pipeline") if context.daemon else None
     for key in ("pitch_rad", "yaw_rad"):
         angle, sigma = _MOUNTED.format(key), _MOUNTED.format(key.replace("_rad", "_sigma_rad"))
@@ -69,7 +69,7 @@ def _learnt_mounting(context: Context) -> Iterator[Finding]:
         try:
             estimated_rad, sigma_rad = float(status.values[angle]), float(status.values[sigma])
         except ValueError:
-            continue  # of another version
+            continue  # a daemon of another version
         configured_rad: float = getattr(context.config.camera, key)
         off_rad = abs(estimated_rad - configured_rad)
         text = f"camera.{key} is {configured_rad:g}, driving shows {estimated_rad:.3f} ± {sigma_rad:.3f}"

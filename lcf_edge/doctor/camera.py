@@ -1,4 +1,4 @@
-"""The camera: there, allowed, free, as it is asked for, and giving pictures that can be used."""
+"""The camera: present, permitted, free, with the requested settings, and delivering usable images."""
 
 import contextlib
 from collections.abc import Iterator
@@ -35,7 +35,7 @@ from lcf_edge.lens import Lens
 
 SECONDS = 2.0
 SETTLING_S = 1.0  # of the automatic exposure
-BRIGHT = 230  # mean grey level of a picture that is burnt out
+BRIGHT = 230  # mean grey level of an image that is burnt out
 FEW_CORNERS = 40
 _SLOW = 0.9  # of the rate that was granted
 
@@ -134,7 +134,7 @@ def _unusable(context: Context, path: Path, error: DriverError) -> Finding:
 
 
 def _nearest(context: Context, path: Path) -> tuple[str, ...]:
-    """Settings for the size and rate on offer that are closest to those asked for; none: they are not the trouble."""
+    """Return settings with the closest size and rate on offer; empty: these are not the problem."""
     camera = context.config.camera
     with contextlib.suppress(OSError), contextlib.closing(Node(str(path), str(path), context.kernel)) as node:
         readable = [name for name in offers.formats(node) if name in PIXEL_FORMATS]
@@ -155,7 +155,7 @@ def _nearest(context: Context, path: Path) -> tuple[str, ...]:
 
 
 def judged(context: Context, measured: Measured[Frame], exposure_s: float | None = None) -> Iterator[Finding]:
-    """What is said of pictures; ``exposure_s``: as the camera reports it, None: unknown."""
+    """Return findings about images; ``exposure_s``: as the camera reports it, None: unknown."""
     if not measured.records:
         yield fail("camera", f"{measured.name}: opens, but gives no picture that can be used ({_counts(measured)})")
         return
@@ -202,7 +202,7 @@ def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Confi
 
 
 def _exposure_s(context: Context, path: Path) -> float | None:
-    """As the camera reports it; some report an old one while they expose by themselves."""
+    """Return the exposure that the camera reports; some report an old one with automatic exposure."""
     try:
         with contextlib.closing(Node(str(path), str(path), context.kernel)) as node:
             return float(node.ask(G_CTRL, Control(id=CID_EXPOSURE_ABSOLUTE)).value * EXPOSURE_UNIT_S)

@@ -1,4 +1,4 @@
-"""The system's clock: set by somebody, and fine enough."""
+"""The system's clock: set, synchronised, and fine enough."""
 
 import ctypes
 import os
@@ -8,13 +8,13 @@ from dataclasses import dataclass
 
 from lcf_edge.doctor.finding import Context, Finding, ok, warn
 
-_UNSYNCHRONISED = 5  # TIME_ERROR, what adjtimex(2) answers
+_UNSYNCHRONISED = 5  # TIME_ERROR of adjtimex(2)
 _EARLIEST_S = 1_735_689_600  # 2025; before it the clock was never set
 _COARSE_S = 1e-4
 
 
 class _Timex(ctypes.Structure):
-    """The beginning of ``struct timex``, and room for the rest."""
+    """The beginning of ``struct timex``, padded to its size."""
 
     _fields_ = (
         ("modes", ctypes.c_uint),  # 0: nothing is changed
@@ -27,23 +27,23 @@ class _Timex(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class SystemClock:
-    """``largest_error_s``: how far it may be off, as the kernel reckons."""
+    """``largest_error_s``: the kernel's estimate of its largest error."""
 
     now_s: float
     synchronised: bool
     largest_error_s: float
     resolution_s: float
-    source: str  # what the kernel counts
+    source: str  # the kernel's clock source
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Is it set, is it fine."""
+    """Check that the clock is set and fine enough."""
     folder = context.sys / "devices/system/clocksource/clocksource0/current_clocksource"
     yield from judged(_read(folder.read_text(encoding="ascii").strip() if folder.exists() else "unknown"))
 
 
 def judged(clock: SystemClock) -> Iterator[Finding]:
-    """What is said of a clock."""
+    """Return findings about a clock."""
     if clock.now_s < _EARLIEST_S:
         year = time.gmtime(clock.now_s).tm_year
         yield warn("clock", f"it says {year}: it was never set, and stamps of scenes are wrong", _SET)

@@ -38,7 +38,7 @@ def ask(configured: Config) -> Daemon | None:
     )
     try:
         return _ask_at(options, configured.publish.prefix, ", ".join(endpoints))
-    except (LcfError, zenoh.ZError):  # not with these certificates, or not with this file
+    except (LcfError, zenoh.ZError):  # these certificates or this file do not work
         return None
 
 

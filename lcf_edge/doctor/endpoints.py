@@ -1,4 +1,4 @@
-"""Zenoh's endpoints, as ``tcp/127.0.0.1:7447``: what is in them, and whether somebody is there."""
+"""Zenoh's endpoints, as ``tcp/127.0.0.1:7447``: their parts, and whether somebody listens."""
 
 import ipaddress
 import re
@@ -22,12 +22,12 @@ class Endpoint:
 
     @property
     def encrypted(self) -> bool:
-        """Whether what goes over it cannot be read on the way."""
+        """Whether it is encrypted."""
         return self.protocol in _ENCRYPTED
 
     @property
     def datagrams(self) -> bool:
-        """Whether it is on top of UDP; else of TCP."""
+        """Whether it uses UDP, else TCP."""
         return self.protocol in _DATAGRAMS
 
     @property
@@ -40,23 +40,23 @@ class Endpoint:
 
 
 def parsed(endpoint: str) -> Endpoint | None:
-    """The parts; None: it has no port, as ``unixsock-stream//run/lcf``."""
+    """Parse an endpoint; None: it has no port, as ``unixsock-stream//run/lcf``."""
     found = _ENDPOINT.fullmatch(endpoint)
     return Endpoint(found["protocol"], found["host"], int(found["port"])) if found else None
 
 
 def reachable_here(endpoint: str) -> str:
-    """Where to connect on the same computer to what listens there."""
+    """Return where to connect on the same computer to what listens there."""
     return endpoint.replace("/0.0.0.0:", "/127.0.0.1:").replace("/[::]:", "/[::1]:")
 
 
 def is_open(endpoint: str) -> bool:
-    """Whether somebody accepts there; what is on top of UDP cannot be tried so, and is taken for open."""
+    """Whether somebody accepts connections there; UDP cannot be tried like that, and counts as open."""
     parts = parsed(endpoint)
     if parts is None or parts.datagrams:
         return True
     try:
         socket.create_connection((parts.host, parts.port), CONNECT_S).close()
-    except (OSError, OverflowError):  # the port is none
+    except (OSError, OverflowError):  # an invalid port
         return False
     return True

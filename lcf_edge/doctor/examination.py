@@ -1,4 +1,4 @@
-"""All checks in a sensible order, each within a limit of time."""
+"""All checks in a sensible order, each within a time limit."""
 
 import threading
 from collections.abc import Callable, Iterator, Sequence
@@ -29,7 +29,7 @@ LIMIT_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """A check; ``needs_config``: it says nothing while the configuration cannot be used."""
+    """A check; ``needs_config``: it is skipped while the configuration is unusable."""
 
     subject: str
     check: Check
@@ -54,9 +54,9 @@ STEPS = (
 
 
 def examine(context: Context, steps: Sequence[Step] = STEPS, limit_s: float = LIMIT_S) -> Iterator[Finding]:
-    """What all checks find, as they find it.
+    """Yield the findings of all checks as they come.
 
-    A check that says nothing for ``limit_s`` is left behind in its thread, and reported.
+    A check that is silent for ``limit_s`` is abandoned in its thread, and reported.
     """
     for step in steps:
         if context.error is None or not step.needs_config:
@@ -80,9 +80,9 @@ def _run(step: Step, context: Context, put: Callable[[Finding | None], None]) ->
     try:
         for finding in step.check(context):
             put(finding)
-    except OSError as error:  # of a file that the check did not expect to fail
+    except OSError as error:  # a file failed that the check did not expect to fail
         put(fail(step.subject, f"{error.filename or 'a device'}: {error.strerror}"))
-    except (LcfError, DriverError, ValueError) as error:  # the last: what the kernel says has an unknown form
+    except (LcfError, DriverError, ValueError) as error:  # ValueError: the kernel's text has an unknown form
         put(fail(step.subject, short(error)))
     finally:
         put(None)

@@ -24,7 +24,7 @@ class Severity(Enum):
     """How bad it is."""
 
     OK = "ok"
-    WARN = "warn"  # works, but worse than it could
+    WARN = "warn"  # works, but not as well as it could
     FAIL = "fail"  # does not work
 
 
@@ -40,10 +40,10 @@ class Finding:
 
 @dataclass(frozen=True)
 class Context:
-    """What the checks look at; all but the first five are of the machine, and a test brings its own.
+    """What the checks look at; all but the first five describe the machine, and are replaced in tests.
 
-    ``settings``: of ``--set``. ``given``: the keys that file or settings have, as "camera.height_m". ``error``: why the
-    configuration cannot be used; then ``config`` holds the defaults.
+    ``settings``: of ``--set``. ``given``: the keys set by file or settings, as "camera.height_m". ``error``: why the
+    configuration is unusable; then ``config`` holds the defaults.
     """
 
     config: Config
@@ -60,24 +60,24 @@ class Context:
     open_bus: Callable[[int], I2cBus] = I2cBus
     clock: Clock = SYSTEM_CLOCK
     systemctl: Sequence[str] = ("systemctl",)
-    installed: Path = DEFAULT_PATH.parent  # where the configurations of the units are
-    program: str = field(default_factory=program)  # as a remedy calls it
+    installed: Path = DEFAULT_PATH.parent  # folder of the units' configurations
+    program: str = field(default_factory=program)  # name of the program in remedies
 
     @cached_property
     def daemon(self) -> Daemon | None:
-        """What the daemon that runs on this computer says of itself; None: none answers."""
+        """The daemon that runs on this computer, by its own report; None: none answers."""
         return ask(self.config)
 
     def again(self, *settings: str) -> str:
-        """The command that looks again with more settings, as "imu.bus=3"."""
+        """Return the command that checks again with more settings, as "imu.bus=3"."""
         words = [f"-c {shlex.quote(str(self.path))}"] if self.path != DEFAULT_PATH else []
         words += [f"--set {shlex.quote(setting)}" for setting in (*self.settings, *settings)]
         return " ".join((f"{self.program} doctor", *words)) + ("  # then in the configuration" if settings else "")
 
     def calibrate(self, what: str) -> str:
-        """The command that measures something and writes it into the configuration.
+        """Return the command that calibrates something and writes it into the configuration.
 
-        Where the configuration does not exist yet, the command makes it, unless another remedy has by then.
+        The command creates a configuration that does not exist yet, unless another remedy has done so.
         """
         file = shlex.quote(str(self.path))
         sudo = "sudo " if _belongs_to_root(self.path) else ""
@@ -90,22 +90,22 @@ Check: TypeAlias = Callable[[Context], Iterator[Finding]]
 
 
 def ok(subject: str, text: str) -> Finding:
-    """As it should be."""
+    """Return a finding of something that works."""
     return Finding(Severity.OK, subject, text)
 
 
 def warn(subject: str, text: str, remedy: str = "") -> Finding:
-    """Works, but worse than it could."""
+    """Return a finding of something that works, but not as well as it could."""
     return Finding(Severity.WARN, subject, text, remedy)
 
 
 def fail(subject: str, text: str, remedy: str = "") -> Finding:
-    """Does not work."""
+    """Return a finding of something that does not work."""
     return Finding(Severity.FAIL, subject, text, remedy)
 
 
 def edit(path: Path, comment: str = "") -> str:
-    """The command that opens a file for editing."""
+    """Return the command that opens a file for editing."""
     file = shlex.quote(str(path))
     command = f"sudoedit {file}" if _belongs_to_root(path) else f"${{EDITOR:-nano}} {file}"
     return f"{command}  # {comment}" if comment else command
@@ -116,5 +116,5 @@ def _belongs_to_root(path: Path) -> bool:
 
 
 def short(error: Exception) -> str:
-    """What an error says is wrong, without the remedy that follows."""
+    """Return an error's text without the remedy."""
     return str(error).partition("; ")[0]

@@ -1,4 +1,4 @@
-"""What a daemon that runs says of itself and of its devices."""
+"""What a running daemon reports of itself and its devices."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -23,7 +23,7 @@ _JOURNAL = "journalctl -u lcf-edge -n 30 --no-pager"
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """The daemon and its parts, but for the devices."""
+    """Check the daemon and its parts, without the devices."""
     daemon = context.daemon
     running = next((process for process in processes(context.proc) if process.is_daemon), None)
     if daemon is not None and daemon.scene:
@@ -44,15 +44,15 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def daemon_having(context: Context, name: str, path: Path) -> Process | None:
-    """The daemon that has a device open, or may have it, as far as it reports that and this user may know."""
+    """Return the daemon that has, or may have, a device open, as far as it reports that and this user may know."""
     process = daemon_with(path.resolve(), context.proc)
     if process is not None and process.files is None and context.daemon and name not in context.daemon.statuses:
-        return None  # it uses none of that kind
+        return None  # it uses no such device
     return process
 
 
 def of_device(context: Context, name: str, daemon: Process) -> Finding:
-    """A device that the daemon has open."""
+    """Return findings about a device that the daemon has open."""
     status = context.daemon.statuses.get(name) if context.daemon else None
     if status is not None:
         return _of_status(name, "the daemon has it", status)

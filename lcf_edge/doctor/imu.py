@@ -1,4 +1,4 @@
-"""The IMU: there, allowed, the one that is configured, and measuring what an IMU at rest should."""
+"""The IMU: present, permitted, the configured one, and measuring what an IMU at rest should."""
 
 import os
 from collections.abc import Iterator
@@ -33,7 +33,7 @@ _STILL_RADPS, _STILL_MPS2 = 0.03, 0.5  # 1 sigma of an axis at rest, the noisies
 _GRAVITY_OFF_MPS2, _GRAVITY_WRONG_MPS2 = 0.4, 2.0
 _BIAS_RADPS = 0.1
 _BAD_SHARE = 0.01
-_HARMLESS = frozenset({"skipped_bytes"})  # the first frame is rarely caught whole
+_HARMLESS = frozenset({"skipped_bytes"})  # the first frame is rarely complete
 _SOFTWARE_BUS = "dtoverlay=i2c-gpio,bus=3"
 
 
@@ -61,7 +61,7 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def judged(context: Context, measured: Measured[ImuSample]) -> Iterator[Finding]:
-    """What is said of samples."""
+    """Return findings about samples."""
     imu = context.config.imu
     if len(measured.records) < 2:
         yield fail("imu", f"{measured.name}: opens, but {len(measured.records)} samples came in {SECONDS:g} s")
@@ -127,7 +127,7 @@ def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
 def _none(context: Context) -> Finding:
     text = "imu.driver is none: the vehicle's turns look like motion of others, and flow lines are widened"
     shared = daemon_having(context, "imu", context.dev / f"i2c-{context.config.imu.bus}") is not None
-    found = [] if shared else _chips(context)  # a look could take a byte out of the FIFO that the daemon reads
+    found = [] if shared else _chips(context)  # looking could take a byte out of the FIFO that the daemon reads
     if found:
         there = f"{', '.join(map(str, found))} on i2c-{context.config.imu.bus}"
         return warn("imu", f"{text}; found {there}", context.again(*found[0].settings))
@@ -145,14 +145,14 @@ def _none(context: Context) -> Finding:
 
 
 def _daemon(context: Context) -> Process | None:
-    """The daemon that has the IMU, or may have it."""
+    """Return the daemon that has the IMU open, or may have it."""
     imu = context.config.imu
     if imu.driver == "recording":
         return None
-    if has_interface(imu.driver, "iio"):  # its files are open only for moments
+    if has_interface(imu.driver, "iio"):  # its files are open only briefly
         return next((process for process in processes(context.proc) if process.is_daemon), None)
     if not os.access(_node(context), os.R_OK | os.W_OK):
-        return None  # opening it says why
+        return None  # opening it will say why
     return daemon_having(context, "imu", _node(context))
 
 
@@ -235,7 +235,7 @@ def _no_bus(context: Context, error: DriverError) -> Finding:
     if (context.sys / f"bus/i2c/devices/i2c-{bus}").exists():
         remedy = "sudo modprobe i2c-dev"
     elif model.exists() and "Raspberry" in model.read_text(encoding="utf-8", errors="replace"):
-        own = bus == 3  # the one of the documentation
+        own = bus == 3  # the number in the documentation
         remedy = (
             f"echo {_SOFTWARE_BUS} | sudo tee -a /boot/firmware/config.txt  # then reboot"
             if own
@@ -268,7 +268,7 @@ def _strangers(context: Context) -> list[int]:
 
 
 def _latency(context: Context) -> Iterator[Finding]:
-    """FTDI's adapters hold bytes back."""
+    """Check the latency timer of an FTDI adapter, which holds bytes back."""
     name = Path(context.config.imu.port).resolve().name
     timer = context.sys / "bus/usb-serial/devices" / name / "latency_timer"
     if timer.exists() and (latency_ms := int(timer.read_text(encoding="ascii"))) > 1:

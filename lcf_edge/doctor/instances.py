@@ -1,4 +1,4 @@
-"""Other units of this computer, one for each camera: what two of them cannot both have."""
+"""Other units of this computer, one for each camera: what they must not share."""
 
 import subprocess
 from collections.abc import Iterator
@@ -14,7 +14,7 @@ _RUNS = ("active", "activating", "reloading")
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """This configuration beside those of the units that run or start at boot; nothing where there is no other."""
+    """Compare this configuration with those of the units that run or start at boot; empty: there are no others."""
     path_here, unit = context.path.absolute(), unit_of(context.path, context.installed)
     if path_here.parent != context.installed:
         return
@@ -25,7 +25,7 @@ def check(context: Context) -> Iterator[Finding]:
         try:
             same = collisions(context.config, load(path))
         except ConfigError:
-            continue  # doctor -c reports that one
+            continue  # doctor -c with that file reports it
         if same:
             yield fail("instances", f"{unit} and {other} both have {', '.join(same)}", edit(context.path))
         else:
@@ -33,13 +33,13 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def collisions(one: Config, other: Config) -> list[str]:
-    """What each of two daemons on a computer needs for itself and both have, as keys with their values."""
+    """Return what two daemons on a computer must not share but do, as keys with their values."""
     mine, theirs = _own(one), _own(other)
     return [f"{key} = {value}" for key, value in mine if (key, value) in theirs]
 
 
 def _own(config: Config) -> list[tuple[str, str]]:
-    """Keys and values that no other daemon on the computer may have."""
+    """Return keys and values that no other daemon on the computer may have."""
     own = [("zenoh.listen", endpoint) for endpoint in config.zenoh.listen]
     own += [("publish.prefix", config.publish.prefix), ("publish.frame_id", config.publish.frame_id)]
     own.append(("publish.robot", config.publish.robot))

@@ -17,7 +17,7 @@ class Stamped(Protocol):
 
     @property
     def stamp_ns(self) -> int:
-        """When it was."""
+        """When it was measured, ns."""
         ...
 
 
@@ -26,7 +26,7 @@ Record = TypeVar("Record", bound=Stamped)
 
 @dataclass(frozen=True, slots=True)
 class Measured(Generic[Record]):
-    """What came, oldest first, and what was counted meanwhile."""
+    """The records that came, oldest first, and the counts meanwhile."""
 
     name: str
     records: list[Record]
@@ -34,19 +34,19 @@ class Measured(Generic[Record]):
 
     @property
     def rate_hz(self) -> float:
-        """Records a second; NaN: fewer than two came."""
+        """Rate, records a second; NaN: fewer than two came."""
         if len(self.records) < 2:
             return math.nan
         return (len(self.records) - 1) / max((self.records[-1].stamp_ns - self.records[0].stamp_ns) / 1e9, 1e-9)
 
     @property
     def jitter_s(self) -> float:
-        """1 sigma of the interval between two."""
+        """1 sigma of the interval between two records, s."""
         return pstdev(self._intervals_s) if len(self.records) > 2 else math.nan
 
     @property
     def longest_s(self) -> float:
-        """The longest interval between two."""
+        """The longest interval between two records, s."""
         return max(self._intervals_s, default=math.nan)
 
     @property
@@ -69,8 +69,8 @@ def measure(
 ) -> Measured[Record]:
     """Open a device, read it, close it. Raises ``DriverError``.
 
-    ``settling_s``: what comes so soon after the first record is thrown away, as of a camera that finds its exposure.
-    A device from which nothing comes is waited for until it complains, three times ``seconds`` at most.
+    ``settling_s``: records this soon after the first are discarded, as while a camera adjusts its exposure. Without any
+    record, wait until the device fails, three times ``seconds`` at most.
     """
     device = open_device()
     try:

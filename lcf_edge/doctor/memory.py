@@ -1,4 +1,4 @@
-"""Memory: what the program needs, may take, and what there is."""
+"""Memory: what the program needs, what it may take, and what is free."""
 
 import re
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from lcf_edge.errors import ConfigError
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Need against budget, budget against what is free."""
+    """Compare need with budget, and budget with what is free."""
     budget_mib = context.config.memory.budget_mib
     try:
         check_budget(context.config)

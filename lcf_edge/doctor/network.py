@@ -1,4 +1,4 @@
-"""Zenoh: its configuration, its ports, and who reaches them."""
+"""Zenoh: its configuration, its ports, and who can reach them."""
 
 import json
 import shlex
@@ -37,7 +37,7 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
-    """Whether strangers can read scenes and tell the speed."""
+    """Check whether strangers can read scenes and send a speed."""
     outside = [endpoint for endpoint in options.listen if (parts := parsed(endpoint)) and not parts.local]
     plain = [endpoint for endpoint in outside if (parts := parsed(endpoint)) and not parts.encrypted]
     if plain:
@@ -65,13 +65,13 @@ def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
 
 
 def keys(options: Zenoh) -> Iterator[Finding]:
-    """Whether others can read the private keys that the file names, or write the file."""
+    """Check whether others can read the private keys named in the file, or write the file."""
     settings = _settings(options)
     named = [json.loads(settings.get_json(f"transport/link/tls/{key}")) for key in _KEYS]
     for path, forbidden in [(Path(name), 0o077) for name in named if name] + [(Path(options.config_file), 0o022)]:
         try:
             mode = path.stat().st_mode
-        except OSError:  # what is missing is reported where it is opened
+        except OSError:  # a missing file is reported where it is opened
             continue
         if stat.S_ISREG(mode) and mode & forbidden:
             what = "read" if forbidden == 0o077 else "write"
@@ -84,7 +84,7 @@ def _wants_certificates(options: Zenoh) -> bool:
 
 
 def _with_the_files(options: Zenoh) -> Zenoh:
-    """Endpoints that the keys leave to ``zenoh.config_file``."""
+    """Fill in endpoints that the configuration leaves to ``zenoh.config_file``."""
     settings = _settings(options)
     listen = options.listen or _endpoints(settings, "listen")
     connect = options.connect or _endpoints(settings, "connect")
@@ -92,7 +92,7 @@ def _with_the_files(options: Zenoh) -> Zenoh:
 
 
 def _endpoints(settings: zenoh.Config, name: str) -> list[str]:
-    """A list, or one for each mode."""
+    """Return endpoints given as a list, or as a list for each mode."""
     endpoints = json.loads(settings.get_json(f"{name}/endpoints"))
     return (
         [endpoint for one in endpoints.values() for endpoint in one] if isinstance(endpoints, dict) else list(endpoints)
@@ -100,7 +100,7 @@ def _endpoints(settings: zenoh.Config, name: str) -> list[str]:
 
 
 def _settings(options: Zenoh) -> zenoh.Config:
-    """Of the file; those of none where it cannot be read, which opening the session will tell."""
+    """Return the file's settings; defaults where it cannot be read: opening the session reports that."""
     try:
         return zenoh.Config.from_file(options.config_file) if options.config_file else zenoh.Config()
     except zenoh.ZError:

@@ -1,4 +1,4 @@
-"""Groups: whose the devices are, and whether this user is one of them."""
+"""Groups that own the devices, and whether this user is a member."""
 
 import getpass
 import grp
@@ -14,23 +14,23 @@ _GROUPS: Mapping[Interface, str] = {"i2c": "i2c", "serial": "dialout", "iio": "i
 
 
 def group_of(driver: str) -> str:
-    """The group that may use what ``imu.driver`` means; "" for none."""
+    """Return the group that may use the device of ``imu.driver``; "" for none."""
     return _GROUPS[DRIVERS[driver].interface] if driver in DRIVERS else ""
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """Each group that the configured devices need."""
+    """Check each group that the configured devices need."""
     for group, pattern in needed(context.config):
         yield _group(group, sorted(context.dev.glob(pattern)))
 
 
 def join(group: str) -> str:
-    """The command that lets this user in."""
+    """Return the command that adds this user to a group."""
     return f"sudo usermod -aG {group} $USER  # then log in again"
 
 
 def owner(path: Path) -> str:
-    """Group and mode of a device, as "group video, crw-rw----"; "" when it is not there."""
+    """Return group and mode of a device, as "group video, crw-rw----"; "" when it does not exist."""
     try:
         status = path.stat()
     except OSError:
@@ -39,14 +39,14 @@ def owner(path: Path) -> str:
 
 
 def needed(config: Config) -> list[tuple[str, str]]:
-    """Groups, and which nodes in /dev should be theirs."""
+    """Return groups, and the nodes in /dev that should belong to them."""
     nodes = {"video": "video*", "i2c": f"i2c-{config.imu.bus}", "dialout": _inside(config.imu.port), "iio": "iio:*"}
     video = "" if config.camera.driver == "recording" else "video"
     return [(group, nodes[group]) for group in (video, group_of(config.imu.driver)) if group]
 
 
 def _inside(path: str) -> str:
-    """A path in /dev as a pattern for there."""
+    """Return a path in /dev as a glob pattern relative to it."""
     return path.removeprefix("/dev/").lstrip("/") or "-"
 
 

@@ -16,7 +16,7 @@ _DAEMON = [(name, command) for name in ("lcf-edge", "lcf_edge") for command in (
 
 @dataclass(frozen=True, slots=True)
 class Process:
-    """``files``: what it has open; None: it is another user's, and only root may know."""
+    """``files``: what it has open; None: another user's process, of which only root may know."""
 
     pid: int
     name: str
@@ -28,7 +28,7 @@ class Process:
 
 
 def processes(proc: Path) -> Iterator[Process]:
-    """All but this one."""
+    """Return all processes but this one."""
     for folder in sorted(proc.glob("[0-9]*")):
         try:
             words = (folder / "cmdline").read_bytes().decode(errors="replace").split("\0")
@@ -42,12 +42,12 @@ def processes(proc: Path) -> Iterator[Process]:
 
 
 def holders(path: Path, proc: Path) -> list[Process]:
-    """Those that are known to have ``path`` open."""
+    """Return the processes known to have ``path`` open."""
     return [process for process in processes(proc) if str(path) in (process.files or ())]
 
 
 def in_use(subject: str, path: Path, proc: Path) -> Finding:
-    """What is said of a device that another program has."""
+    """Return the finding about a device that another program has open."""
     found = holders(path.resolve(), proc)
     if found:
         return fail(subject, f"{path}: in use by {' and '.join(map(str, found))}", f"kill {found[0].pid}")
@@ -55,13 +55,13 @@ def in_use(subject: str, path: Path, proc: Path) -> Finding:
 
 
 def daemon_with(path: Path, proc: Path) -> Process | None:
-    """The daemon that has ``path`` open, or may have it."""
+    """Return the daemon that has ``path`` open, or may have it."""
     daemons = (process for process in processes(proc) if process.is_daemon)
     return next((process for process in daemons if process.files is None or str(path) in process.files), None)
 
 
 def listening(endpoint: Endpoint, proc: Path) -> Process | None:
-    """Who listens on that port, if that may be known."""
+    """Return the process that listens on a port, if this user may know it."""
     sockets = {f"socket:[{inode}]" for inode in _inodes(endpoint, proc)}
     return next((process for process in processes(proc) if sockets & (process.files or set())), None)
 
@@ -71,12 +71,12 @@ def _open_files(folder: Path) -> frozenset[str] | None:
         return frozenset(str(link.readlink()) for link in (folder / "fd").iterdir())
     except PermissionError:
         return None
-    except OSError:  # it has ended, or closed one
+    except OSError:  # it has ended, or closed a file
         return frozenset()
 
 
 def _inodes(endpoint: Endpoint, proc: Path) -> Iterator[str]:
-    """Of the sockets on that port, whatever the address (Linux, ``Documentation/networking/proc_net_tcp.rst``)."""
+    """Return inodes of the sockets on a port, any address (Linux, ``Documentation/networking/proc_net_tcp.rst``)."""
     kind = "udp" if endpoint.datagrams else "tcp"
     for table in (proc / "net" / kind, proc / "net" / f"{kind}6"):
         lines = table.read_text(encoding="ascii").splitlines()[1:] if table.exists() else []

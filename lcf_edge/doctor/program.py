@@ -1,4 +1,4 @@
-"""The words with which this very program can be called again, by its user and with ``sudo``."""
+"""How this very program can be called again, by its user and with ``sudo``."""
 
 import shlex
 import shutil
@@ -6,11 +6,11 @@ import sys
 from pathlib import Path
 
 SYSTEM_PATH = "/usr/local/sbin:/usr/local/bin:/usr/sbin:/usr/bin:/sbin:/bin"
-"""Where ``sudo`` looks for commands; an environment that is active is not among them."""
+"""Where ``sudo`` looks for commands; not in an active virtual environment."""
 
 
 def program(environment: Path = Path(sys.prefix), path: str = SYSTEM_PATH) -> str:
-    """For a shell: ``lcf-edge`` where that name on ``path`` is the program of ``environment``, else its full path."""
+    """Return, for a shell, ``lcf-edge`` if that name on ``path`` is the program of ``environment``, else its path."""
     script = environment / "bin" / "lcf-edge"
     named = shutil.which("lcf-edge", path=path)
     if named and script.exists() and Path(named).samefile(script):

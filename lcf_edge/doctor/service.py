@@ -1,4 +1,4 @@
-"""The unit of systemd that has this configuration: installed, enabled, running, and how it last ended."""
+"""The systemd unit of this configuration: installed, enabled, running, and how it last ended."""
 
 import subprocess
 from collections.abc import Iterator, Mapping
@@ -29,14 +29,14 @@ _ENDS = {
 
 
 def unit_of(path: Path, installed: Path) -> str:
-    """The unit that reads a configuration: lcf-edge@front for front.toml, where those of units are; else lcf-edge."""
+    """Return the unit of a configuration: lcf-edge@front for front.toml in the units' folder, else lcf-edge."""
     file = path.absolute()
     is_instance = file.parent == installed and file.suffix == ".toml" and file.name != DEFAULT_PATH.name
     return f"{UNIT}@{file.stem}" if is_instance else UNIT
 
 
 def check(context: Context) -> Iterator[Finding]:
-    """How systemd sees it."""
+    """Check the unit as systemd sees it."""
     unit = unit_of(context.path, context.installed)
     try:
         properties = properties_of(context, unit)
@@ -52,7 +52,7 @@ def check(context: Context) -> Iterator[Finding]:
 
 
 def properties_of(context: Context, unit: str) -> Mapping[str, str]:
-    """What systemd says of a unit; empty: it does not run. Raises ``FileNotFoundError`` and ``TimeoutExpired``."""
+    """Return a unit's properties; empty: no systemd runs. Raises ``FileNotFoundError`` and ``TimeoutExpired``."""
     done = subprocess.run(
         (*context.systemctl, "show", f"{unit}.service", f"--property={','.join(_PROPERTIES)}"),
         capture_output=True,
@@ -64,7 +64,7 @@ def properties_of(context: Context, unit: str) -> Mapping[str, str]:
 
 
 def judged(properties: Mapping[str, str], budget_mib: float, unit: str = UNIT) -> Iterator[Finding]:
-    """What is said of the unit's properties, as ``systemctl show`` lists them."""
+    """Return findings about a unit's properties, as ``systemctl show`` lists them."""
     if properties.get("LoadState") == "not-found":
         yield ok("service", "not installed: nothing starts lcf-edge at boot (sudo make install, in the source)")
         return

@@ -1,4 +1,4 @@
-"""The program, what it rests on, and the computer that it runs on."""
+"""The program, its packages, and the computer that it runs on."""
 
 import platform
 import re
@@ -16,13 +16,13 @@ NEEDED: Mapping[str, tuple[tuple[int, int], tuple[int, int]]] = {
     "opencv-python-headless": ((4, 10), (6, 0)),
     "eclipse-zenoh": ((1, 5), (2, 0)),
 }
-"""From which version on, and before which."""
+"""First version that works, and first that may not."""
 
 _MODULES = {"plot": "matplotlib", "view": "aiohttp", "watch": "rich"}
 
 
 def check(_: Context) -> Iterator[Finding]:
-    """Versions."""
+    """Check versions."""
     yield _computer(sys.maxsize > 2**32)
     yield from packages({name: _installed(name) for name in NEEDED})
     yield compilation(extension())
@@ -35,7 +35,7 @@ def check(_: Context) -> Iterator[Finding]:
 
 
 def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
-    """What is said of these versions; "": unknown."""
+    """Return findings about versions; "": unknown."""
     for name, (least, below) in NEEDED.items():
         numbers = tuple(map(int, re.findall(r"\d+", installed[name])[:2]))
         if numbers and not least <= numbers < below:
@@ -47,7 +47,7 @@ def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
 
 
 def compilation(compiled: Compiled) -> Finding:
-    """Whether the filter runs compiled."""
+    """Check whether the filter runs compiled."""
     if not compiled.reason:
         return ok("software", "the filter runs compiled")
     text = f"the filter runs uncompiled, about {SLOWER} times slower: {compiled.reason}"

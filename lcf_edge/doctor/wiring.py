@@ -27,12 +27,12 @@ class Chip:
 
     @property
     def settings(self) -> tuple[str, str]:
-        """That make it the configured one."""
+        """Return the settings that configure it."""
         return f"imu.driver={self.driver}", f"imu.address=0x{self.address:02x}"
 
 
 def chips(bus: I2cBus) -> Iterator[Chip]:
-    """The chips at the addresses that IMUs have."""
+    """Return the chips recognised at the addresses of IMUs."""
     kinds = registry.chips()
     for address in bus.scan(_addresses()):
         for driver, kind in kinds.items():
@@ -45,7 +45,7 @@ def chips(bus: I2cBus) -> Iterator[Chip]:
 
 
 def strangers(bus: I2cBus) -> list[int]:
-    """Addresses of IMUs at which something acknowledges that no driver knows, and that the kernel does not own."""
+    """Return addresses of IMUs with a device that no driver recognises and that no kernel driver owns."""
     known = {chip.address for chip in chips(bus)}
     found = []
     for address in bus.scan(_addresses()):
@@ -57,7 +57,7 @@ def strangers(bus: I2cBus) -> list[int]:
 
 
 def _addresses() -> list[int]:
-    """That IMUs have."""
+    """Return all addresses that IMUs can have."""
     return sorted({address for kind in registry.chips().values() for address in kind.addresses})
 
 
@@ -71,12 +71,12 @@ class Spoken:
 
     @property
     def settings(self) -> tuple[str, str]:
-        """That make it the configured one."""
+        """Return the settings that configure it."""
         return f"imu.driver={self.driver}", f"imu.baud={self.baud}"
 
 
 def spoken(port: str, clock: Clock) -> Spoken | None:
-    """What is spoken at a port, tried at all baud rates in use; None: nothing that is known."""
+    """Return the protocol found at a port, trying all baud rates in use; None: no known one."""
     bauds = dict.fromkeys(baud for protocol in registry.protocols().values() for baud in protocol.bauds)
     understood = [found for baud in bauds for found in _understood(_heard(port, baud, clock), baud)]
     best = max(understood, key=lambda found: found.readings, default=None)
@@ -89,7 +89,7 @@ def _understood(data: bytes, baud: int) -> Iterator[Spoken]:
 
 
 def _heard(port: str, baud: int, clock: Clock) -> bytes:
-    """What comes within ``LISTENED_S``; nothing where that rate cannot be had."""
+    """Return the bytes that come within ``LISTENED_S``; empty if the port does not have that rate."""
     heard = bytearray()
     with suppress(DriverError), closing(SerialPort(port, baud)) as line:
         end_ns = clock.monotonic_ns() + round(LISTENED_S * 1e9)

@@ -17,7 +17,7 @@ MAX_SETTINGS = 2**16  # characters
 
 @dataclass(frozen=True, slots=True)
 class Entry:
-    """A recording. ``name``: as short as is unique, in characters that can be written anywhere."""
+    """A recording. ``name``: the shortest unique one, in characters that are safe anywhere."""
 
     name: str
     path: Path
@@ -33,7 +33,7 @@ class Entry:
 
     @property
     def truth(self) -> Path | None:
-        """The file that says what is in the pictures."""
+        """The file with the truth about the images."""
         path = self._beside("truth.jsonl")
         return path if path.is_file() else None
 
@@ -44,19 +44,19 @@ class Entry:
 
 
 def find(places: Sequence[Path]) -> list[Entry]:
-    """The recordings that are named; a folder that is not one stands for all below it. Raises ``UsageError``."""
+    """The recordings that are named; a folder that is not one stands for all in it. Raises ``UsageError``."""
     paths: list[Path] = []
     for place in places:
         found = [place] if not place.is_dir() else list(_below(place))
         if not found:
             raise UsageError(f"{place}: no recording in it; name recordings, or a folder of them")
         paths += found
-    paths = list({path.resolve(): path.absolute() for path in reversed(paths)}.values())[::-1]  # each once
+    paths = list({path.resolve(): path.absolute() for path in reversed(paths)}.values())[::-1]  # without duplicates
     return [Entry(printable_name(name), path) for name, path in zip(_names(paths), paths, strict=True)]
 
 
 def printable_name(name: str) -> str:
-    """A file's name in which what cannot be shown, or is no text at all, stands as its code."""
+    """Return a file's name with characters that cannot be printed, or decoded, as their codes."""
     return "".join(
         letter if letter.isprintable() else letter.encode("unicode_escape").decode("ascii") for letter in name
     )
@@ -74,7 +74,7 @@ def _below(folder: Path) -> Iterator[Path]:
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
-    """The last parts of each path, as many as it takes."""
+    """Return the last parts of each path, as many as make it unique."""
     parts = [path.parts[1:-1] if path.name == "mav0" else path.parts[1:] for path in paths]
     taken = [1] * len(paths)
     while repeated := _repeated(_joined(parts, taken)):

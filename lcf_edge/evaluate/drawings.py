@@ -1,4 +1,4 @@
-"""Pictures of a report: what is known of a frame, and what was reported."""
+"""Images of a report: what is known of a frame, and what was reported."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,7 @@ from lcf_edge.evaluate.score import CLOSE_S
 from lcf_edge.evaluate.truth import Known
 
 WIDTH_PX = 420
-MAX_HEIGHT_PX = 1260  # of a picture that is higher than wide
+MAX_HEIGHT_PX = 1260  # of an image that is higher than wide
 QUALITY = 82  # of the JPEGs
 _RED, _YELLOW, _GREY, _WHITE, _BLACK = (60, 60, 255), (0, 230, 255), (190, 190, 190), (255, 255, 255), (0, 0, 0)
 
@@ -19,7 +19,7 @@ Colours = npt.NDArray[np.uint8]
 
 
 def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], reported: Sequence[Rebel], caption: str) -> Colours:
-    """A frame (h, w), grey, as a small picture (h, w, 3): threats yellow, other things grey, rebels red.
+    """A frame (h, w), grey, as a small image (h, w, 3): threats yellow, other things grey, rebels red.
 
     At most ``WIDTH_PX`` wide and ``MAX_HEIGHT_PX`` high.
     """
@@ -40,13 +40,13 @@ def draw(image: npt.NDArray[np.uint8], known: Sequence[Known], reported: Sequenc
 
 
 def beside(left: Colours, right: Colours) -> Colours:
-    """Two pictures of one frame as one."""
+    """Put two images of one frame side by side."""
     gap = np.full((left.shape[0], 6, 3), 255, np.uint8)
     return np.concatenate([left, gap, right], axis=1)
 
 
 def encode(canvas: Colours) -> bytes:
-    """As JPEG."""
+    """Encode an image as JPEG."""
     _, data = cv2.imencode(".jpg", canvas, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
     return data.tobytes()
 

@@ -1,4 +1,4 @@
-"""The whole of it: hands the recordings of a corpus out, and writes what comes back into a folder."""
+"""The whole evaluation: hands out the recordings of a corpus, and writes the results into a folder."""
 
 import platform
 import re
@@ -43,7 +43,7 @@ class Question:
 
 @dataclass(frozen=True, slots=True)
 class Written:
-    """A report on the disk. ``before``: the one that it was compared with."""
+    """A written report. ``before``: the one that it was compared with."""
 
     report: Report
     before: Report | None
@@ -52,7 +52,7 @@ class Written:
 
 def evaluate(question: Question, folder: Path, work: Work) -> Written:
     """Evaluate recordings and write the report into a folder. Raises ``UsageError``, ``ConfigError``, ``SinkError``."""
-    load(question.config, question.settings)  # what is wrong for all of them is reported before work begins
+    load(question.config, question.settings)  # errors that concern all recordings are reported at once
     entries = find(question.places)
     before, before_folder = report.read(question.against) if question.against else (None, Path())
     if question.truth is not None and not question.truth.is_dir() and len(entries) > 1:
@@ -105,12 +105,12 @@ def _task(entry: Entry, question: Question, before: Mapping[str, Path]) -> Task:
 
 
 def _config(entry: Entry, question: Question, words: Sequence[str]) -> Config:
-    """The file that is named, or else the configuration that the recording holds; over it the settings beside it."""
+    """Load the named file, else the recording's own configuration, with the settings beside the recording on top."""
     return load(question.config or _holder(entry.path), [*words, *question.settings])
 
 
 def _holder(recording: Path) -> Path | None:
-    """The file that holds the configuration with which a recording began; None: it is not one of ours."""
+    """Return the file that holds a recording's configuration; None: it has none."""
     first = next((path for path in bag_files(recording) if path.suffix.lower() == ".mcap"), None)
     with suppress(ConfigError):
         if first is not None:
@@ -122,7 +122,7 @@ def _holder(recording: Path) -> Path | None:
 def _frames(of: Report, folder: Path) -> dict[str, Path]:
     """The files of a report's frames, by the names of the recordings. Raises ``UsageError``."""
     for row in of.read:
-        if row.frames and not _FRAMES.fullmatch(row.frames):  # another's report could name any file
+        if row.frames and not _FRAMES.fullmatch(row.frames):  # a foreign report could name any file
             raise UsageError(f"{folder}: {row.frames} is no file of frames of a report; evaluate again")
     return {row.name: folder / row.frames for row in of.read if row.frames}
 
@@ -133,7 +133,7 @@ def _prepare(folder: Path, against: Path | None) -> None:
     try:
         for path in (folder / "frames", folder / "pictures"):
             path.mkdir(parents=True, exist_ok=True)
-            for old in path.glob("[0-9][0-9][0-9][0-9]*"):  # of a report that was here
+            for old in path.glob("[0-9][0-9][0-9][0-9]*"):  # of an earlier report here
                 old.unlink()
         probe = folder / PAGE
         with probe.open("ab"):

@@ -1,4 +1,4 @@
-"""One recording through the pipeline, scored; in whichever process this is called."""
+"""One recording through the pipeline, scored, in the calling process."""
 
 import heapq
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -24,9 +24,9 @@ from lcf_edge.pipeline import run
 from lcf_edge.printable import printable
 from lcf_edge.recording.read import open_recording
 
-EVENTS = 8  # pictures of a recording, at most, of what went wrong or differs
-VIEWS = 3  # and of what it is like
-APART = 10  # frames between two pictures of the same kind of event
+EVENTS = 8  # images of a recording, at most, of what went wrong or differs
+VIEWS = 3  # typical images of a recording
+APART = 10  # frames between two images of the same kind of event
 
 MAX_FRAMES_BYTES = 2**30  # some 300 bytes a frame
 
@@ -36,10 +36,10 @@ _DIFFERENCES = {"contact": 3, "found": 2, "on nothing": 1}
 
 @dataclass(frozen=True, slots=True)
 class Task:
-    """What to do; goes to another process, perhaps on another computer, which sees the same files.
+    """A task for another process, perhaps on another computer that sees the same files.
 
-    ``before``: the file of another evaluation's frames, for comparison, which only the process that hands out needs to
-    see; None: there is none.
+    ``before``: the file of another evaluation's frames, for comparison, which only the process that hands out must see;
+    None: there is none.
     """
 
     name: str
@@ -50,7 +50,7 @@ class Task:
     before: Path | None = None
 
     def frames_before(self) -> bytes | None:
-        """What is in that file. Raises ``UsageError``."""
+        """Read that file. Raises ``UsageError``."""
         try:
             if self.before is None:
                 return None
@@ -132,7 +132,7 @@ def _evaluate(task: Task, before: Mapping[int, FrameLine] | None, row: Recording
 
 
 def _event(line: FrameLine, *, known: bool) -> tuple[int, str]:
-    """How grave what went wrong is, and its name."""
+    """Return how grave an error is, and its name."""
     what = "contact that does not come" if line.contact else "missed" if line.missed else "on nothing"
     text = f"missed: {', '.join(line.missed)}" if what == "missed" else what
     return _GRAVITY[what], text if known else "reported"
@@ -160,16 +160,16 @@ def _pair(frame: Frame, known: Sequence[Known], before: FrameLine, now: FrameLin
 
 
 class _Kept:
-    """The pictures that a report shows of a recording: the gravest events, and some that show what it is like."""
+    """The images that a report shows of a recording: the gravest events, and some typical ones."""
 
     def __init__(self) -> None:
         self._order = count()
         self._events: list[tuple[int, int, ImageRow, bytes]] = []  # a heap, the least grave first
         self._views: list[tuple[ImageRow, bytes]] = []
-        self._last: dict[int, int] = {}  # seq of the last picture of each gravity
+        self._last: dict[int, int] = {}  # seq of the last image of each gravity
 
     def offer(self, line: FrameLine, gravity: int, why: str, drawing: Callable[[], Colours]) -> None:
-        """Keep a picture if it is graver than one of those kept, and not much like the one before it."""
+        """Keep an image if it is graver than one of those kept, and not close to the one before it."""
         if line.seq - self._last.get(gravity, -APART) < APART:
             return
         if len(self._events) == EVENTS and gravity <= self._events[0][0]:
@@ -181,7 +181,7 @@ class _Kept:
             heapq.heappop(self._events)
 
     def keep(self, line: FrameLine, why: str, drawing: Callable[[], Colours]) -> None:
-        """Keep a picture in any case."""
+        """Keep an image in any case."""
         self._views.append((ImageRow(line.seq, line.stamp_ns, why), encode(drawing())))
 
     def drawings(self) -> list[tuple[ImageRow, bytes]]:

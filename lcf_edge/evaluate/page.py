@@ -1,4 +1,4 @@
-"""The report as a page for a browser: one file that shows the pictures beside it, without scripts."""
+"""The report as a page for a browser: one file that shows the images beside it, without scripts."""
 
 import re
 from collections.abc import Callable, Sequence
@@ -23,7 +23,7 @@ class Measure:
     worse: int
 
     def text(self, numbers: Numbers) -> str:
-        """The number, or a dash where there is none."""
+        """Return the number as text, or a dash where there is none."""
         value = self.of(numbers)
         return "–" if value is None else f"{value:.{self.decimals}f}"
 
@@ -61,7 +61,7 @@ def page(result: Report, before: Report | None = None) -> str:
         ),
     }
     marks = re.compile("|".join(map(re.escape, parts)))
-    return marks.sub(lambda mark: parts[mark[0]], template)  # at once: a name may look like a mark
+    return marks.sub(lambda mark: parts[mark[0]], template)  # in one pass: a name may look like a mark
 
 
 def _head(result: Report, before: Report | None) -> str:
@@ -77,7 +77,7 @@ def _head(result: Report, before: Report | None) -> str:
 
 
 def _totals(result: Report, known: dict[str, RecordingRow]) -> str:
-    """The sums, apart for recordings with truth, and for those in which all that was reported counts as false."""
+    """Return the sums: of recordings with truth, and of those without, in which every report counts as false."""
     parts = []
     for has_truth, title in ((True, "With truth"), (False, "Without truth: as if nothing moved and nothing were met")):
         rows = [row for row in result.read if row.has_truth == has_truth]
@@ -103,7 +103,7 @@ def _tile(measure: Measure, now: Numbers, then: Numbers | None) -> str:
 
 
 def _mark(measure: Measure, now: Numbers, then: Numbers | None) -> str:
-    """How a number has changed, as a class."""
+    """Return the CSS class for how a number has changed."""
     if then is None or not measure.worse:
         return ""
     new, old = measure.of(now), measure.of(then)
@@ -164,7 +164,7 @@ def _section(row: RecordingRow, number: int) -> str:
 
 
 def _strip(row: RecordingRow) -> str:
-    """What was reported when, as a drawing: a line of each kind, from the first frame to the last."""
+    """Return a timeline as a drawing: a line for each kind of event, from the first frame to the last."""
     kinds = [kind for kind in KINDS if any(event.what == kind for event in row.events)]
     if not kinds:
         return ""

@@ -1,4 +1,4 @@
-"""What an evaluation leaves: the numbers in ``report.json``, and a line a frame of each recording in ``frames/``."""
+"""What an evaluation writes: the numbers in ``report.json``, and a line a frame of each recording in ``frames/``."""
 
 import math
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ MAX_BYTES = 2**30
 
 
 class Rebel(msgspec.Struct, frozen=True, array_like=True):
-    """A rebel circle, px of the picture. ``ttc_s``: None: no contact."""
+    """A rebel circle, px of the image. ``ttc_s``: None: no contact."""
 
     x: float
     y: float
@@ -40,12 +40,12 @@ class FrameLine(msgspec.Struct, frozen=True):
 
     @property
     def verdict(self) -> tuple[bool, frozenset[str], int, bool]:
-        """What two evaluations of a frame are compared by."""
+        """The part by which two evaluations of a frame are compared."""
         return self.scored, frozenset(self.found), self.false, self.contact
 
 
 class ThreatRow(msgspec.Struct, frozen=True):
-    """One threat. ``late_s``: from the first picture in which it was due to the first in which it was found."""
+    """One threat. ``late_s``: from the first image in which it was due to the first in which it was found."""
 
     name: str
     due: int
@@ -54,7 +54,7 @@ class ThreatRow(msgspec.Struct, frozen=True):
 
 
 class Numbers(msgspec.Struct, frozen=True):
-    """Of one recording, or of all. ``due``, ``found``: threats, picture by picture; times in ms a picture."""
+    """Of one recording, or of all. ``due``, ``found``: threats, frame by frame; times in ms a frame."""
 
     pictures: int = 0
     scored: int = 0
@@ -64,7 +64,7 @@ class Numbers(msgspec.Struct, frozen=True):
     contacts: int = 0
     late_s: float | None = None
     median_ms: float | None = None
-    slow_ms: float | None = None  # 99 % are faster
+    slow_ms: float | None = None  # 99th percentile
 
     @property
     def false_a_picture(self) -> float | None:
@@ -73,9 +73,9 @@ class Numbers(msgspec.Struct, frozen=True):
 
 
 class Event(msgspec.Struct, frozen=True, array_like=True):
-    """Frames in a row, by their places in the recording, of which the same can be said.
+    """Consecutive frames with the same verdict, by their places in the recording.
 
-    ``what``: found, missed (a threat), on nothing (a rebel), contact (one that does not come).
+    ``what``: found, missed (a threat), on nothing (a rebel), contact (that does not come).
     """
 
     what: str
@@ -84,7 +84,7 @@ class Event(msgspec.Struct, frozen=True, array_like=True):
 
 
 class ImageRow(msgspec.Struct, frozen=True):
-    """A picture of the report, and why it is there. ``file``: below the report's folder."""
+    """An image of the report, and why it is there. ``file``: below the report's folder."""
 
     seq: int
     stamp_ns: int
@@ -95,7 +95,7 @@ class ImageRow(msgspec.Struct, frozen=True):
 class RecordingRow(msgspec.Struct, frozen=True):
     """One recording. ``error``: why it could not be read at all; then the numbers are none.
 
-    ``differing``: frames on which the verdict is another than that of the report compared with; None: not compared.
+    ``differing``: frames whose verdict differs from that of the other report; None: not compared.
     """
 
     name: str
@@ -113,7 +113,7 @@ class RecordingRow(msgspec.Struct, frozen=True):
 
 
 class Report(msgspec.Struct, frozen=True):
-    """All of it. ``label``: version and settings, as one reads them."""
+    """The whole report. ``label``: version and settings, as text."""
 
     format: int
     version: str
@@ -125,7 +125,7 @@ class Report(msgspec.Struct, frozen=True):
 
     @property
     def read(self) -> list[RecordingRow]:
-        """Those that could be read."""
+        """The recordings that could be read."""
         return [row for row in self.recordings if not row.error]
 
 
@@ -165,7 +165,7 @@ def threats(score: Score) -> list[ThreatRow]:
 
 
 def events(lines: Sequence[FrameLine]) -> list[Event]:
-    """What can be said of which frames, in the order in which it begins."""
+    """Return the events, in the order in which they begin."""
     runs: list[Event] = []
     open_runs: dict[str, int] = {}
     for place, line in enumerate(lines):
@@ -188,7 +188,7 @@ def events(lines: Sequence[FrameLine]) -> list[Event]:
 
 
 def count(number: int, thing: str) -> str:
-    """So many things, in words."""
+    """Return a number of things, in words."""
     return f"{number} {thing}" + ("" if number == 1 else "s")
 
 
@@ -197,7 +197,7 @@ def _known(value: float) -> float | None:
 
 
 def total(rows: list[RecordingRow]) -> Numbers:
-    """The sum of recordings; times are the median recording's."""
+    """Return the sum of recordings; times are the median recording's."""
 
     def middle(values: list[float | None]) -> float | None:
         reported = [value for value in values if value is not None]

@@ -1,4 +1,4 @@
-"""What was reported of a recording, compared with what is known of it."""
+"""The results of a recording, compared with what is known of it."""
 
 import math
 from collections.abc import Sequence
@@ -12,13 +12,13 @@ from lcf_edge.messages import Kind
 
 MIN_TRUST = 3.0
 CLOSE_S = 1.0
-BESIDE_M = 0.6  # what misses by more is no contact
+BESIDE_M = 0.6  # a larger miss is no contact
 
 Circles = np.ndarray[Any, np.dtype[np.void]]
 
 
 def rebels(circles: Circles) -> Circles:
-    """The circles that count: rebel ones, with trust."""
+    """Return the circles that count: rebels with enough trust."""
     reported: Circles = circles[(circles["kind"] == Kind.REBEL) & (circles["trust"] >= MIN_TRUST)]
     return reported
 
@@ -30,7 +30,7 @@ def is_close(circle: np.void) -> bool:
 
 @dataclass(frozen=True, slots=True)
 class Verdict:
-    """On one picture. ``found``, ``missed``: names of the threats that were due. ``false``: rebels on nothing.
+    """Verdict on one image. ``found``, ``missed``: names of the threats that were due. ``false``: rebels on nothing.
 
     ``contact``: a contact below a second was reported where there is no threat.
     """
@@ -43,7 +43,7 @@ class Verdict:
 
 @dataclass(slots=True)
 class Threat:
-    """One threat of a recording. ``due``, ``found``: pictures. ``first_ns``: when it was due and found first."""
+    """One threat of a recording. ``due``, ``found``: images. ``first_ns``: when it was due and found first."""
 
     due: int = 0
     found: int = 0
@@ -52,7 +52,7 @@ class Threat:
 
     @property
     def late_s(self) -> float:
-        """Until it was found; NaN: never."""
+        """Time until it was found, s; NaN: never."""
         return math.nan if self.found_first_ns is None else (self.found_first_ns - self.due_first_ns) / 1e9
 
 
@@ -60,8 +60,8 @@ class Threat:
 class Score:
     """Adds up verdicts.
 
-    ``due``, ``found``: threats, picture by picture. ``false``: rebels on nothing. ``contacts``: pictures with a contact
-    below a second that does not come. ``step_ms``: time of each picture, scored or not.
+    ``due``, ``found``: threats, frame by frame. ``false``: rebels on nothing. ``contacts``: images with a contact
+    below a second that does not come. ``step_ms``: time of each image, scored or not.
     """
 
     scored: int = 0
@@ -79,17 +79,17 @@ class Score:
 
     @property
     def latency_s(self) -> float:
-        """Until a threat is found, median of those that are."""
+        """Time until a threat is found, s: median of those that are."""
         late = [threat.late_s for threat in self.threats.values() if threat.found]
         return float(np.median(late)) if late else math.nan
 
     @property
     def median_ms(self) -> float:
-        """Of a step."""
+        """Median time of a step, ms."""
         return float(np.median(self.step_ms))
 
     def add(self, stamp_ns: int, reported: Circles, known: Sequence[Known]) -> Verdict:
-        """Score the ``rebels`` of one picture."""
+        """Score the ``rebels`` of one image."""
         on = [[each for each in known if each.holds(circle["x"], circle["y"])] for circle in reported]
         false = sum(not things for things in on)
         contact = any(

@@ -1,4 +1,4 @@
-"""What is known of the pictures of a recording: the file ``truth.jsonl`` (docs/evaluate.md)."""
+"""What is known of the images of a recording: the file ``truth.jsonl`` (docs/evaluate.md)."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -8,19 +8,19 @@ import msgspec
 
 from lcf_edge.errors import RecordingError
 
-MIN_BOX_PX = 12.0  # smaller threats need not be found yet
-GROWN_SHARE, GROWN_PX = 0.25, 8.0  # of a box, on each side, within which a circle is on it
+MIN_BOX_PX = 12.0  # smallest threat that must be found
+GROWN_SHARE, GROWN_PX = 0.25, 8.0  # growth of a box on each side; circles within count as on it
 MAX_BYTES = 256 * 2**20
 MAX_LINE_BYTES = 2**20
-MAX_KNOWN = 2_000_000  # pictures and what is in them, some 200 bytes of memory each
+MAX_KNOWN = 2_000_000  # images and what is in them, some 200 bytes of memory each
 MAX_NAME = 200  # characters
-MAX_PX = 1e6  # of a box, from the picture's corner
+MAX_PX = 1e6  # of a box, from the image's corner
 
 _Px = Annotated[float, msgspec.Meta(ge=-MAX_PX, le=MAX_PX)]
 
 
 class Known(msgspec.Struct, frozen=True):
-    """Something in a picture. ``box``: x0, y0, x1, y1, px. ``threat``: it is in the way, straight ahead."""
+    """Something in an image. ``box``: x0, y0, x1, y1, px. ``threat``: it is in the way, straight ahead."""
 
     name: Annotated[str, msgspec.Meta(max_length=MAX_NAME)]
     box: tuple[_Px, _Px, _Px, _Px]
@@ -32,7 +32,7 @@ class Known(msgspec.Struct, frozen=True):
         return self.threat and min(self.box[2] - self.box[0], self.box[3] - self.box[1]) >= MIN_BOX_PX
 
     def holds(self, x: float, y: float) -> bool:
-        """Whether a circle with its centre there is on it."""
+        """Whether a circle with this centre, px, is on it."""
         left, top, right, bottom = self.box
         across, down = GROWN_SHARE * (right - left) + GROWN_PX, GROWN_SHARE * (bottom - top) + GROWN_PX
         return left - across <= x <= right + across and top - down <= y <= bottom + down
@@ -44,18 +44,18 @@ class _Line(msgspec.Struct, frozen=True):
 
 
 class Truth:
-    """What is known, picture by picture. Of a recording without truth: that nothing in it moves or is met."""
+    """What is known, frame by frame. Without a file of truth: that nothing moves or is met."""
 
     def __init__(self, by_stamp: Mapping[int, Sequence[Known]] | None) -> None:
         self._by_stamp = by_stamp
 
     @property
     def is_known(self) -> bool:
-        """Whether somebody has said it."""
+        """Whether there is a file of truth."""
         return self._by_stamp is not None
 
     def of(self, stamp_ns: int) -> Sequence[Known] | None:
-        """What is in the picture of this stamp; None: it is not to be scored."""
+        """What is in the image of this stamp; None: it is not to be scored."""
         return () if self._by_stamp is None else self._by_stamp.get(stamp_ns)
 
 

@@ -16,19 +16,19 @@ from lcf_edge.evaluate.one_recording import Done, Task, evaluate
 if TYPE_CHECKING:
     from distributed import Client
 
-PATIENCE_S = 10.0  # of reaching a scheduler
+PATIENCE_S = 10.0  # for reaching a scheduler
 ANXIETY_S = 30.0  # without a result, after which the cluster is looked at
 
 Outcome = tuple[Task, Done | str]
-"""A task and what became of it; text: why it failed."""
+"""A task and its result; text: why it failed."""
 
 Say = Callable[[str], None]
 
 
 def by_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Outcome]:
-    """Have it done by processes on this computer; yield in the order in which they end.
+    """Run the tasks in processes on this computer; yield in the order in which they end.
 
-    A recording that ends its process, by a fault in a decoder say, is reported as failed, and no other one with it.
+    A recording that ends its process, say by a fault in a decoder, is reported as failed, but no other one.
     """
     waiting = deque(tasks)
     while waiting:
@@ -48,7 +48,7 @@ def by_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Outcome]:
 
 @contextmanager
 def _pool(jobs: int) -> Iterator[Executor]:
-    fresh = multiprocessing.get_context("spawn")  # nothing of this process's threads and locks goes with them
+    fresh = multiprocessing.get_context("spawn")  # inherits none of this process's threads and locks
     pool = ProcessPoolExecutor(jobs, mp_context=fresh, initializer=_end_by_interrupt)
     try:
         yield pool
@@ -58,7 +58,7 @@ def _pool(jobs: int) -> Iterator[Executor]:
 
 @contextmanager
 def _interrupts_held() -> Iterator[None]:
-    """Around the start of a worker, which inherits it: Ctrl-C before it is ready would make it print a traceback."""
+    """Hold back Ctrl-C while a worker starts, which inherits it: before it is ready, it would print a traceback."""
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
@@ -67,15 +67,15 @@ def _interrupts_held() -> Iterator[None]:
 
 
 def _end_by_interrupt() -> None:
-    """Ctrl-C reaches the workers too; they end without a word."""
+    """End silently at Ctrl-C, which reaches the workers too."""
     signal.signal(signal.SIGINT, signal.SIG_DFL)
     signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
 
 
 def by_cluster(tasks: Sequence[Task], endpoint: str, say: Say) -> Iterator[Outcome]:
-    """Have it done by the workers of a Dask scheduler, which see the recordings under the same paths.
+    """Run the tasks on the workers of a Dask scheduler, which see the recordings under the same paths.
 
-    What a worker had when it was lost, another one does. Raises ``LcfError`` when there is no scheduler, or none of its
+    The tasks of a lost worker go to another. Raises ``LcfError`` when there is no scheduler, or none of its
     workers has this version of the program.
     """
     try:
@@ -101,7 +101,7 @@ def by_cluster(tasks: Sequence[Task], endpoint: str, say: Say) -> Iterator[Outco
 
 
 def _refuse_strangers(client: "Client", endpoint: str) -> None:
-    """Workers of another version would find something else."""
+    """Refuse workers of another version, whose results would differ."""
     if not client.nthreads():
         raise LcfError(f"{endpoint}: the scheduler has no workers; start one: dask worker {endpoint}")
     for worker, version in client.run(_version, on_error="return").items():

@@ -12,7 +12,7 @@ ROVER_NAME = "localhost"  # in the rover's certificate, by which the gate knows 
 class Certificates:
     """``server``: for parties, who need a certificate of ``ca.pem``. Raises ``LcfError`` that names the file.
 
-    ``parties``: by the common name of a party, how the gate shows the daemon for whom it connects: with
+    ``parties``: by the common name of a party, the certificate by which the gate tells the daemon for whom it connects:
     ``inner/NAME.pem``, or ``inner_NAME.pem`` as systemd hands it over, of an authority that the daemon alone trusts.
     """
 
@@ -30,7 +30,7 @@ class Certificates:
 
 
 def common_name(connection: ssl.SSLObject) -> str:
-    """Of the certificate that the other side has shown; empty: it has none."""
+    """Return the common name of the peer's certificate; empty: it has none."""
     certificate: dict[str, Any] = connection.getpeercert() or {}
     return next((value for part in certificate.get("subject", ()) for name, value in part if name == "commonName"), "")
 

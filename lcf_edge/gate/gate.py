@@ -22,9 +22,9 @@ MAX_PARTIES = 32  # connections in all
 DIAL_S = 2.0
 SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
 PIECE_BYTES = 2**16
-PAUSE_S = 0.1  # where the system gives no connection
+PAUSE_S = 0.1  # when the system refuses a connection
 TELL_EACH_S = 10.0
-COLLECT_EACH = 32  # connections: asyncio leaves each in a cycle, with 256 KiB of buffer
+COLLECT_EACH = 32  # connections: asyncio leaves each in a reference cycle with 256 KiB of buffer
 BACKLOG = 128
 
 Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
@@ -35,7 +35,7 @@ async def serve(listening: socket.socket, daemon: tuple[str, int], certificates:
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(lambda *_: None)  # of connections: counted where they end
     gc.collect()
-    gc.freeze()  # what is here now stays: collections are short
+    gc.freeze()  # objects that exist now stay: collections are short
     gate = Gate(daemon, certificates)
     tasks = [loop.create_task(gate.accept(listening)), loop.create_task(gate.tell())]
     for number in (signal.SIGINT, signal.SIGTERM):
@@ -76,7 +76,7 @@ class Gate:
             task = loop.create_task(self._meet(connection))
             self._strangers[task] = None
             task.add_done_callback(self._forget)
-            await asyncio.sleep(0)  # handshakes go on, however many come
+            await asyncio.sleep(0)  # lets handshakes go on, however many connections come
 
     async def tell(self) -> None:
         """Now and then, until cancelled."""
@@ -85,7 +85,7 @@ class Gate:
             self.tell_now()
 
     def tell_now(self) -> None:
-        """What has happened since the last report."""
+        """Report what has happened since the last report."""
         news = self.counts - self._reported
         self._reported = self.counts.copy()
         if news:
@@ -135,7 +135,7 @@ class Gate:
         return reader, asyncio.StreamWriter(transport, protocol, reader, loop)
 
     def _refusal(self, name: str) -> str:
-        """Why a party is not let in; empty: it is."""
+        """Return why a party is not let in; empty: it is."""
         if name not in self._certificates.parties:
             return "of no known name"
         names = list(self._parties.values())
@@ -149,7 +149,7 @@ class Gate:
                 inner = await asyncio.open_connection(
                     *self._daemon, ssl=self._certificates.parties[name], server_hostname=ROVER_NAME, limit=PIECE_BYTES
                 )
-        except OSError:  # also in time
+        except OSError:  # also a timeout
             self.counts["daemon away"] += 1
             return
         self.counts[f"let in {name}"] += 1

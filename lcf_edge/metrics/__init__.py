@@ -1,1 +1,1 @@
-"""The diagnostics for Prometheus: ``text`` writes them in its format, ``endpoint`` serves that, ``sink`` keeps them."""
+"""The diagnostics for Prometheus: ``text`` formats them, ``endpoint`` serves them, ``sink`` keeps them up to date."""

@@ -25,7 +25,7 @@ class Endpoint:
             def do_GET(self) -> None:
                 host = self.headers.get("Host", "")
                 if host.rsplit(":", 1)[0] not in _HOSTS and host not in _HOSTS:
-                    self.send_error(403)  # a name that was pointed here
+                    self.send_error(403)  # another host name that points here
                 elif self.path != "/metrics":
                     self.send_error(404)
                 else:
@@ -36,7 +36,7 @@ class Endpoint:
                     self.wfile.write(endpoint.text)
 
             def log_message(self, *_: object) -> None:
-                """Nothing: clients may ask often."""
+                """Log nothing: clients may ask often."""
 
         try:
             self._server = _Server((HOST, port), Handler)
@@ -54,7 +54,7 @@ class Endpoint:
         if self._thread.is_alive():
             ending = threading.Thread(target=self._server.shutdown, daemon=True)
             ending.start()
-            self._server.cut()  # or it would end when that connection does
+            self._server.cut()  # else it would wait for that connection to end
             ending.join(_WITHIN_S)
         self._server.server_close()
 
@@ -82,7 +82,7 @@ class _Server(HTTPServer):
             _cut(connection)
 
     def handle_error(self, *_: object) -> None:
-        """Nothing: the other end went away."""
+        """Ignore it: the other end went away."""
 
 
 def _cut(connection: socket.socket) -> None:

@@ -1,4 +1,4 @@
-"""Keeps the metrics new: a file that is replaced as a whole, a text that is served."""
+"""Keeps the metrics up to date: a file that is replaced atomically, a text that is served."""
 
 import os
 from collections.abc import Callable, Sequence
@@ -33,10 +33,10 @@ class MetricsSink(Sink):
             self._endpoint.start()
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:
-        """Nothing: single frames are no metric."""
+        """Do nothing: single frames are no metric."""
 
     def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:  # noqa: ARG002
-        """Take how each part is. A file that cannot be written is reported by ``status``."""
+        """Take the status of each part. A file that cannot be written is reported by ``status``."""
         text = prometheus_text(statuses, self._robot)
         if self._endpoint is not None:
             self._endpoint.text = text
@@ -52,7 +52,7 @@ class MetricsSink(Sink):
         return DeviceStatus(self.name, Level.WARN if self._trouble else Level.OK, self._trouble or "written")
 
     def close(self) -> None:
-        """Serve no more; the file goes, or its last figures would be taken for new ones."""
+        """Stop serving; remove the file, or its last figures would be taken for current ones."""
         if self._endpoint is not None:
             self._endpoint.close()
         if self._file is not None:

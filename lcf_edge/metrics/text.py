@@ -9,7 +9,7 @@ CONTENT_TYPE = "text/plain; version=0.0.4; charset=utf-8"
 
 
 def prometheus_text(statuses: Sequence[DeviceStatus], robot: str) -> bytes:
-    """The level of each part, and each of its values that is a number.
+    """Return the level of each part, and each of its values that is a number.
 
     ``rate_hz`` of the camera becomes ``lcf_edge_camera_rate_hz``; a fill such as ``2/32`` becomes two, which end in
     ``_used`` and ``_capacity``. What is no number is left out.
@@ -24,7 +24,7 @@ def prometheus_text(statuses: Sequence[DeviceStatus], robot: str) -> bytes:
     for status in statuses:
         for key, value in status.values.items():
             for name, number in _numbers(f"lcf_edge_{status.name}_{key}", value):
-                if name not in typed:  # names that differ in their signs alone become one
+                if name not in typed:  # names that differ only in punctuation become one
                     typed.add(name)
                     lines += [f"# TYPE {name} untyped", f"{name}{{{label}}} {number}"]
     return ("\n".join(lines) + "\n").encode(errors="replace")

@@ -1,4 +1,4 @@
-"""What people look at a running daemon with: ``live`` follows it, ``terminal`` and ``web`` show that.
+"""Views of a running daemon: ``live`` follows it, ``terminal`` and ``web`` show it.
 
 ``replay`` plays a recording in place of the daemon.
 

@@ -1,1 +1,1 @@
-"""Recordings: made (``write``), read (``read``), and played as if they were devices (``playback``)."""
+"""Recordings: written (``write``), read (``read``), and played as if they were devices (``playback``)."""

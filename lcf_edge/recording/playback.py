@@ -1,8 +1,8 @@
-"""A recording as camera, IMU and odometry: its pictures and samples come again at the pace at which they were made.
+"""A recording as camera, IMU and odometry: its frames and samples are delivered at the pace of the recording.
 
-All devices that are opened on one recording with one clock share a ``Playback``: they start together, whoever opens
-them in whichever thread, and stay aligned to the nanosecond. At its end a recording begins again, an average interval
-between pictures later, with stamps and numbers that go on. It begins anew when nobody has it open any more.
+All devices opened on one recording with one clock share a ``Playback``: they start together, from whichever thread they
+are opened, and stay aligned to the nanosecond. At its end a recording begins again, one average frame interval later,
+with stamps and numbers that go on. Once all devices are closed, it starts anew.
 """
 
 import random
@@ -27,15 +27,15 @@ MAX_WAIT_S = 0.25  # of one read
 _ON_TIME_NS = 2_000_000
 _STALL_S = 1.0
 _NAMES: dict[type, str] = {ImuSample: "inertial samples", SpeedSample: "speeds"}
-_MAX_WAITING = {Frame: 4, ImuSample: 4096, SpeedSample: 4096}  # that wait for their reader; the oldest give way
+_MAX_WAITING = {Frame: 4, ImuSample: 4096, SpeedSample: 4096}  # for their reader; the oldest are dropped
 
 
 @dataclass
 class Faults:
     """Faults to simulate; may be changed at any time, also between two openings."""
 
-    drop: float = 0.0  # share of the records that get lost
-    jitter_s: float = 0.0  # a record comes up to this much after its time; its stamp stays true
+    drop: float = 0.0  # share of the records that are lost
+    jitter_s: float = 0.0  # largest delay of a record; its stamp stays true
     stalled: bool = False  # open, but nothing comes
     unplugged: bool = False  # reading fails, opening too
     seed: int = 0
@@ -59,12 +59,12 @@ class Playback:
         self._items: Iterator[Item] = iter(())
         self._lap = -1
         self._start_ns = clock.monotonic_ns()  # of the lap
-        self._span_ns: tuple[int, int] | None = None  # of the recording's stamps in the lap so far
-        self._frames, self._first_seq = 0, 0  # pictures in the lap so far, and in those before
+        self._span_ns: tuple[int, int] | None = None  # first and last stamp in the lap so far
+        self._frames, self._first_seq = 0, 0  # frames in the lap so far, and in those before
 
     @classmethod
     def join(cls, path: Path, config: Config, clock: Clock) -> "Playback":
-        """The playback that goes on, or a new one. Raises ``RecordingError``."""
+        """Return the running playback, or a new one. Raises ``RecordingError``."""
         key = (path.resolve(), id(clock))
         with cls._lock_of_all:
             if key not in cls._playing:
@@ -73,15 +73,15 @@ class Playback:
             return cls._playing[key]
 
     def leave(self) -> None:
-        """The counterpart of ``join``."""
+        """Undo a ``join``."""
         with self._lock_of_all:
             self._users -= 1
             for key in [key for key, playback in self._playing.items() if playback is self and not self._users]:
                 del self._playing[key]
 
     def next(self, kind: type[Record]) -> tuple[int, Record]:
-        """The next record of a kind and when it comes, by the clock, ns. Raises ``RecordingError``: there is none."""
-        with self._turn:  # in turn: a camera that is late, and asks again at once, does not keep out the others
+        """Return the next record of a kind and when it is due, ns. Raises ``RecordingError`` if there is none."""
+        with self._turn:  # fair: a late camera that asks again at once does not lock out the others
             self._lock.acquire()
         try:
             lap = self._lap
@@ -96,7 +96,7 @@ class Playback:
             self._lock.release()
 
     def _advance(self) -> None:
-        """Put the recording's next item to those that wait for their reader, or begin again."""
+        """Queue the recording's next item for its reader, or begin again."""
         item = next(self._items, None)
         if item is None:
             self._begin_lap()
@@ -124,9 +124,9 @@ class Playback:
 
 
 class _Recorded(Generic[Record]):
-    """One kind of a recording's records as a device, from the moment on in which it is opened.
+    """One kind of a recording's records as a device, from the moment at which it is opened.
 
-    ``counts``: ``dropped`` by the fault of that name; of a camera ``overtaken``, as the real one counts it.
+    ``counts``: ``dropped`` by the fault of that name; of a camera also ``overtaken``, as a real one counts it.
     """
 
     kind: type[Record]
@@ -154,7 +154,7 @@ class _Recorded(Generic[Record]):
             raise WrongDeviceError(f"{path}: no {_NAMES[self.kind]} in this recording; name another one, or none")
 
     def read(self) -> Sequence[Record]:
-        """What has come since; nothing after ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """Return the records since the last call; empty after ``MAX_WAIT_S``. Raises ``DriverError``."""
         if self.faults.unplugged or self._playback is None:
             raise DeviceLostError(f"{self.name}: unplugged; plug it in again")
         if self.faults.stalled:
@@ -174,7 +174,7 @@ class _Recorded(Generic[Record]):
                 records.append(self._next[1])
             self._next = None
             if now_ns - due_ns < _ON_TIME_NS:
-                break  # the next is not due, and to ask for it is to decode it while this one waits
+                break  # the next is not due; asking for it would decode it while this one waits
         return list(records)
 
     def close(self) -> None:
@@ -184,7 +184,7 @@ class _Recorded(Generic[Record]):
             self._playback = None
 
     def _due_ns(self) -> int:
-        """When the next record comes; what came before the device was opened is passed over."""
+        """Return when the next record is due, ns; records from before the opening are skipped."""
         assert self._playback is not None
         while self._next is None:
             try:
@@ -204,12 +204,12 @@ class _Recorded(Generic[Record]):
 
 
 class RecordedCamera(_Recorded[Frame]):
-    """The pictures of a recording; the newest wins, as with the real driver."""
+    """The images of a recording; the newest wins, as with the real driver."""
 
     kind = Frame
 
     def read(self) -> Sequence[Frame]:
-        """The newest picture; nothing after ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """The newest image; nothing after ``MAX_WAIT_S``. Raises ``DriverError``."""
         frames = super().read()
         self.counts["overtaken"] += len(frames[:-1])
         return frames[-1:]

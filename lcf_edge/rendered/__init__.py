@@ -2,5 +2,5 @@
 
 ``scenes`` is the entry. It rests on ``drives`` (what a drive is), ``layouts``, ``lookalikes``, ``placing`` and ``plan``
 (the kinds of drive), ``trajectory`` (how the vehicle moves), ``projection`` (what appears where), ``textures`` and
-``rendering`` (pictures) and ``truth`` (time to contact, misses, threats).
+``rendering`` (images) and ``truth`` (time to contact, misses, threats).
 """

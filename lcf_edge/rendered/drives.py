@@ -1,7 +1,7 @@
 """What a rendered drive is: vehicle motion, camera, sensors and the boxes that stand and move in the world.
 
 World axes: x right, y down, z forward at the start; the ground is y = 0. Headings turn left positive, in
-rad, and are 0 along z. Times are seconds from the first picture.
+rad, and are 0 along z. Times are seconds from the first image.
 """
 
 import math
@@ -17,7 +17,7 @@ LensModel = Literal["none", "radial-tangential", "equidistant"]
 Axis = Literal["pitch", "roll", "yaw", "heave"]
 
 START_NS = 1_700_000_000_000_000_000
-"""Stamp of the first picture, ns."""
+"""Stamp of the first image, ns."""
 
 
 def stamp_ns(time_s: float) -> int:
@@ -148,14 +148,14 @@ class Shadow:
 
 @dataclass(frozen=True, slots=True)
 class Lens:
-    """The camera: pinhole with an optional distortion of the finished picture (OpenCV's coefficients)."""
+    """The camera: pinhole with an optional distortion of the finished image (OpenCV's coefficients)."""
 
     width: int = 640
     height: int = 480
     focal_px: float = 500.0
     model: LensModel = "none"
     distortion: tuple[float, ...] = ()
-    vignetting: float = 0.0  # light lost in the picture's corners, 0..1
+    vignetting: float = 0.0  # light lost in the image's corners, 0..1
 
     @property
     def matrix(self) -> Floats:
@@ -196,7 +196,7 @@ class Drive:
     exposure_s: float = 0.0  # motion blur over this time
     readout_s: float = 0.0  # from the first row to the last, the stamp in the middle (rolling shutter)
     shadows: tuple[Shadow, ...] = ()
-    sharpening: float = 0.0  # by the camera: this times what a smoother picture lacks is added
+    sharpening: float = 0.0  # by the camera: this times what a smoother image lacks is added
     camera_height_m: float = 0.5
     camera_pitch_rad: float = 0.0  # positive: looks up
     ground: Paint = Paint(0)
@@ -204,6 +204,6 @@ class Drive:
     lamps: tuple[Lamp, ...] = ()
     ceiling_m: float = 3.0  # where they hang
     gloss: float = 0.0  # share of their light that the floor mirrors
-    own_parts: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of the vehicle in the picture, px
+    own_parts: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of the vehicle in the image, px
     half_width_m: float = 0.6  # of the vehicle
     horizon_s: float = 4.0  # contact later than this is no threat yet

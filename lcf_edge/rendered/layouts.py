@@ -195,7 +195,7 @@ def make(
     """The drive of a kind and a seed.
 
     By default 8 s at 20 frames/s; `slow_rover`, 5 cm/s as in the paper, lasts 30 s at 3 frames/s. Raises
-    ValueError on an unknown kind, a negative seed, or a drive without a picture.
+    ValueError on an unknown kind, a negative seed, or a drive without an image.
     """
     if kind not in _KINDS:
         raise ValueError(f"unknown kind of drive {kind!r}; one of {', '.join(KINDS)}")

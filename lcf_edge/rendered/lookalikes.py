@@ -73,12 +73,12 @@ def _dark_crossing(plan: Plan) -> None:
 
 
 def _fast_crossing(plan: Plan) -> None:
-    """A car crosses so fast that it leaps 50 to 100 px from picture to picture."""
+    """A car crosses so fast that it leaps 50 to 100 px from image to image."""
     _crossing_car(plan, "fast_car", (6.0, 10.0), lambda: plan.paint(0.3))
 
 
 def _own_bumper(plan: Plan) -> None:
-    """The vehicle's own front fills the foot of the picture, and a rod rises from it."""
+    """The vehicle's own front fills the foot of the image, and a rod rises from it."""
     plan.cruise(1.2, 2.8)
     width, height = plan.drive.lens.width, plan.drive.lens.height
     left, middle, right = (height * plan.between(0.78, 0.88) for _ in range(3))

@@ -31,7 +31,7 @@ class Surface:
 
 @dataclass(frozen=True)
 class Placed:
-    """A box that is in the picture."""
+    """A box that is in the image."""
 
     number: int  # among the drive's boxes
     box: Box
@@ -49,9 +49,9 @@ class View:
 
 
 class Optics:
-    """From camera axes to the pinhole canvas, and from the canvas to the finished picture.
+    """From camera axes to the pinhole canvas, and from the canvas to the finished image.
 
-    The canvas is the picture itself, or, with a distorting lens, a larger one that the lens looks at.
+    The canvas is the image itself, or, with a distorting lens, a larger one that the lens looks at.
     """
 
     def __init__(self, lens: Lens) -> None:
@@ -77,7 +77,7 @@ class Optics:
         return np.asarray(flat, dtype=np.float64)[:, 0]
 
     def distorted(self, points: Floats) -> Floats:
-        """Where the finished picture shows points (n, 2) px of the canvas."""
+        """Where the finished image shows points (n, 2) px of the canvas."""
         if self._map is None:
             return points
         rays = (points - self.matrix[:2, 2]) / self.lens.focal_px
@@ -90,14 +90,14 @@ class Optics:
         return np.asarray(shown, dtype=np.float64)[:, 0]
 
     def finish(self, canvas: Image) -> Image:
-        """The picture behind the lens."""
+        """The image behind the lens."""
         if self._map is None:
             return canvas
         columns, rows = self._map
         return np.asarray(cv2.remap(canvas, columns, rows, cv2.INTER_LINEAR), dtype=np.uint8)
 
     def surfaces(self, corners: Floats, across: Floats, down: Floats) -> list[Surface | None]:
-        """Rectangles by one corner and two sides (n, 3), camera axes in m; None: not in the picture."""
+        """Rectangles by one corner and two sides (n, 3), camera axes in m; None: not in the image."""
         points = corners[:, None] + _UNIT[:, :1] * across[:, None] + _UNIT[:, 1:] * down[:, None]
         homographies = self.matrix @ np.stack([across, down, corners], axis=2)
         before = points[..., 2] >= NEAR_M

@@ -1,7 +1,7 @@
-"""Pictures of a drive: far to near, each surface warped through its homography onto its bounding region.
+"""Images of a drive: far to near, each surface warped through its homography onto its bounding region.
 
 Shrinking is anti-aliased: box faces keep a pyramid with independent levels across and along, chosen by the
-face's foreshortening; the ground is drawn in bands of distance with three lines a picture row.
+face's foreshortening; the ground is drawn in bands of distance with three lines an image row.
 """
 
 import math
@@ -58,7 +58,7 @@ class _Skin:
 
 
 class Renderer:
-    """Draws the pictures of one drive; keeps its textures."""
+    """Draws the images of one drive; keeps its textures."""
 
     def __init__(self, stage: Stage) -> None:
         drive = stage.drive
@@ -82,7 +82,7 @@ class Renderer:
         self._grain = np.rint(grain).astype(np.int16)
 
     def image(self, view: View) -> Image:
-        """The next picture (height, width); exposure starts at the view's time."""
+        """The next image (height, width); exposure starts at the view's time."""
         drive = self._drive
         exposed = self._read_out(view) if drive.readout_s else self._optics.finish(self._canvas(view))
         if drive.exposure_s > 0:

@@ -1,4 +1,4 @@
-"""Rendered drives with exact truth: pictures, inertial samples, odometry; in memory or as EuRoC/ASL folder.
+"""Rendered drives with exact truth: images, inertial samples, odometry; in memory or as EuRoC/ASL folder.
 
 `make` draws a drive of a kind from a seed, `frames` renders it, `write` puts it into a folder that the
 replay reads.
@@ -42,11 +42,11 @@ __all__ = [
 IMU_HZ = 200.0
 ODOMETRY_HZ = 50.0
 
-_MARGIN_S = 0.1  # the inertial samples begin before the first picture and end after the last
+_MARGIN_S = 0.1  # the inertial samples begin before the first image and end after the last
 
 
 def frames(drive: Drive) -> Iterator[tuple[Frame, Truth]]:
-    """Pictures (height, width) uint8 with their truth, in order of time."""
+    """Images (height, width) uint8 with their truth, in order of time."""
     stage = Stage(drive)
     renderer = Renderer(stage)
     for seq, view in enumerate(_views(stage)):
@@ -66,7 +66,7 @@ def _views(stage: Stage) -> Iterator[View]:
 
 
 def imu(drive: Drive) -> list[ImuSample]:
-    """Inertial samples at 200 Hz, camera axes, from 0.1 s before the first picture to after the last."""
+    """Inertial samples at 200 Hz, camera axes, from 0.1 s before the first image to after the last."""
     times, trajectory, noise = _sensor_times(drive, IMU_HZ), Trajectory(drive), drive.noise
     random = np.random.default_rng([drive.seed, 1])
     gyro = trajectory.gyro(times) + noise.gyro_bias_radps

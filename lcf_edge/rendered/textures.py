@@ -1,4 +1,4 @@
-"""Surfaces made from a seed: grey pictures with marks that have real corners at several scales."""
+"""Surfaces made from a seed: grey images with marks that have real corners at several scales."""
 
 from functools import cache
 

@@ -1,4 +1,4 @@
-"""What is where, exactly: boxes in the picture, time to contact, miss, threat; geometry, not pictures."""
+"""What is where, exactly: boxes in the image, time to contact, miss, threat; geometry, not images."""
 
 import math
 from collections.abc import Sequence
@@ -24,11 +24,11 @@ _MAX_S = 12.0  # lateral misses are predicted this far, or to the horizon
 
 @dataclass(frozen=True, slots=True)
 class ObjectTruth:
-    """One object in one picture."""
+    """One object in one image."""
 
     id: int  # its place among the drive's boxes
     name: str
-    box: Bounds  # x, y, w, h in px of the picture, clipped to it
+    box: Bounds  # x, y, w, h in px of the image, clipped to it
     visible: float  # share of its area that nothing nearer hides
     depth_m: float  # of its nearest corner before the camera, along the vehicle's heading
     ttc_s: float  # to the camera plane with the present relative speed, inf: never
@@ -38,7 +38,7 @@ class ObjectTruth:
 
     @property
     def in_sight(self) -> bool:
-        """Large enough in the picture, and not mostly hidden."""
+        """Large enough in the image, and not mostly hidden."""
         return self.visible >= MIN_VISIBLE and min(self.box[2:]) >= MIN_BOX_PX
 
     @property
@@ -146,7 +146,7 @@ def passages_of(
 
 
 def visible_shares(view: View, optics: Optics) -> list[tuple[float, Bounds | None]]:
-    """Of each placed box: the share of its area in the picture that is not hidden, and its bounds."""
+    """Of each placed box: the share of its area in the image that is not hidden, and its bounds."""
     width, height = optics.size
     order = np.zeros((height // 2, width // 2), dtype=np.uint16)
     alone = np.zeros_like(order)
@@ -172,7 +172,7 @@ def _fill(mask: npt.NDArray[np.uint16], placed: Placed, value: int) -> None:
 
 
 def _bounds(placed: Placed, optics: Optics) -> Bounds | None:
-    """x, y, w, h in px of the finished picture, clipped to it."""
+    """x, y, w, h in px of the finished image, clipped to it."""
     left, top, right, bottom = _outer(placed)
     if optics.lens.model != "none":
         outlines = np.concatenate([_edge_points(surface.outline) for _, surface in placed.faces])

@@ -15,7 +15,7 @@ class SinkError(LcfError):
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> None:
-    """Refuse an output before work begins, without touching what the file may hold.
+    """Refuse an output before work begins, without touching an existing file.
 
     Raises ``UsageError`` when the name does not end in one of ``suffixes``, ``SinkError`` when the file
     cannot be written.
@@ -33,5 +33,5 @@ def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> None:
 
 
 def cannot_write(path: Path | str, error: OSError) -> SinkError:
-    """The error of a file that cannot be written."""
+    """Return the error for a file that cannot be written."""
     return SinkError(f"{path}: cannot be written ({error.strerror}); name another file or free the disk")

@@ -1,8 +1,8 @@
-"""Text as a mask, in one size, put together from a picture of its letters.
+"""Text as a mask, in one size, put together from an image of the letters.
 
-OpenCV 5 would write as well, but its fonts cost the process 8 MiB. ``letters.png`` holds printable ASCII as OpenCV
+OpenCV 5 could draw text too, but its fonts take 8 MiB of memory. ``letters.png`` holds printable ASCII as OpenCV
 draws it: a white dot in the first row begins each letter, which reaches ``_OVERLAP_PX`` into its neighbours. The sign ±
-is made of them, and the zero, which has a stroke there that makes it look like Ø.
+is composed of them, and so is the zero, whose stroke in OpenCV's font makes it look like Ø.
 """
 
 from functools import cache

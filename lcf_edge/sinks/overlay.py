@@ -2,7 +2,7 @@
 
 Left, the Line expert: corners (yellow dots), those omitted by ψ (red dots), estimated normal edges (blue
 squares), λ groups (green lines from each edge to the group's centre), ψ (yellow circles and rectangles).
-Right, what becomes of it: objects (boxes with class, time to contact and its standard deviation; orange: will probably
+Right, the results: objects (boxes with class, time to contact and its standard deviation; orange: will probably
 be met, blue: will not; thin and dashed: not seen in this frame), C_n (green circles), C_r (red circles; those of no
 object with cause and time to contact), rebel edges (red squares), the focus of expansion (white cross). Own parts that
 the configuration masks are hatched in both. The caption names each in its colour.
@@ -44,12 +44,12 @@ _PROBABLY = 0.5
 
 def draw(image: npt.NDArray[np.uint8], scene: PipelineScene, view: View) -> Image:
     """The two panels of one frame: (h, w) luminance in, (h, 2w, 3) blue, green, red out."""
-    base = cv2.cvtColor(cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR)  # dimmed: the marks stand out
+    base = cv2.cvtColor(cv2.convertScaleAbs(image, alpha=0.75), cv2.COLOR_GRAY2BGR)  # dimmed: marks stand out
     width = image.shape[1]
     panels = np.concatenate((base, base), axis=1).astype(np.uint8, copy=False)
     left, right = panels[:, :width], panels[:, width:]
     for panel, paint in ((left, _line_expert), (right, _found)):
-        own = np.ascontiguousarray(panel)  # nothing drawn in one panel spills over into the other
+        own = np.ascontiguousarray(panel)  # a copy, so that nothing spills over into the other panel
         _hatch(own, view.own_parts)
         paint(own, scene, view)
         panel[...] = own
@@ -98,7 +98,7 @@ def _found(panel: Image, scene: PipelineScene, view: View) -> None:
     for thing in urgent_first[::-1]:
         _box(panel, thing)
     taken: list[_Box] = []
-    for thing in urgent_first:  # which has the best place
+    for thing in urgent_first:  # the most urgent gets the best place
         around = (thing["x"], thing["y"], thing["width"] / 2, thing["height"] / 2)
         is_met = thing["probability"] >= _PROBABLY
         _beside(panel, _object_label(thing), around, taken, _colour(thing), needed=is_met)
@@ -129,12 +129,12 @@ def _colour(thing: np.void) -> Colour:
 
 
 def _box(panel: Image, thing: np.void) -> None:
-    """Two px and whole for what is seen, else one px and dashed; dark beside the line, for a bright picture."""
+    """Draw a box: 2 px and solid if seen, else 1 px and dashed; with a dark border, for bright images."""
     half = np.array((thing["width"], thing["height"]), np.float64) / 2
     middle = np.array((thing["x"], thing["y"]), np.float64)
     if not (np.isfinite(half) & np.isfinite(middle)).all():
         return
-    beyond = _DASH_PX + _GAP_PX  # of the picture: a side out there is not to be seen
+    beyond = _DASH_PX + _GAP_PX  # of the image: a side farther out is invisible
     rows, columns = panel.shape[:2]
     limits = np.array((columns, rows)) + beyond
     (left, top), (right, bottom) = (np.clip(corner, -beyond, limits) for corner in (middle - half, middle + half))
@@ -149,7 +149,7 @@ def _box(panel: Image, thing: np.void) -> None:
 
 
 def _dashes(start: npt.NDArray[np.float64], end: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
-    """(n, 2, 2) px: pieces of a line."""
+    """Return the dashes of a line, (n, 2, 2) px."""
     length_px = float(np.hypot(*(end - start)))
     along = np.arange(0.0, max(length_px, 1.0), _DASH_PX + _GAP_PX)
     shares = np.stack((along, np.minimum(along + _DASH_PX, length_px)), axis=1) / max(length_px, 1.0)
@@ -166,7 +166,7 @@ def _object_label(thing: np.void) -> str:
 
 
 def _hatch(panel: Image, parts: tuple[npt.NDArray[np.float32], ...]) -> None:
-    """Own parts: hatched, with an outline."""
+    """Hatch and outline own parts."""
     if not parts:
         return
     rows, columns = panel.shape[:2]
@@ -186,7 +186,7 @@ def _label(circle: np.void) -> str:
 
 
 def _fixed_point(points: npt.NDArray[np.floating]) -> npt.NDArray[np.int32]:
-    """(n, k, 2) px to OpenCV's fixed point, without shapes that have a point not finite or far outside."""
+    """Convert shapes, (n, k, 2) px, to OpenCV's fixed point, without those with points not finite or far outside."""
     seen = (np.abs(points) < _FARTHEST_PX).all(axis=(1, 2))  # NaN compares false
     fixed: npt.NDArray[np.int32] = np.round(points[seen] * (1 << _FRACTION_BITS)).astype(np.int32)
     return fixed
@@ -220,9 +220,9 @@ def _beside(
     *,
     needed: bool = True,
 ) -> None:
-    """Write beside what has its middle and half its extent at ``around`` (x, y, across, down; px).
+    """Write a label beside something: ``around``: its middle and half extent (x, y, across, down; px).
 
-    Inside the picture, and where no other label stands; where there is no such place, only what is ``needed``.
+    It is placed inside the image and away from other labels; without such a place, only if it is ``needed``.
     """
     if not np.less(np.abs(around), _FARTHEST_PX).all():
         return
@@ -256,7 +256,7 @@ def _overlap(a: _Box, b: _Box) -> bool:
 
 
 def _write(panel: Image, letters: Mask, left_top: tuple[int, int], colour: Colour) -> None:
-    """Text with a dark halo; what would lie outside the picture is cut."""
+    """Text with a dark halo; what would lie outside the image is cut."""
     letters = np.pad(letters, _HALO_PX)
     left, top = (max(at - _HALO_PX, 0) for at in left_top)
     place = panel[top : top + letters.shape[0], left : left + letters.shape[1]]

@@ -42,7 +42,7 @@ def encode_line(scene: PipelineScene) -> bytes:
 
 
 def sent_fields(scene: Scene) -> dict[str, Any]:
-    """Return the part of a line that also a scene that came over Zenoh has; unknown numbers are NaN or infinite."""
+    """Return the part of a line that is also sent over Zenoh; unknown numbers are NaN or infinite."""
     return {
         "stamp_ns": scene.stamp_ns,
         "seq": scene.seq,
@@ -54,7 +54,7 @@ def sent_fields(scene: Scene) -> dict[str, Any]:
 
 
 def _columns(table: np.ndarray[Any, np.dtype[np.void]]) -> dict[str, list[Any]]:
-    """Each field of a table as a list of Python numbers, floats with 3 decimals."""
+    """Return each field of a table as a list of Python numbers, floats with 3 decimals."""
     names = table.dtype.names or ()
     return {
         name: (np.round(table[name].astype(np.float64), 3) if table[name].dtype.kind == "f" else table[name]).tolist()
@@ -75,7 +75,7 @@ def _objects(scene: Scene) -> list[dict[str, Any]]:
 
 
 def _circles_of_objects(scene: PipelineScene) -> dict[int, list[int]]:
-    """Return the circles of each object, as far as it is known which they are."""
+    """Return the ids of the circles of each object, as far as known."""
     circles: dict[int, list[int]] = {}
     for circle, owner in zip(scene.circles["id"].tolist(), scene.circle_objects.tolist(), strict=False):
         circles.setdefault(owner, []).append(circle)

@@ -1,4 +1,4 @@
-"""The paper's last figure: rows in use of each table, frame by frame, against a map of everything."""
+"""The paper's last figure: rows in use of each table, frame by frame, against the corners of a map."""
 
 import importlib.util
 from collections.abc import Callable
@@ -50,10 +50,10 @@ class SizePlot(Sink):
         self._sizes.append(scene.sizes)
 
     def close(self) -> None:
-        """Draw and write the picture, if there were frames; 1400×800 px as PNG. Raises ``SinkError``."""
+        """Draw and write the plot, if there were frames; 1400×800 px as PNG. Raises ``SinkError``."""
         if not self._sizes:
             return
-        # Here, so that only a plot pays for Matplotlib's memory.
+        # Imported here, because Matplotlib takes much memory.
         from matplotlib.backends.backend_agg import FigureCanvasAgg  # noqa: PLC0415
         from matplotlib.figure import Figure  # noqa: PLC0415
         from matplotlib.ticker import FuncFormatter  # noqa: PLC0415
@@ -100,7 +100,7 @@ class SizePlot(Sink):
 
 
 def _spread(heights: npt.NDArray[np.float64], least_gap: float) -> npt.NDArray[np.float64]:
-    """Heights from 0 up, neighbours pushed apart, each by half, until ``least_gap`` lies between them."""
+    """Return heights from 0 up, with neighbours pushed apart to at least ``least_gap``."""
     order = np.argsort(heights, kind="stable")
     placed = heights[order]
     for _ in range(200):

@@ -1,7 +1,7 @@
 """A video of the overlay that a browser plays.
 
-PyAV writes it: of OpenCV's own writer browsers play only VP8 and VP9, for which it takes no options, so that they
-become several times as large and take half a second a picture.
+PyAV writes it: of the formats of OpenCV's own writer, browsers play only VP8 and VP9, for which it takes no options, so
+that files are several times as large and each frame takes half a second.
 """
 
 import importlib.util
@@ -25,13 +25,13 @@ _CODECS: dict[str, tuple[str, dict[str, str]]] = {
     ".webm": ("libvpx-vp9", {"deadline": "realtime", "cpu-used": "8", "row-mt": "1", "crf": "42", "b": "0"}),
     ".mp4": ("libx264", {"preset": "veryfast", "crf": "27", "movflags": "+faststart"}),
 }
-"""Encoder of each suffix, and its options: as fast as the filter on a small computer, small before beautiful."""
+"""Encoder of each suffix, and its options: as fast as the filter on a small computer, favouring size over quality."""
 
 SUFFIXES = tuple(_CODECS)
 
 
 class VideoSink(Sink):
-    """A video at ``frames_per_s``, as large as its first picture: VP9 in ``.webm``, H.264 in ``.mp4``.
+    """A video at ``frames_per_s``, as large as its first image: VP9 in ``.webm``, H.264 in ``.mp4``.
 
     The codecs want even sizes: an odd last row or column is cut. Raises ``UsageError`` when PyAV is missing or the
     name ends in neither, ``SinkError`` when the file cannot be written.
@@ -53,8 +53,8 @@ class VideoSink(Sink):
         self.write(draw(frame.image, scene, view()))
 
     def write(self, image: Image) -> None:
-        """Append one picture. Raises ``SinkError``."""
-        from av import FFmpegError, VideoFrame  # noqa: PLC0415  # only a video pays for its memory
+        """Append one image. Raises ``SinkError``."""
+        from av import FFmpegError, VideoFrame  # noqa: PLC0415  # loaded only for a video
 
         rows, columns = (side // 2 * 2 for side in image.shape[:2])
         try:

@@ -1,6 +1,6 @@
 """The scene in messages that other programs know: Foxglove, RViz, Nav2 and every node of ROS 2.
 
-Each file has one message as a pure function, from a scene to the bytes of its CDR. What is ROS's follows ROS: metres,
-x ahead, y left and z up on the vehicle (REP-103), frames by their usual names (REP-105), and in the camera's optical
-frame x right, y down and z ahead. Objects whose range is not known have no place, and are left out of what is a place.
+Each file has one message as a pure function, from a scene to its CDR. Conventions are those of ROS: metres, x ahead, y
+left and z up on the vehicle (REP-103), frames by their usual names (REP-105), and in the camera's optical frame x
+right, y down and z ahead. Objects of unknown range have no position, and are left out of messages with positions.
 """

@@ -7,7 +7,7 @@ MESSAGE = "tf2_msgs/msg/TFMessage"
 
 
 def encode_camera_transform(stamp_ns: int, setup: Setup) -> bytes:
-    """From ``base_frame`` to the camera's optical frame. Raises ``CdrError``."""
+    """Encode the transform from ``base_frame`` to the camera's optical frame. Raises ``CdrError``."""
     writer = Writer()
     writer.scalars("I", 1)
     writer.header(stamp_ns, setup.base_frame)

@@ -14,7 +14,7 @@ _NO_POSE = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
 
 
 def encode_detections_2d(scene: Scene, setup: Setup) -> bytes:
-    """Each box, px of the input frame; class by its name, score: its share of the most trust. Raises ``CdrError``."""
+    """Encode each box, px of the input frame; class by name, score: trust / largest trust. Raises ``CdrError``."""
     writer = Writer()
     writer.header(scene.stamp_ns, setup.frame_id)
     writer.scalars("I", len(scene.objects))
@@ -27,7 +27,7 @@ def encode_detections_2d(scene: Scene, setup: Setup) -> bytes:
 
 
 def encode_detections_3d(scene: Scene, setup: Setup) -> bytes:
-    """Those objects whose range is known, m in the camera's optical frame; as deep as wide. Raises ``CdrError``."""
+    """Encode objects of known range, m in the camera's optical frame, as deep as wide. Raises ``CdrError``."""
     objects = placed(scene.objects)
     writer = Writer()
     writer.header(scene.stamp_ns, setup.frame_id)
@@ -51,7 +51,7 @@ def _hypothesis(writer: Writer, thing: np.void, most_trust: float, middle: Float
 
 
 def _covariance(thing: np.void, middle: Floats) -> Floats:
-    """(6, 6): of the place, m²; how it is turned is not known, which ROS writes as zeros."""
+    """(6, 6): of the position, m²; the orientation is unknown, which ROS writes as zeros."""
     ahead = middle[2]
     spreads = [(middle / ahead, thing["range_sigma"])]  # along the line of sight
     spreads.append((np.array((ahead * (1 + (middle[0] / ahead) ** 2), 0.0, 0.0)), thing["bearing_sigma"]))

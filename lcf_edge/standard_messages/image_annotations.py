@@ -1,4 +1,4 @@
-"""``foxglove_msgs/msg/ImageAnnotations``: circles, ψ and objects, to be drawn over the picture.
+"""``foxglove_msgs/msg/ImageAnnotations``: circles, ψ and objects, to be drawn over the image.
 
 Foxglove's pixels begin at the upper left corner of the first one; ours have their centres at whole numbers.
 """
@@ -42,15 +42,15 @@ Label = tuple[float, float, str, Colour]
 def encode_image_annotations(scene: Scene) -> bytes:
     """Normal circles green, rebels red, ψ yellow; objects orange (will probably be met) or light blue, with text.
 
-    The stamp is that of the scene and comes first, as in messages that begin with a header. What has no finite place
-    is left out. Raises ``CdrError``.
+    The stamp is that of the scene and comes first, as in messages that begin with a header. What has no finite
+    position is left out. Raises ``CdrError``.
     """
     rings, boxes, labels = _shapes(scene)
     writer = Writer()
     writer.stamp(scene.stamp_ns)
     writer.scalars("I", len(rings))
     for x, y, radius, colour, thickness in rings:
-        writer.scalars("iI", 0, 0)  # the stamp of the whole counts
+        writer.scalars("iI", 0, 0)  # the stamp of the whole message counts
         writer.scalars("12d", x + CENTRE_PX, y + CENTRE_PX, 2 * radius, thickness, *NOTHING, *colour)
         writer.scalars("I", 0)  # metadata: none
     writer.scalars("I", len(boxes))
@@ -100,16 +100,16 @@ def _shapes(scene: Scene) -> tuple[list[Ring], list[Box], list[Label]]:
 
 
 def _somewhere(table: npt.NDArray[np.void], names: tuple[str, ...]) -> npt.NDArray[np.void]:
-    """Rows of which all these numbers are finite."""
+    """Return the rows in which all these numbers are finite."""
     return np.asarray(table[np.logical_and.reduce([np.isfinite(table[name]) for name in names])])
 
 
 def _rows(table: npt.NDArray[np.void], *names: str) -> Iterator[tuple[Any, ...]]:
-    """These fields of each row, as Python's own numbers."""
+    """Return these fields of each row, as Python numbers."""
     return zip(*(table[name].tolist() for name in names), strict=True)
 
 
 def _in_a_box(circle: np.void, objects: npt.NDArray[np.void]) -> bool:
-    """Whether an object says what there is to say of the place."""
+    """Whether a circle lies in the box of an object, which has its own label."""
     across, down = np.abs(objects["x"] - circle["x"]), np.abs(objects["y"] - circle["y"])
     return bool(((2 * across <= objects["width"]) & (2 * down <= objects["height"])).any())

@@ -20,7 +20,7 @@ PROBABLY = 0.5
 
 
 def colour_of(thing: np.void) -> Colour:
-    """Orange for what will probably be met."""
+    """Return orange for what will probably be met, else light blue."""
     return ORANGE if thing["probability"] >= PROBABLY else LIGHT_BLUE
 
 
@@ -30,7 +30,7 @@ def class_name(thing: np.void) -> str:
 
 
 def object_label(thing: np.void) -> str:
-    """Class, and what is known of time to contact and range: ``crossing 2.1 ±0.2 s 3.2 m``."""
+    """Return class, time to contact and range, as far as known: ``crossing 2.1 ±0.2 s 3.2 m``."""
     name = "object" if thing["class_id"] == ObjectClass.UNKNOWN else class_name(thing).replace("_", " ")
     spread = f" ±{thing['ttc_sigma']:.1f}" if np.isfinite(thing["ttc_sigma"]) else ""
     contact = f" {thing['ttc']:.1f}{spread} s" if np.isfinite(thing["ttc"]) else ""
@@ -38,7 +38,7 @@ def object_label(thing: np.void) -> str:
 
 
 def circle_label(circle: np.void) -> str:
-    """Why it is a rebel, and its time to contact: ``incoming 1.3 s``."""
+    """Return cause and time to contact: ``incoming 1.3 s``."""
     cause = Cause(circle["cause"])
     name = "rebel" if cause is Cause.NONE else cause.name.lower()
     return f"{name} {circle['ttc']:.1f} s" if np.isfinite(circle["ttc"]) else name

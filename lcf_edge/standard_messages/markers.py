@@ -18,7 +18,7 @@ ARROW_M = (0.05, 0.12, 0.15)  # thickness of the shaft, of the head, length of t
 
 _ARROW, _CUBE, _TEXT = 0, 1, 9
 _ADD, _DELETE_ALL = 0, 3
-_SLOWEST_MPS = 0.05  # that has an arrow
+_SLOWEST_MPS = 0.05  # least speed with an arrow
 
 
 class _Marker(NamedTuple):
@@ -36,9 +36,9 @@ class _Marker(NamedTuple):
 
 
 def encode_markers(scene: Scene, setup: Setup) -> bytes:
-    """First a marker that removes those of before; then for each object whose range is known box, text and velocity.
+    """Encode a marker that removes earlier ones, then box, text and velocity of each object of known range.
 
-    An arrow is as long as the way of one second over ground. Raises ``CdrError``.
+    An arrow is as long as the path of one second over ground. Raises ``CdrError``.
     """
     markers = [_Marker("", 0, _CUBE, _DELETE_ALL)]
     objects = placed(scene.objects)
@@ -80,7 +80,7 @@ def _write(writer: Writer, marker: _Marker, stamp_ns: int, frame_id: str) -> Non
         writer.scalars("3d", *point)
     writer.scalars("I", 0)  # a colour of each point: none
     writer.string("")  # texture: none,
-    writer.header(0, "")  # nor a picture of it
+    writer.header(0, "")  # nor an image of it
     writer.string("")
     writer.octets(b"")
     writer.scalars("I", 0)  # with places in it

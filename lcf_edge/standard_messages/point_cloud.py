@@ -1,8 +1,8 @@
 """``sensor_msgs/msg/PointCloud2``: what will probably be met, as a source for Nav2's obstacle layer.
 
-The points of an object lie across its box, so close that no cell of a costmap between them stays empty. Behind all of
-them, ``CLEAR_M`` ahead, lies a row of points over the whole width of the picture, level with the camera: an obstacle
-layer marks nothing that far, but clears the way to it, so that what is gone leaves the map.
+The points of an object lie across its box, so close that no cell of a costmap between them stays empty. Behind them,
+``CLEAR_M`` ahead, is a row of points over the whole width of the image, level with the camera: an obstacle layer marks
+nothing that far, but clears the way up to them, so that what is gone leaves the map.
 """
 
 import numpy as np
@@ -28,7 +28,7 @@ _FLOAT32 = 7
 
 
 def encode_point_cloud(scene: Scene, setup: Setup) -> bytes:
-    """In the camera's optical frame. Raises ``CdrError``."""
+    """Encode the points in the camera's optical frame. Raises ``CdrError``."""
     points = cloud(scene, setup)
     writer = Writer()
     writer.header(scene.stamp_ns, setup.frame_id)
@@ -48,7 +48,7 @@ def encode_point_cloud(scene: Scene, setup: Setup) -> bytes:
 
 
 def cloud(scene: Scene, setup: Setup) -> npt.NDArray[np.void]:
-    """The points, as ``POINT``."""
+    """Return the points, as ``POINT``."""
     met = placed(scene.objects[scene.objects["probability"] >= PROBABLY])
     parts = [_clearing(setup)]
     for thing, middle, size in zip(met, positions(met), sizes(met, setup.lens), strict=True):

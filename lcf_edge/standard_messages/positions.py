@@ -12,7 +12,7 @@ from lcf_edge.lens import Lens
 Floats = npt.NDArray[np.float64]
 
 _OPTICAL_FROM_BODY = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
-"""Of a vector in x ahead, y left, z up that in x right, y down, z ahead."""
+"""(3, 3), turns a vector of x ahead, y left, z up into x right, y down, z ahead."""
 
 
 @dataclass(frozen=True)
@@ -49,8 +49,8 @@ class Setup:
 
     @cached_property
     def base_from_optical(self) -> Floats:
-        """(3, 3) rotation: of a vector in the optical frame that in ``base_frame``."""
-        # In x ahead, y left, z up looking up is a negative turn about y, looking to the right one about z.
+        """Return the rotation (3, 3) of vectors from the optical frame to ``base_frame``."""
+        # With x ahead, y left, z up, looking up is a negative rotation about y, looking right one about z.
         cy, sy = np.cos(-self.yaw_rad), np.sin(-self.yaw_rad)
         cp, sp = np.cos(-self.pitch_rad), np.sin(-self.pitch_rad)
         yaw = np.array([[cy, -sy, 0.0], [sy, cy, 0.0], [0.0, 0.0, 1.0]])
@@ -59,7 +59,7 @@ class Setup:
 
 
 def placed(objects: npt.NDArray[np.void]) -> npt.NDArray[np.void]:
-    """Those of which it is known where they are."""
+    """Return the objects whose position is known."""
     known = np.isfinite(objects["range"]) & np.isfinite(objects["bearing"]) & np.isfinite(objects["elevation"])
     return np.asarray(objects[known])
 
@@ -81,7 +81,7 @@ def sizes(objects: npt.NDArray[np.void], lens: Lens) -> Floats:
 def quaternion(rotation: Floats) -> tuple[float, float, float, float]:
     """x, y, z, w of a (3, 3) rotation matrix, w not negative."""
     (a, b, c), (d, e, f), (g, h, i) = rotation.tolist()
-    # Each row is the quaternion times four of its own components; the longest one is the most exact.
+    # Each row is the quaternion times four of its own components; the longest is the most accurate.
     rows = np.array(
         [
             (1 + a - e - i, b + d, c + g, h - f),

@@ -13,13 +13,13 @@ MESSAGE = "geometry_msgs/msg/TwistStamped"
 NAV2_MESSAGE = "nav2_msgs/msg/SpeedLimit"
 
 NAV2_STOP_MPS = 1e-3
-"""What Nav2 gets instead of 0, which would mean no limit."""
+"""m/s: sent to Nav2 instead of 0, which would mean no limit."""
 
 _EARLY_SIGMAS = 2.0
 
 
 def speed_limit_mps(scene: Scene, horizon_s: float) -> float:
-    """The present speed, reduced so far that the first contact comes after ``horizon_s``; infinite: nothing is met.
+    """Return the present speed, reduced so that the first contact comes after ``horizon_s``; infinite: no contact.
 
     Contacts are taken two sigmas early. 0 where the time to contact or the vehicle's own speed is not known.
     """

@@ -1,6 +1,6 @@
 """What a daemon that listens only on this machine accepts from others: what it needs, and nothing else.
 
-Every local process can connect. It may read all that the daemon publishes, ask it, and tell the speed; it cannot send
+Every local process can connect. It may read all that the daemon publishes, query it, and send the speed; it cannot send
 scenes, answers or tokens to others through the daemon, nor fill its memory with large messages.
 """
 
@@ -11,11 +11,11 @@ from lcf_edge.config import Publish, Zenoh
 from lcf_edge.zenoh_link.topics import STANDARD
 
 MAX_MESSAGE_BYTES = 2**14
-"""What comes in larger in parts is dropped before it is put together: a speed takes less than 1 kB."""
+"""Larger incoming messages are dropped before their parts are put together: a speed takes less than 1 kB."""
 
 
 def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
-    """Of Zenoh, as JSON by key, where no file of the user's own says better.
+    """Return settings of Zenoh, as JSON by key, to be used unless the user's file has others.
 
     A daemon that connects to routers, is one, or speaks to ROS 2 routes for others as well, by keys that it cannot
     know: there are no rules then.

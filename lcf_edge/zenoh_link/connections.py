@@ -1,9 +1,9 @@
 """Who is connected, and how much of the daemon's memory each is charged with.
 
 Zenoh keeps what peers declare, has no limit for it, and does not say who declared what. So whenever the memory of the
-process has grown, those connections over TCP are charged with it that have brought something meanwhile, each by its
-share, but none with more than its bytes can have caused. Unix sockets do not tell how much they brought: what TCP
-leaves unexplained is laid to all of them alike.
+process has grown, the TCP connections that have brought something meanwhile are charged with it, each by its share, but
+with no more than its bytes can have caused. Unix sockets do not count bytes: what TCP leaves unexplained is charged to
+all of them alike.
 """
 
 import os
@@ -21,11 +21,11 @@ _TCP_INFO_BYTES = 192
 _RECEIVED = slice(128, 136)  # tcpi_bytes_received of struct tcp_info, linux/tcp.h
 
 Connection = int
-"""The number of its socket in the system."""
+"""The inode number of its socket."""
 
 
 class Connections:
-    """Those that others have made to this process. Of all, since the beginning: ``charged_mib``, ``received_bytes``."""
+    """The connections that others have made to this process. Totals of all: ``charged_mib``, ``received_bytes``."""
 
     def __init__(self) -> None:
         self.charged_mib = 0.0
@@ -34,7 +34,7 @@ class Connections:
         self._charges_mib: dict[Connection, float] = {}
 
     def charge(self, grown_mib: float) -> None:
-        """Look at what each has brought since the last call, while the memory grew by so much (0: it did not)."""
+        """Charge connections by what each has brought since the last call, while memory grew by that much (0: not)."""
         try:
             received = {number: _bytes_received(one) for number, one in _accepted()}
         except OSError:  # no descriptor is left to look with: the next look counts this one's
@@ -63,7 +63,7 @@ class Connections:
         with suppress(OSError):  # no descriptor is left to look with
             for number, one in _accepted():
                 if number in guilty:
-                    with suppress(OSError):  # it has just gone by itself
+                    with suppress(OSError):  # it has just ended by itself
                         one.shutdown(socket.SHUT_RDWR)
                     cut += 1
                     del self._charges_mib[number]
@@ -84,13 +84,13 @@ def _accepted() -> Iterator[tuple[Connection, socket.socket]]:
 
 
 def _place(one: socket.socket) -> int | str | bytes:
-    """Where it was connected to: a port, or the path of a Unix socket."""
+    """Return what it was connected to: a port, or the path of a Unix socket."""
     name: tuple[str, int] | str | bytes = one.getsockname()
     return name[1] if isinstance(name, tuple) else name
 
 
 def _sockets() -> Iterator[socket.socket]:
-    for number in os.listdir(_DESCRIPTORS):  # noqa: PTH208  # done often: as paths it would take twice the time
+    for number in os.listdir(_DESCRIPTORS):  # noqa: PTH208  # called often; pathlib takes twice the time
         one = _stream_socket(number)
         if one is not None:
             with one:
@@ -98,7 +98,7 @@ def _sockets() -> Iterator[socket.socket]:
 
 
 def _stream_socket(number: str) -> socket.socket | None:
-    """A copy of a descriptor, where it is one."""
+    """Return a copy of a descriptor if it is a stream socket, else None."""
     try:
         if not os.readlink(f"{_DESCRIPTORS}/{number}").startswith("socket:"):  # noqa: PTH115
             return None

@@ -39,9 +39,9 @@ _COUNTED = (
 class Link:
     """Publishes, listens and answers on one session, which it closes at the end.
 
-    No method waits for a peer or raises because of one; what went wrong is in ``counts``. Each ``put`` may have a
+    No method waits for a peer or raises because of one; failures are counted in ``counts``. Each ``put`` may have a
     thread of its own. ``reopen``: opens another session like the first, for ``renew``. ``lens_for``: gives the lens of
-    the pictures. Raises ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
+    the images. Raises ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """
 
     def __init__(
@@ -56,7 +56,7 @@ class Link:
         self._config_text = shown(config)
         self._reopen = reopen
         self._lens_for = lens_for
-        self._own: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))  # all keys at once: read while it counts
+        self._own: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))  # all keys at once: read meanwhile
         self._closed: Counter[str] = Counter()  # by sessions that are closed
         self._connections = Connections()
         self._parts: _Parts | None = None
@@ -76,16 +76,16 @@ class Link:
         return 0 if parts is None else parts.sessions
 
     def charge(self, grown_mib: float) -> None:
-        """Lay growth of the process's memory, since the last call, to those who have sent something meanwhile."""
+        """Charge growth of the process's memory since the last call to peers that have sent something meanwhile."""
         self._connections.charge(grown_mib)
 
     @property
     def charged_mib(self) -> float:
-        """What was laid to peers so far."""
+        """What was charged to peers so far, MiB."""
         return self._connections.charged_mib
 
     def cut(self, charge_mib: float) -> int:
-        """Cut connections to which that much or more is laid. Return how many."""
+        """Cut connections that are charged with that much, MiB, or more. Return how many."""
         number = self._connections.cut(charge_mib)
         self._own["connections cut"] += number
         return number
@@ -122,7 +122,7 @@ class Link:
             self._send("messages", lambda parts: parts.messages.put_transform(stamp_ns))
 
     def has_preview_subscriber(self) -> bool:
-        """Somebody looks at previews, and the next one is due by ``publish.preview_hz``. Takes 2 µs."""
+        """Whether somebody subscribes to previews, and the next is due by ``publish.preview_hz``. Takes 2 µs."""
         parts = self._parts
         return parts is not None and parts.preview.has_subscriber
 
@@ -139,18 +139,18 @@ class Link:
         return [] if parts is None or parts.speed is None else parts.speed.take()
 
     def show_config(self, config: Config) -> None:
-        """What ``query/config`` answers from now on."""
+        """Set the answer of ``query/config``."""
         self._config, self._config_text = config, shown(config)
         if self._parts is not None:
             self._parts.messages.config = config
 
     def close(self) -> None:
-        """Listen and answer no more, then close the session; 1.2 s at most, may be called twice."""
+        """Stop listening and answering, then close the session; 1.2 s at most, may be called twice."""
         if self._parts is not None:
             self._parts.close()
 
     def _send(self, part: str, put: Callable[["_Parts"], object]) -> None:
-        """Counts what does not fit its message, or has no session, instead of raising it."""
+        """Within, count data that do not fit a message, or a missing session, instead of raising."""
         parts = self._parts
         if parts is None:
             self._own[f"{part} failed"] += 1
@@ -185,7 +185,7 @@ class _Parts:
         publish = config.publish
         self._session = session
         try:
-            self._ros2 = ros2 = Ros2Node(session, publish) if publish.ros2 else None  # there while it is kept
+            self._ros2 = ros2 = Ros2Node(session, publish) if publish.ros2 else None  # lives as long as this reference
             self.scene = ScenePublisher(session, publish, ros2)
             self.preview = PreviewPublisher(session, publish, ros2)
             self.diagnostics = DiagnosticsPublisher(session, publish, ros2)
@@ -198,7 +198,7 @@ class _Parts:
 
     @property
     def counts(self) -> Counter[str]:
-        """Of all, by part."""
+        """Counts of all parts, by part."""
         parts: dict[str, Counter[str]] = {
             "scene": self.scene.counts,
             "preview": self.preview.counts,
@@ -222,7 +222,7 @@ class _Parts:
             return 0
 
     def close(self) -> None:
-        """Listen and answer no more, then close the session."""
+        """Stop listening and answering, then close the session."""
         self._queryables.close()
         if self.speed is not None:
             self.speed.close()

@@ -1,4 +1,4 @@
-"""Previews: frames with the overlay drawn, only while somebody watches, after everything else."""
+"""Previews: frames with the overlay drawn, only while somebody subscribes, at the lowest priority."""
 
 import time
 
@@ -20,7 +20,7 @@ PREVIEW = ZenohTopic(
 
 
 class PreviewPublisher:
-    """Puts JPEG pictures on ``<prefix>/preview/compressed``, at most ``publish.preview_hz`` of them a second."""
+    """Puts JPEG images on ``<prefix>/preview/compressed``, at most ``publish.preview_hz`` of them a second."""
 
     def __init__(self, session: zenoh.Session, publish: config.Publish, ros2: Ros2Node | None = None) -> None:
         self._frame_id = publish.frame_id
@@ -31,13 +31,13 @@ class PreviewPublisher:
 
     @property
     def has_subscriber(self) -> bool:
-        """Somebody subscribes, and the last preview was long enough ago."""
+        """Whether somebody subscribes, and the next preview is due."""
         if self._pause_ns is None:
             return False
         due = self._last_ns is None or time.monotonic_ns() - self._last_ns >= self._pause_ns
         return due and self._publisher.matched
 
     def put(self, jpeg: bytes, stamp_ns: int) -> None:
-        """Send one picture, taken at ``stamp_ns`` of the system clock."""
+        """Send one image, taken at ``stamp_ns`` of the system clock."""
         self._last_ns = time.monotonic_ns()
         self._publisher.put(encode_compressed_image(stamp_ns, self._frame_id, "jpeg", jpeg))

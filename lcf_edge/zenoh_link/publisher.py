@@ -19,7 +19,7 @@ ATTACHMENT = struct.Struct("<qqB16s")
 """Attachment of rmw_zenoh, 33 bytes: sequence number, source time (ns), length of the gid (16), gid."""
 
 LATEST_NS = 2**63 - 1
-"""The last moment, in April 2262, that an attachment can tell; a clock that is beyond it stands still there."""
+"""The last time, in April 2262, that an attachment can hold, ns; later times are clamped to it."""
 
 
 class MessagePublisher:
@@ -33,7 +33,7 @@ class MessagePublisher:
         self, session: zenoh.Session, publish: config.Publish, topic: ZenohTopic, ros2: Ros2Node | None = None
     ) -> None:
         self.key = topic.key(publish.prefix)
-        self.counts: Counter[str] = Counter(sent=0, failed=0)  # all keys at once: read while it counts
+        self.counts: Counter[str] = Counter(sent=0, failed=0)  # all keys at once: read meanwhile
         if set("*$#?") & set(publish.prefix) or not publish.prefix:
             raise PublishError(f"publish.prefix: {publish.prefix!r}: a key to publish on has no wildcards")
         endpoints = [Endpoint(self.key, gid_of(f"{session.zid()}/{self.key}"))]
@@ -56,7 +56,7 @@ class MessagePublisher:
 
     @property
     def matched(self) -> bool:
-        """Somebody subscribes."""
+        """Whether somebody subscribes."""
         status: list[Any] = [publisher.matching_status for publisher in self._publishers]
         return any(one.matching for one in status)
 

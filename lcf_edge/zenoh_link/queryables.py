@@ -8,8 +8,8 @@ from typing import Any
 
 import zenoh
 
-CAPACITY = 16  # queries that wait; of more, the newest
-ENDING_S = 0.2  # of the thread, unless who asked does not listen
+CAPACITY = 16  # queries that wait; of more, the newest are kept
+ENDING_S = 0.2  # for the thread's end, unless a client does not listen
 
 Answer = Callable[[], tuple[bytes, str] | str]
 """A payload and its encoding, or why there is none."""
@@ -36,7 +36,7 @@ class Queryables:
         self._thread.start()
 
     def close(self) -> None:
-        """Answer no more; may be called twice."""
+        """Stop answering; may be called twice."""
         with suppress(zenoh.ZError):  # it was closed before
             self._queryable.undeclare()
         with self._changed:
@@ -61,7 +61,7 @@ class Queryables:
                     return
                 query = self._waiting.popleft()
             self._answer(query)
-            del query  # or it ends with the next one
+            del query  # else it would end only with the next one
 
     def _answer(self, query: zenoh.Query) -> None:
         """Its end, with that of the last name for it, tells the client that no more answers come."""
@@ -72,13 +72,13 @@ class Queryables:
 
 
 def _reply(query: zenoh.Query, key: zenoh.KeyExpr, answer: tuple[bytes, str] | str) -> str:
-    """What became of it, as it is counted."""
+    """Reply to a query. Return the outcome, as it is counted."""
     try:
         if isinstance(answer, str):
             query.reply_err(answer)
             return "refused"
         payload, encoding = answer
         query.reply(key, payload, encoding=zenoh.Encoding(encoding))
-    except zenoh.ZError:  # who asked has gone
+    except zenoh.ZError:  # the client has gone
         return "failed"
     return "answered"

@@ -30,7 +30,7 @@ TYPE_HASHES = {
 """REP-2011 hashes of the message definitions; they change with any field, and with nothing else."""
 
 _NODE_ID = 0
-_BEST_EFFORT_DEPTH_1 = "2::,1:,:,:,,"  # what is not written is the default: volatile, keep last, …
+_BEST_EFFORT_DEPTH_1 = "2::,1:,:,:,,"  # omitted fields have defaults: volatile, keep last, …
 _LASTING_DEPTH_1 = ":1:,1:,:,:,,"  # reliable, transient local
 
 EndpointKind = Literal["MP", "MS"]
@@ -56,7 +56,7 @@ def dds_type(message: str) -> str:
 
 
 class Ros2Node:
-    """The node ``/lcf_edge_<robot>``, there for as long as this object and its session.
+    """The node ``/lcf_edge_<robot>``, which exists as long as this object and its session.
 
     Raises ``PublishError`` when ``publish.prefix`` is no name for a ROS topic.
     """
@@ -73,7 +73,7 @@ class Ros2Node:
         self._tokens = [session.liveliness().declare_token(self._token(_NODE_ID, "NN"))]
 
     def declare(self, kind: EndpointKind, topic: str, message: str, *, is_lasting: bool = False) -> Endpoint:
-        """Tell of a publisher or a subscription. ``is_lasting``: a late subscriber wants the last message."""
+        """Announce a publisher or a subscription. ``is_lasting``: a late subscriber wants the last message."""
         type_name, type_hash = dds_type(message), self._hash or TYPE_HASHES[message]
         name = f"/{topic}".replace("/", "%")
         endpoint = f"{name}/{type_name}/{type_hash}/{_LASTING_DEPTH_1 if is_lasting else _BEST_EFFORT_DEPTH_1}"

@@ -23,7 +23,7 @@ def scene_key(prefix: str) -> str:
 class ScenePublisher:
     """Puts each scene on ``<prefix>/scene``, and with ``publish.ros2`` on its ROS 2 topic.
 
-    A liveliness token ``<prefix>/@alive/<robot>`` says that it is there. It lives as long as its session. ``ros2``:
+    A liveliness token ``<prefix>/@alive/<robot>`` shows that it is there. It lives as long as its session. ``ros2``:
     the node to which the topic belongs; None with ``publish.ros2`` on: its own. ``latest``: the last payload. Raises
     ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """
@@ -31,7 +31,7 @@ class ScenePublisher:
     def __init__(self, session: zenoh.Session, publish: config.Publish, ros2: Ros2Node | None = None) -> None:
         self.latest: bytes | None = None
         self._frame_id = publish.frame_id
-        self._ros2 = Ros2Node(session, publish) if ros2 is None and publish.ros2 else ros2  # there while it is kept
+        self._ros2 = Ros2Node(session, publish) if ros2 is None and publish.ros2 else ros2  # kept alive here
         self._publisher = MessagePublisher(session, publish, SCENE, self._ros2)
         self.key, self.counts = self._publisher.key, self._publisher.counts
         if set("*$#?") & set(publish.robot) or not publish.robot:
@@ -43,7 +43,7 @@ class ScenePublisher:
 
     @property
     def sent(self) -> int:
-        """Scenes that went out."""
+        """Number of scenes that were sent."""
         return self.counts["sent"]
 
     def put(self, scene: Scene) -> int:

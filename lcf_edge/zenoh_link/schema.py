@@ -1,4 +1,4 @@
-"""The definition of the scene, with all that it is made of, as ``ros2msg`` (the notation of MCAP and rosbag2)."""
+"""The definition of the scene, with its nested types, as ``ros2msg`` (the notation of MCAP and rosbag2)."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ _STANDARD = {
 
 
 def scene_schema() -> str:
-    """``Scene.msg``, and behind it each message that it names."""
+    """Return ``Scene.msg``, followed by each message that it names."""
     ours = {f"lcf_msgs/{name}": _definition(name) for name in ("Circle", "PsiRegion", "Object")}
     parts = [_definition("Scene")]
     parts += [f"MSG: {name}\n{text}" for name, text in {**ours, **_STANDARD}.items()]

@@ -20,10 +20,10 @@ from lcf_edge.zenoh_link import admission
 CLOSING_S = 1.0  # a frozen peer would hold up the closing for 10 s
 
 MAX_MESSAGE_BYTES = 2**20
-"""What comes in larger is dropped before it is put together; nothing that is published is this large."""
+"""Larger incoming messages are dropped before they are put together; nothing that is published is this large."""
 
 MAX_SESSIONS = 32
-"""With others; each takes some 160 kB. Zenoh does not report whom it refuses."""
+"""Largest number of sessions; each takes some 160 kB. Zenoh does not report whom it refuses."""
 
 _UNLESS_THE_FILE_SAYS = {
     "scouting/multicast/enabled": "false",
@@ -31,15 +31,15 @@ _UNLESS_THE_FILE_SAYS = {
     "transport/shared_memory/enabled": "false",
     "transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES),
     "transport/unicast/max_sessions": str(MAX_SESSIONS),
-    "transport/unicast/accept_timeout": "2000",  # ms; who connects and says nothing takes one of 100 places
+    "transport/unicast/accept_timeout": "2000",  # ms; a silent connection takes one of 100 places
 }
 
 
 def open_session(options: config.Zenoh, publish: config.Publish | None = None) -> zenoh.Session:
     """Open a session; close it with ``close_session``, or use ``opened_session``.
 
-    ``options.config_file`` is read first; the keys go on top of it, where an empty list leaves the file's. ``publish``:
-    what a daemon publishes, which then takes in what it needs and nothing else; None: whatever comes. Raises
+    ``options.config_file`` is read first; the keys override it, but an empty list leaves the file's. ``publish``:
+    what a daemon publishes, which then accepts only what it needs; None: accept everything. Raises
     ``PublishError`` that names the endpoint or the file.
     """
     settings = _settings(options, admission.settings(options, publish) if publish else {})
@@ -73,7 +73,7 @@ def opened_session(options: config.Zenoh) -> Iterator[zenoh.Session]:
 
 
 def reason(error: zenoh.ZError) -> str:
-    """The innermost reason, without the places in Zenoh's own source."""
+    """Return the innermost reason, without positions in Zenoh's source."""
     text = re.sub(r"\s+at /\S+", "", str(error)).replace("\n", " ")
     inner = re.search(r"\[([^\]]+ \(os error \d+\))", text)
     return (inner[1] if inner else text).strip(" .!]")
@@ -93,7 +93,7 @@ def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Confi
     settings.insert_json5("scouting/gossip/enabled", json.dumps(options.gossip))
     settings.insert_json5("mode", json.dumps(options.mode))
     for name, endpoints in (("connect", options.connect), ("listen", options.listen)):
-        for wrong in filter(None, map(fault, endpoints)):  # Zenoh would try to connect to it for ever
+        for wrong in filter(None, map(fault, endpoints)):  # Zenoh would try to connect to it forever
             raise PublishError(f"zenoh.{name}: {wrong}")
         key = f"{name}/endpoints"
         if endpoints or settings.get_json(key) == untouched.get_json(key):  # else Zenoh listens on all interfaces
@@ -108,7 +108,7 @@ def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Confi
 
 
 def _insert(settings: zenoh.Config, key: str, value: str) -> None:
-    """Raises ``PublishError`` for the prefix, which is all in it that can be wrong."""
+    """Insert a setting. Raises ``PublishError`` for the prefix, the only part that can be invalid."""
     try:
         settings.insert_json5(key, value)
     except zenoh.ZError as error:
@@ -116,7 +116,7 @@ def _insert(settings: zenoh.Config, key: str, value: str) -> None:
 
 
 def _remedy(error: zenoh.ZError, options: config.Zenoh) -> str:
-    """Zenoh's message as one line that says what to do."""
+    """Return Zenoh's message as one line that says what to do."""
     bound = re.search(r"bound to ([^\s,\]]+):", str(error))
     endpoint = bound[1] if bound else ", ".join(options.listen + options.connect) or options.config_file
     if "Address already in use" in str(error):

@@ -58,14 +58,14 @@ class SpeedInput:
             self._subscribers.append(session.declare_subscriber(f"{ros2.domain}/{key}/*/*", receive))
 
     def take(self) -> list[tuple[int, SpeedSample]]:
-        """What arrived since the last call, oldest first: when (monotonic, ns), and the sample in the sender's time."""
+        """Return what arrived since the last call, oldest first: arrival (monotonic, ns), and the sample as stamped."""
         with self._lock:
             samples = list(self._samples)
             self._samples.clear()
         return samples
 
     def close(self) -> None:
-        """Listen no more; may be called twice."""
+        """Stop listening; may be called twice."""
         for subscriber in self._subscribers:
             with suppress(zenoh.ZError):  # it was closed before
                 subscriber.undeclare()
@@ -109,7 +109,7 @@ class SpeedInput:
 
 
 def _announced(sample: zenoh.Sample) -> str:
-    """The type that the sender gives the sample, in its encoding or as rmw_zenoh in its key; empty: none."""
+    """Return the type that the sender states, in the encoding or, with rmw_zenoh, in the key; empty: none."""
     part = str(sample.key_expr).split("/")[-2:]
     if "::" in part[0]:
         return part[0]

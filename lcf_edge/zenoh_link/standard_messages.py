@@ -1,6 +1,6 @@
-"""Messages that other programs know, beside the scene: each on by a key of ``publish``, made while somebody listens.
+"""Messages that other programs know, beside the scene: each has a key of ``publish``, made while somebody subscribes.
 
-The camera's place goes out once a second, so that who comes later learns it too.
+The camera's place goes out once a second, so that late subscribers get it too.
 """
 
 from collections import Counter
@@ -35,7 +35,7 @@ from lcf_edge.zenoh_link.topics import (
 )
 
 LensFor = Callable[[Config, int, int], Lens]
-"""The lens of pictures of a width and height, px."""
+"""The lens of images of a width and height, px."""
 
 _OF_A_SCENE: tuple[tuple[Callable[[Publish], bool], ZenohTopic, Callable[[Scene, Setup], bytes]], ...] = (
     (lambda on: on.annotations, ANNOTATIONS, lambda scene, _: image_annotations.encode_image_annotations(scene)),
@@ -46,11 +46,11 @@ _OF_A_SCENE: tuple[tuple[Callable[[Publish], bool], ZenohTopic, Callable[[Scene,
     (lambda on: on.speed_limit, SPEED_LIMIT, speed_limit.encode_speed_limit),
     (lambda on: on.speed_limit, NAV2_SPEED_LIMIT, speed_limit.encode_nav2_speed_limit),
 )
-"""What turns it on, where it goes, how it is made."""
+"""The key that turns it on, its topic, and how it is made."""
 
 
 def lens_by_config(config: Config, width: int, height: int) -> Lens:
-    """What the configuration says of it. Raises ``ConfigError``."""
+    """Return the lens by the configuration. Raises ``ConfigError``."""
     return Lens.from_config(config.camera, width, height)
 
 
@@ -81,7 +81,7 @@ class StandardMessages:
 
     @property
     def counts(self) -> Counter[str]:
-        """What happened so far."""
+        """Counts so far."""
         publishers = [publisher for publisher, _ in self._publishers]
         counts = Counter(sent=0, failed=0)
         for publisher in publishers if self._transform is None else [*publishers, self._transform]:
@@ -89,7 +89,7 @@ class StandardMessages:
         return counts
 
     def put(self, scene: Scene) -> None:
-        """Send what somebody listens to. Raises ``CdrError``, ``ConfigError`` where the lens does not fit."""
+        """Send what somebody subscribes to. Raises ``CdrError``, ``ConfigError`` where the lens does not fit."""
         for publisher, encode in self._publishers:
             if publisher.matched:
                 publisher.put(encode(scene, self._setup_for(scene.image_width, scene.image_height)))

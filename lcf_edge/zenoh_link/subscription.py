@@ -14,7 +14,7 @@ from lcf_edge.zenoh_link.session import close_session, open_session, reason
 
 
 def reading_from(endpoint: str, config_file: str = "") -> config.Zenoh:
-    """The session of somebody who only reads: it waits for a daemon or a router at ``endpoint``.
+    """Return the options of a session that only reads: it waits for a daemon or a router at ``endpoint``.
 
     It is of mode "router", a leaf since it listens nowhere: a router hands a peer nothing from other peers, and a
     client cannot wait.
@@ -25,7 +25,7 @@ def reading_from(endpoint: str, config_file: str = "") -> config.Zenoh:
 class Scenes(Iterator[Scene]):
     """An iterator over scenes that waits for the next one. Close it, or let it go.
 
-    ``key``: of the last scene, which tells the rover where the subscription is to several. ``broken`` counts payloads
+    ``key``: of the last scene, which says whose it is if several rovers match. ``broken`` counts payloads
     that were no scene; they are skipped.
     """
 

@@ -23,9 +23,9 @@ class ZenohTopic:
     message: str  # "lcf_msgs/msg/Scene"
     priority: zenoh.Priority
     express: bool = False
-    largest_bytes: int = 2**17  # of what is taken for one; a scene has some 60 a circle
+    largest_bytes: int = 2**17  # of a payload; a scene has some 60 a circle
     is_global: bool = False  # not under the prefix
-    is_lasting: bool = False  # for ROS 2: who comes later wants the last one
+    is_lasting: bool = False  # for ROS 2: late subscribers get the last one
 
     def key(self, prefix: str) -> str:
         """The key of its samples."""
@@ -37,7 +37,7 @@ class ZenohTopic:
         return f"application/cdr;{self.message}"
 
     def payload(self, sample: zenoh.Sample) -> bytes:
-        """Of one that came. Raises ``CdrError`` for what is larger than any of this topic."""
+        """Return the payload of a sample. Raises ``CdrError`` if it is larger than any of this topic."""
         if len(sample.payload) > self.largest_bytes:
             raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
         return sample.payload.to_bytes()

@@ -1,4 +1,4 @@
-"""Two cameras on one computer, as docs/install.md says: ``lcf-edge@front`` and ``lcf-edge@rear``."""
+"""Two cameras on one computer, each with its instance of the unit, as in docs/several-cameras.md."""
 
 from collections.abc import Iterator
 

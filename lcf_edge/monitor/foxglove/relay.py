@@ -1,6 +1,6 @@
 """A WebSocket server for Foxglove that passes on what a daemon publishes, byte by byte, with its definitions.
 
-What is drawn over the picture it makes of the scenes itself, so that it costs the daemon nothing. It subscribes to a
+It draws the annotations from the scenes itself, so that they cost the daemon nothing. It subscribes to a
 topic only while a client of it does. Clients can read and nothing else.
 """
 
@@ -25,7 +25,7 @@ from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 from lcf_edge.zenoh_link.topics import ANNOTATIONS, STANDARD, ZenohTopic
 
-BACKLOG = 64  # messages that wait for a client which takes nothing: 3 s of scenes; of more, the oldest are dropped
+BACKLOG = 64  # messages that wait for a slow client, 3 s of scenes; then the oldest are dropped
 
 RELAYED = (SCENE, DIAGNOSTICS, PREVIEW, *STANDARD)
 
@@ -33,7 +33,7 @@ RELAYED = (SCENE, DIAGNOSTICS, PREVIEW, *STANDARD)
 class Relay(ServerListener):
     """Serves at ``host``:``port`` (0: any) until it is closed.
 
-    ``broken`` counts payloads that were not what their key promises; they are not passed on. Raises ``PublishError``
+    ``broken`` counts payloads that do not match their key; they are not passed on. Raises ``PublishError``
     for an invalid address, ``LcfError`` when the port cannot be listened to.
     """
 
@@ -41,10 +41,10 @@ class Relay(ServerListener):
         self.broken = 0
         self._prefix = address.prefix
         self._lock = threading.Lock()
-        self._clients: Counter[str] = Counter()  # of each topic
+        self._clients: Counter[str] = Counter()  # number, by topic
         self._subscribers: dict[str, Any] = {}
-        foxglove.set_log_level(logging.CRITICAL)  # it has a line for whatever a client sends that is nonsense
-        self._context = context = foxglove.Context()  # there while it is kept
+        foxglove.set_log_level(logging.CRITICAL)  # it logs a line for any nonsense of a client
+        self._context = context = foxglove.Context()  # lives as long as this reference
         self._channels = {f"/{_key(topic, address)}": (topic, _channel(topic, address, context)) for topic in RELAYED}
         self._session = open_session(address.zenoh())
         try:
@@ -78,7 +78,7 @@ class Relay(ServerListener):
                     subscriber.undeclare()
 
     def close(self) -> None:
-        """Let the clients go, and the daemon."""
+        """Disconnect from clients and daemon."""
         self._server.stop()
         close_session(self._session)
 

@@ -7,14 +7,14 @@ from dataclasses import dataclass
 
 LENGTH_S = 30.0
 MAX_BYTES = {"scene": 4 * 2**20, "diagnostics": 2**20, "preview/compressed": 16 * 2**20}
-"""By topic: what is small must not be pushed out by pictures."""
+"""Bytes by topic, so that images do not push out what is small."""
 
 
 @dataclass(frozen=True, slots=True)
 class ReceivedMessage:
     """One payload of a topic."""
 
-    topic: str  # "scene"; behind the prefix of the keys
+    topic: str  # "scene": the key after the prefix
     received_ns: int  # system clock
     payload: bytes
 
@@ -40,7 +40,7 @@ class History:
             self._expire(message.received_ns)
 
     def messages(self, now_ns: int) -> list[ReceivedMessage]:
-        """What is not older than the length, in the order in which it came."""
+        """Return the messages of the last ``length_s``, in the order of arrival."""
         with self._lock:
             self._expire(now_ns)
             kept = [message for messages in self._kept.values() for message in messages]

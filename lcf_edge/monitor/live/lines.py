@@ -7,5 +7,5 @@ from lcf_edge.sinks.results import sent_fields
 
 
 def scene_fields(scene: Scene) -> dict[str, Any]:
-    """Return what a result line has, as far as it is sent, and the size of the picture."""
+    """Return the fields of a result line that are sent, and the size of the image."""
     return {**sent_fields(scene), "image_width": scene.image_width, "image_height": scene.image_height}

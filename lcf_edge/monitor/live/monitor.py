@@ -34,10 +34,10 @@ from lcf_edge.zenoh_link.scene import SCENE
 from lcf_edge.zenoh_link.session import close_session, open_session, reason
 from lcf_edge.zenoh_link.topics import ZenohTopic
 
-MAX_ROBOTS = 32  # of one prefix that are listed by name; where no rule forbids it, anybody can claim to be some
-MAX_NAME = 64  # characters of one
+MAX_ROBOTS = 32  # listed by name; without access rules, anybody can claim names
+MAX_NAME = 64  # characters of a name
 
-_JOINED = 64  # scenes among which that of a picture is looked for
+_JOINED = 64  # latest scenes, among which an image's scene is looked for
 _MAX_CONFIG_BYTES = 2**16
 _ANSWER_S = 5.0
 _FARTHEST = 1e3  # m and s
@@ -47,7 +47,7 @@ _PAUSE_NS = 1_000_000_000  # without scenes; then the rate begins anew
 class Presence(Enum):
     """Whether a daemon is there, by its liveliness token."""
 
-    SOUGHT = "sought"  # nobody was there yet
+    SOUGHT = "sought"  # not found yet
     THERE = "there"
     AWAY = "away"
 
@@ -63,7 +63,7 @@ class Preview:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """What a vehicle takes of the way ahead, by its configuration."""
+    """The part of the way ahead that a vehicle takes up, by its configuration."""
 
     half_width_m: float
     horizon_s: float
@@ -71,15 +71,15 @@ class Ahead:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Where a recording is, which is shown in place of a daemon; seconds after its first picture."""
+    """Where a recording is, which is shown in place of a daemon; seconds after its first image."""
 
     position_s: float
     length_s: float  # as far as it is known
     start_s: float  # of the part that is played
     playing: bool
     speed: float
-    alarms_s: tuple[float, ...]  # when each begins, as far as they are known
-    searched: bool  # all of them are
+    alarms_s: tuple[float, ...]  # beginning of each, as far as known
+    searched: bool  # whether all are known
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,21 +97,21 @@ class Snapshot:
     diagnostics: DiagnosticArray | None
     diagnostics_received_ns: int
     preview: Preview | None
-    broken: int  # payloads that were not what their key promises
+    broken: int  # payloads that do not match their key
     replay: Replay | None = None  # None: a daemon
     ahead: Ahead | None = None  # None: not known
 
     def scene_age_s(self, now_ns: int) -> float:
-        """Since the newest scene came; infinite: none yet."""
+        """Time since the newest scene came, s; infinite: none yet."""
         return math.inf if self.scene is None else max(now_ns - self.scene_received_ns, 0) / 1e9
 
 
 class Monitor:
-    """Subscribes to the daemon of ``address`` in Zenoh's threads, now or as soon as it is there, and again.
+    """Subscribes to the daemon of ``address`` in Zenoh's threads, now or once it is there, and again after a loss.
 
-    Previews come only while they are wanted (``switch_preview``): nobody draws them else. ``changed`` is called in
+    Previews come only while they are wanted (``switch_preview``); otherwise none are drawn. ``changed`` is called in
     those threads whenever something came; it must be quick. ``history`` keeps what came. Raises ``PublishError`` for
-    an address that is none.
+    an invalid address.
     """
 
     def __init__(
@@ -204,7 +204,7 @@ class Monitor:
 
     @contextmanager
     def _unless_broken(self) -> Iterator[None]:
-        """Take something in, and say that it came."""
+        """Take something in and report it; count what is broken."""
         with self._lock:
             self._version += 1
             try:
@@ -244,11 +244,11 @@ class Monitor:
             presence = Presence.THERE if self._robots else Presence.AWAY
             if presence is not self._presence:
                 self._presence, self._since_ns = presence, time.time_ns()
-                if presence is Presence.THERE:  # in a thread of its own: this one belongs to Zenoh, and must not wait
+                if presence is Presence.THERE:  # in its own thread: this one is Zenoh's, and must not wait
                     threading.Thread(target=self._ask_what_is_ahead, name="configuration", daemon=True).start()
 
     def _ask_what_is_ahead(self) -> None:
-        """One question to the daemon that has come; without an answer it stays unknown."""
+        """Ask a daemon that has appeared; without an answer it stays unknown."""
 
         def take(reply: zenoh.Reply) -> None:
             if reply.ok is not None and len(reply.ok.payload) <= _MAX_CONFIG_BYTES:
@@ -260,14 +260,14 @@ class Monitor:
             self._session.get(f"{self._prefix}/query/config", handler, timeout=_ANSWER_S)
 
     def _rate_hz(self, now_ns: int) -> float:
-        """0: they stopped."""
+        """Rate of scenes; 0: they stopped."""
         if self._scene is None or now_ns - self._scene_ns > _PAUSE_NS:
             return 0.0
         return self._intervals.rate_hz
 
 
 def _ahead(toml: bytes) -> Ahead | None:
-    """Out of a configuration; None: not in it."""
+    """Read it from a configuration; None: not in it."""
     try:
         vehicle = tomllib.loads(toml.decode())["vehicle"]
         half_width_m, horizon_s = float(vehicle["half_width_m"]), float(vehicle["horizon_s"])
@@ -279,7 +279,7 @@ def _ahead(toml: bytes) -> Ahead | None:
 
 
 def _latency_s(scene: Scene, sample: zenoh.Sample) -> float:
-    """By the sender's clock alone: the attachment has the time of sending."""
+    """Latency by the sender's clock alone, s: the attachment has the time of sending."""
     attachment = sample.attachment
     if attachment is None or len(attachment) != ATTACHMENT.size:
         return math.nan

@@ -1,4 +1,4 @@
-"""Figures of the last minutes: one point for each message of diagnostics, once a second."""
+"""Values of the last minutes: one point for each message of diagnostics, once a second."""
 
 import math
 import threading
@@ -46,7 +46,7 @@ class Point(msgspec.Struct, frozen=True):
 
     @classmethod
     def of(cls, at_ns: int, scene: Scene | None, rate_hz: float, diagnostics: DiagnosticArray) -> Self:
-        """The point of one message; ``scene``: the newest, None: there is none of now."""
+        """Return the point of one message; ``scene``: the newest one, None: there is no current one."""
         figures = Figures(diagnostics)
         rebels = None if scene is None else int((scene.circles["kind"] == Kind.REBEL).sum())
         return cls(
@@ -69,17 +69,17 @@ class Point(msgspec.Struct, frozen=True):
 
 @dataclass(frozen=True, slots=True)
 class Figures:
-    """Numbers out of the texts of a message; None: there is no such number."""
+    """Reads numbers from the texts of a message; None: there is no such number."""
 
     diagnostics: DiagnosticArray | None
 
     def text(self, device: str, name: str) -> str:
-        """A value as it was sent; empty: there is none."""
+        """Return a value as it was sent; empty: there is none."""
         statuses = self.diagnostics.status if self.diagnostics is not None else ()
         return next((status.values.get(name, "") for status in statuses if status.name == device), "")
 
     def number(self, device: str, name: str) -> float | None:
-        """A finite number."""
+        """Return a finite number; None: there is none."""
         try:
             value = float(self.text(device, name))
         except ValueError:
@@ -87,7 +87,7 @@ class Figures:
         return value if math.isfinite(value) else None
 
     def fill(self, table: str) -> tuple[int, int] | None:
-        """Rows in use of a table, and its capacity."""
+        """Return the rows in use of a table, and its capacity."""
         rows, _, capacity = self.text("pipeline", f"{table}_fill").partition("/")
         if not (rows.isdecimal() and capacity.isdecimal()) or max(len(rows), len(capacity)) > _MAX_DIGITS:
             return None
@@ -102,14 +102,14 @@ class Traces:
         self._lock = threading.Lock()
 
     def add(self, point: Point) -> None:
-        """Keep a point; the oldest makes room, and those that are later, since the clock was set back, go."""
+        """Keep a point; the oldest makes room; points that are later, because the clock was set back, are removed."""
         with self._lock:
             while self._points and self._points[-1].at_ns >= point.at_ns:
                 self._points.pop()
             self._points.append(point)
 
     def since(self, at_ns: int) -> list[Point]:
-        """Points later than that, oldest first; all when none is as late, since the clock was set back."""
+        """Return points later than that, oldest first; all points, if the clock was set back before it."""
         with self._lock:
             was_set_back = bool(self._points) and self._points[-1].at_ns < at_ns
             return [point for point in self._points if point.at_ns > at_ns or was_set_back]

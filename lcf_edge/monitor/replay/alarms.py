@@ -11,24 +11,24 @@ from lcf_edge.pipeline import run
 from lcf_edge.recording.pace import Pace
 from lcf_edge.recording.read import open_recording
 
-PROBABLY = 0.5  # that an object is met; then it is an alarm
-_APART_S = 0.5  # at least: what begins sooner after another is the same
+PROBABLY = 0.5  # least probability of being met for an alarm
+_APART_S = 0.5  # an alarm sooner after another counts as the same
 
 
 def met(scene: Scene) -> set[int]:
-    """The ids of what will probably be met."""
+    """Return the ids of objects that will probably be met."""
     return set(scene.objects["id"][scene.objects["probability"] >= PROBABLY].tolist())
 
 
 class Alarms:
-    """Looks through a recording in a thread of its own; what it found so far may be read at any time."""
+    """Searches a recording in a thread of its own; what it has found may be read at any time."""
 
     def __init__(self, path: Path, config: Config, pace: Pace) -> None:
         """Raises ``RecordingError``."""
         self._recording = open_recording(path, config)
         self._recording.start_s, self._recording.duration_s = pace.start_s, pace.duration_s
         self._config = config
-        self.found_s: tuple[float, ...] = ()  # when each begins, after the first picture
+        self.found_s: tuple[float, ...] = ()  # when each begins, after the first image
         self.searched_s = pace.start_s  # up to here
         self.done = False
         self._closing = threading.Event()
@@ -39,17 +39,17 @@ class Alarms:
         self._thread.start()
 
     def close(self) -> None:
-        """End, in the midst of it too."""
+        """Stop, even before the search is complete."""
         self._closing.set()
         if self._thread.ident is not None:
             self._thread.join()
 
     def before(self, at_s: float) -> float | None:
-        """The last one that begins before; None: there is none."""
+        """Return the last alarm before a position, s; None: there is none."""
         return max((found_s for found_s in self.found_s if found_s < at_s), default=None)
 
     def after(self, at_s: float) -> float | None:
-        """The first one that begins later; None: there is none yet."""
+        """Return the first alarm after a position, s; None: there is none yet."""
         return min((found_s for found_s in self.found_s if found_s > at_s), default=None)
 
     def _search(self) -> None:
@@ -67,6 +67,6 @@ class Alarms:
                 if self._closing.wait(0):
                     return
         except LcfError:
-            return  # the player comes upon it too, and reports it
+            return  # the player meets the same error, and reports it
         finally:
             self.done = True

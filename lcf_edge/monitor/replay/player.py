@@ -1,4 +1,4 @@
-"""Plays a recording through the pipeline, at a pace, and can be paused, sought in and stepped through."""
+"""Plays a recording through the pipeline, at a pace, and can pause, seek and step."""
 
 import math
 import threading
@@ -27,26 +27,26 @@ from lcf_edge.recording.pace import FASTEST, SLOWEST, Pace
 from lcf_edge.recording.read import open_recording
 from lcf_edge.sinks.overlay import draw
 
-WARM_UP_S = 2.0  # are filtered, and not shown, before the place that was sought
-ALARM_LEAD_S = 0.5  # an alarm is sought that much before it begins
-_PREVIEW_S = 0.1  # between two pictures while it plays
+WARM_UP_S = 2.0  # filtered but not shown before a position that is sought
+ALARM_LEAD_S = 0.5  # seeking an alarm goes this much before it
+_PREVIEW_S = 0.1  # between two images while it plays
 _POINT_S = 1.0  # of the recording between two points of the plots
-_LATE_S = 0.5  # then it goes on from here instead of hurrying
+_LATE_S = 0.5  # then it goes on from here instead of catching up
 _QUALITY = 80
 
 
 class Player:
     """A recording in place of a daemon: ``snapshot``, ``traces`` and ``switch_preview`` are those of a ``Monitor``.
 
-    Positions are seconds after the first picture. ``changed`` is called in the player's thread whenever another
-    picture is shown. Raises ``RecordingError`` for a recording without a usable picture in the part that is played,
+    Positions are seconds after the first image. ``changed`` is called in the player's thread whenever another
+    image is shown. Raises ``RecordingError`` for a recording without a usable image in the part that is played,
     ``ConfigError`` for tables that are larger than the memory budget.
     """
 
     def __init__(self, path: Path, config: Config, pace: Pace, *, changed: Callable[[], None] = lambda: None) -> None:
         self.traces = Traces()
         self.alarms = Alarms(path, config, pace)
-        self.failed: LcfError | None = None  # why it plays no more
+        self.failed: LcfError | None = None  # why it stopped
         self._ahead = Ahead(config.vehicle.half_width_m, config.vehicle.horizon_s)
         self._name = printable(path.name)
         self._config, self._pace, self._changed = config, pace, changed
@@ -55,9 +55,9 @@ class Player:
         self._condition = threading.Condition()
         self._sought_s: float | None = pace.start_s
         self._position_s = pace.start_s
-        self._due = 0  # pictures that are shown whether it plays or not
+        self._due = 0  # images to show even if it does not play
         self._playing, self._speed, self._loop = not pace.step, pace.speed or 1.0, pace.loop
-        self._anchor: tuple[float, float] | None = None  # monotonic time and position from which it has played
+        self._anchor: tuple[float, float] | None = None  # monotonic time and position where playing began, s
         self._preview_on = self._closing = False
         self._shown: tuple[Frame, PipelineScene, View] | None = None
         self._preview: Preview | None = None
@@ -68,7 +68,7 @@ class Player:
         self._thread = threading.Thread(target=self._run, name="player", daemon=True)
 
     def start(self) -> None:
-        """Begin to play, and to look for alarms."""
+        """Begin to play, and to search for alarms."""
         self._thread.start()
         self.alarms.start()
 
@@ -82,7 +82,7 @@ class Player:
             self._thread.join()
 
     def play(self, playing: bool) -> None:
-        """Go on, at the end from the beginning; or stand still."""
+        """Play, at the end from the beginning; or pause."""
         with self._changing():
             if not playing:
                 self._preview = None  # the last drawn may be an earlier one
@@ -91,23 +91,23 @@ class Player:
             self._playing, self._anchor = playing, None
 
     def step(self) -> None:
-        """Stand still at the next picture."""
+        """Pause at the next image."""
         with self._changing():
             self._playing = False
             self._due += 1
 
     def run_at(self, speed: float) -> None:
-        """Play so many times as fast as it was made; what is beyond ``SLOWEST`` and ``FASTEST`` is cut."""
+        """Play that many times as fast as it was recorded, limited to ``SLOWEST`` and ``FASTEST``."""
         with self._changing():
             self._speed, self._anchor = min(max(speed, SLOWEST), FASTEST), None
 
     def seek(self, at_s: float) -> None:
-        """Go to the picture at a position, or to the nearest that there is."""
+        """Go to the image nearest to a position."""
         with self._changing():
             self._sought_s = min(max(at_s, self._pace.start_s), self._length_s())
 
     def seek_alarm(self, forward: bool) -> None:
-        """Go to just before the next alarm, or the one before; nothing happens where there is none."""
+        """Go to just before the next or the previous alarm, if there is one."""
         at_s = self._position_s if self._sought_s is None else self._sought_s
         lead_s = ALARM_LEAD_S + 1e-3
         alarm_s = self.alarms.after(at_s + lead_s) if forward else self.alarms.before(at_s)
@@ -115,7 +115,7 @@ class Player:
             self.seek(alarm_s - ALARM_LEAD_S)
 
     def snapshot(self) -> Snapshot:
-        """What is shown; of a recording nothing is ever stale."""
+        """Return what is shown; nothing of a recording is stale."""
         with self._condition:
             now_ns = time.time_ns()
             replay = Replay(
@@ -146,14 +146,14 @@ class Player:
             )
 
     def switch_preview(self, on: bool) -> None:
-        """Draw what is shown, or no longer."""
+        """Draw previews, or no longer."""
         with self._condition:
             self._preview_on = on
             self._condition.notify()
 
     @contextmanager
     def _changing(self) -> Iterator[None]:
-        """Whoever waits hears of it; ``changed`` is called without the lock, for it may ask what is shown."""
+        """Within, change state; then wake waiting threads, and call ``changed`` without the lock, which it may need."""
         with self._condition:
             yield
             self._version += 1
@@ -167,7 +167,7 @@ class Player:
         return self.alarms.done and self._position_s >= self.alarms.searched_s
 
     def _first_stamp_ns(self) -> int:
-        """Of the whole recording. Raises what the first picture would raise in the player's thread."""
+        """Return the first stamp, ns. Raises what the first image would raise in the player's thread."""
         self._recording.start_s = self._pace.start_s
         next(run(self._recording, self._config))
         assert self._recording.first_ns is not None
@@ -184,7 +184,7 @@ class Player:
                     self._play_from(at_s)
                 else:
                     self._stand()
-        except LcfError as error:  # the recording has gone meanwhile
+        except LcfError as error:  # the recording was removed meanwhile
             with self._changing():
                 self.failed, self._playing = error, False
                 status = DeviceStatus("recording", Level.ERROR, printable(str(error)))
@@ -213,7 +213,7 @@ class Player:
                 self._playing, self._preview = False, None  # the last drawn may be an earlier one
 
     def _stand(self) -> None:
-        """At the end, until a place is sought."""
+        """Wait at the end until a position is sought."""
         with self._condition:
             self._due = 0
             if not self._needs_preview():
@@ -224,7 +224,7 @@ class Player:
             self._draw()
 
     def _wait(self, position_s: float) -> bool:
-        """Until a picture is to be shown; False: another one is sought."""
+        """Wait until an image is to be shown; False: another one is sought."""
         while True:
             with self._condition:
                 if self._closing or self._sought_s is not None:
@@ -242,7 +242,7 @@ class Player:
                 self._draw()
 
     def _wait_s(self, position_s: float) -> float:
-        """Until that is due, s, of the pace at which it plays."""
+        """Return the time until a position is due at the present pace, s."""
         now_s = time.monotonic()
         since_s, from_s = self._anchor or (now_s, position_s)
         wait_s = (position_s - from_s) / self._speed - (now_s - since_s)
@@ -267,7 +267,7 @@ class Player:
         return 0 if self._diagnostics is None else self._diagnostics.header.stamp_ns
 
     def _tell(self, scene: PipelineScene) -> None:
-        """A point of the plots, at the time of the recording."""
+        """Add a point to the plots, at the time of the recording."""
         memory = asdict(self._config.memory)
         values = {f"{table}_fill": f"{getattr(scene.sizes, table)}/{memory[table]}" for table in TABLES}
         values["detect_p50_ms"] = f"{scene.timing.detect / 1e3:.2f}"

@@ -23,20 +23,20 @@ class Replayed:
     pace: Pace
 
     def player(self, changed: Callable[[], None] = lambda: None) -> "Player":
-        """It, not yet started. Raises ``RecordingError``."""
+        """Return its player, not started. Raises ``RecordingError``."""
         from lcf_edge.monitor.replay.player import Player  # noqa: PLC0415
 
         return Player(self.path, self.config, self.pace, changed=changed)
 
 
 class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """One wish. ``value``: where to go, s after the first picture, or how many times as fast as it was made."""
+    """A command. ``value``: position, s after the first image, or speed as a multiple of real time."""
 
     do: Literal["play", "pause", "step", "seek", "speed", "previous", "next"]
     value: float = 0.0
 
     def give(self, player: "Player") -> None:
-        """Have it done."""
+        """Carry it out."""
         match self.do:
             case "play" | "pause":
                 player.play(self.do == "play")

@@ -1,4 +1,4 @@
-"""The table in a terminal: ``screen`` makes it from what is known, ``terminal`` has the keys and the way back.
+"""The table in a terminal: ``screen`` makes it from a snapshot, ``terminal`` reads keys and restores the terminal.
 
 ``player_keys`` are those of a recording.
 """

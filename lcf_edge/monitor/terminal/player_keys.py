@@ -27,7 +27,7 @@ class PlayerKeys:
         }
 
     def obey(self, keys: bytes) -> None:
-        """Do what each key says, in turn; what is none is passed over."""
+        """Carry out each key in turn; ignore others."""
         while keys:
             key = next((key for key in self._keys if keys.startswith(key)), keys[:1])
             if key in self._keys:

@@ -16,10 +16,10 @@ from lcf_edge.monitor.live.monitor import Presence, Snapshot
 from lcf_edge.monitor.live.traces import TABLES, Figures
 from lcf_edge.printable import printable
 
-STALE_S = 1.0  # scenes older than this are not of now
+STALE_S = 1.0  # older scenes are stale
 _TABLE_HEAD = 2  # lines: how many there are, the names of the columns
-_MAX_ILL_DEVICES = 100  # of the devices are looked at, the worst first
-_MIN_CIRCLES = 3  # are shown before anything below them is
+_MAX_ILL_DEVICES = 100  # devices with problems that are listed at most, the worst first
+_MIN_CIRCLES = 3  # shown before anything below them
 _PROBABLY = 0.5
 
 _LEVELS = {Level.OK: "green", Level.WARN: "yellow", Level.ERROR: "bold red", Level.STALE: "bold yellow"}
@@ -29,12 +29,12 @@ _CAUSES = {Cause.NONE: "rebel", Cause.CROSSING: "crossing", Cause.INCOMING: "inc
 
 @dataclass(frozen=True, slots=True)
 class Column:
-    """One figure of an object or a circle."""
+    """One value of an object or a circle."""
 
     name: str
     least_columns: int  # a narrower terminal goes without it
     text: Callable[[np.void], str]
-    columns: int | None = None  # it takes at least, so that it does not move; None: those of its name
+    columns: int | None = None  # least width, so that columns do not move; None: that of its name
 
 
 def _figure(
@@ -88,14 +88,14 @@ CIRCLE_COLUMNS = (
 
 @dataclass(frozen=True, slots=True)
 class Screen:
-    """A snapshot as it looks ``now_ns`` (system clock, ns). Fits into the height that it is given."""
+    """A snapshot as it looks at ``now_ns`` (system clock, ns). Fits into the given height."""
 
     snapshot: Snapshot
     endpoint: str
     now_ns: int
 
     def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
-        """As rich asks for it."""
+        """Render, as rich calls it."""
         height = options.height or console.height
         free = options.update(height=None)
 
@@ -107,11 +107,11 @@ class Screen:
         ill, well = self._devices()
         scene = self.snapshot.scene
         rebels = 0 if scene is None else int((scene.circles["kind"] == Kind.REBEL).sum())
-        objects = self._objects(options.max_width, height - lines(head) - 1)  # one for how many circles there are
+        objects = self._objects(options.max_width, height - lines(head) - 1)  # one line is for the number of circles
         circles = _MIN_CIRCLES if objects else max(rebels, _MIN_CIRCLES)
         left = height - lines([*head, *objects]) - _TABLE_HEAD - circles
         foot: list[Text] = []
-        for part in (*([one] for one in ill), [*well, self._tables()]):  # what is wrong before what is not
+        for part in (*([one] for one in ill), [*well, self._tables()]):  # what is wrong comes first
             if lines(foot + part) > left:
                 break
             foot += part
@@ -241,7 +241,7 @@ class Screen:
 
 
 def _line(texts: Sequence[str], widths: Sequence[int], style: str) -> Text:
-    """A row of a table: the first text to the left, numbers to the right. A table of rich takes six times as long."""
+    """A row of a table: the first text to the left, numbers to the right. Rich's own table takes six times as long."""
     padded = [text.rjust(width) for text, width in zip(texts, widths, strict=True)]
     padded[0] = texts[0].ljust(widths[0])
     return Text(" ".join(padded), style, no_wrap=True, overflow="ellipsis", end="\n")
@@ -276,7 +276,7 @@ def _clock(moment_ns: int) -> str:
 
 
 def _duration(seconds: float) -> str:
-    """Short, and steady to look at."""
+    """Return a short text of constant width."""
     whole = max(int(seconds), 0)
     if whole < 60:
         return f"{whole} s"

@@ -1,4 +1,4 @@
-"""A terminal whose keys come one by one, and that is given back as it was, however it ends."""
+"""A terminal that delivers keys one by one, and is restored however the program ends."""
 
 import os
 import select
@@ -23,7 +23,7 @@ def show(
 ) -> None:
     """Draw ``screen()`` at 5 Hz over the whole terminal until q is pressed or a signal ends it.
 
-    ``obey`` hears the other keys. Ctrl-Z gives the terminal back meanwhile. Raises ``KeyboardInterrupt``,
+    ``obey`` gets the other keys. Ctrl-Z restores the terminal meanwhile. Raises ``KeyboardInterrupt``,
     ``SystemExit`` for SIGTERM and SIGHUP.
     """
     with _signals() as stopped:
@@ -32,7 +32,7 @@ def show(
                 ended = _draw(live, screen, pressed, obey, stopped)
             if ended:
                 return
-            os.kill(os.getpid(), signal.SIGSTOP)  # until the shell lets it go on
+            os.kill(os.getpid(), signal.SIGSTOP)  # until the shell continues it
             stopped.clear()
 
 
@@ -49,20 +49,20 @@ def _draw(
         live.update(screen(), refresh=True)
         if not live.console.is_terminal:  # any more
             return True
-        due_s = max(due_s + INTERVAL_S, time.monotonic())  # what was missed is not made up for
+        due_s = max(due_s + INTERVAL_S, time.monotonic())  # missed updates are skipped
         while not stopped and (left_s := due_s - time.monotonic()) > 0:
             keys = pressed(left_s)
             if _END_KEYS & set(keys):
                 return True
             if keys:
                 obey(keys)
-                break  # and what became of it is shown at once
+                break  # and the result is shown at once
     return False
 
 
 @contextmanager
 def _signals() -> Iterator[set[int]]:
-    """SIGTERM and SIGHUP end by the way back; a stop is noted in the set."""
+    """Let SIGTERM and SIGHUP end through cleanup; note a stop in the set."""
     stopped: set[int] = set()
 
     def end(number: int, _: FrameType | None) -> None:
@@ -81,7 +81,7 @@ def _signals() -> Iterator[set[int]]:
 
 @contextmanager
 def _keys() -> Iterator[Callable[[float], bytes]]:
-    """A function that waits for keys; where standard input is no terminal there are none."""
+    """Yield a function that waits for keys; without a terminal at standard input there are none."""
     if not sys.stdin.isatty():
         yield _no_keys
         return

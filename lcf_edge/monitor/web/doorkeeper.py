@@ -1,8 +1,8 @@
-"""How many may be connected to the page, each of which takes a descriptor.
+"""Limits the connections to the page, each of which takes a descriptor.
 
-When as many are there as may be, the one that has waited longest without a request under way gives way to the new one;
-where all have one, the new one is turned away. In the end no request is left to the server's own time limit: aiohttp
-(3.14) fails where a request ends just as that is up.
+At the limit, the one that has been idle longest gives way to the new one; if all have a request under way, the new one
+is turned away. At the end no request is left to the server's own time limit: aiohttp (3.14) fails when a request ends
+just at that moment.
 """
 
 import asyncio
@@ -12,8 +12,8 @@ from collections.abc import Awaitable, Callable
 from aiohttp import web
 
 MAX_CONNECTIONS = 96  # 16 browsers with 6 each
-BACKLOG = 32  # accepted at once; with the connections far below 256 descriptors
-REQUEST_WITHIN_S = 5.0  # or it is let go, also between two requests
+BACKLOG = 32  # accepted at once; together far below 256 descriptors
+REQUEST_WITHIN_S = 5.0  # or the connection is closed, also between two requests
 FAREWELL_S = 1.0  # for requests under way when the server ends, then they are cancelled
 
 LOGGER = logging.getLogger(__name__)
@@ -22,11 +22,11 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Doorkeeper:
-    """Knows which connections have a request under way, and so which may be let go."""
+    """Knows which connections have a request under way, and so which may be closed."""
 
     def __init__(self) -> None:
         self._busy: set[asyncio.BaseProtocol] = set()
-        self._under_way: set[asyncio.Task[object]] = set()  # requests, until all is sent
+        self._under_way: set[asyncio.Task[object]] = set()  # requests whose answers are not sent completely
 
     @web.middleware
     async def busy(self, request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -49,7 +49,7 @@ class Doorkeeper:
                 await asyncio.wait(self._under_way, timeout=FAREWELL_S)
 
     def protocol(self, server: web.Server) -> asyncio.BaseProtocol:
-        """Of the next connection to ``server``."""
+        """Return the protocol of the next connection to ``server``."""
         connections = [one for one in server.connections if one.transport is not None]
         if len(connections) < MAX_CONNECTIONS:
             return server()

@@ -1,8 +1,8 @@
-"""Who may look: this machine alone, or who knows the token.
+"""Who may look: only this machine, or whoever knows the token.
 
-On loopback every request must name a loopback host, so that no page of the internet can point a name of its own here
-(DNS rebinding). Opened to the network, a request must bring the token instead, which no such page knows. In both cases
-the Origin of a request, where there is one, must be the page's own.
+On loopback every request must name a loopback host, so that no web page can point a name of its own here (DNS
+rebinding). Opened to the network, a request must bring the token instead, which no such page knows. In both cases the
+Origin of a request, if it has one, must be the page's own.
 """
 
 import hmac
@@ -39,7 +39,7 @@ class Guard:
         self.token = None if is_loopback(host) else secrets.token_urlsafe(24)
 
     def protect(self, application: web.Application) -> None:
-        """Stand before all that ``application`` answers."""
+        """Check every request to ``application``."""
 
         @web.middleware
         async def guarded(request: web.Request, handler: Handler) -> web.StreamResponse:
@@ -49,7 +49,7 @@ class Guard:
         application.on_response_prepare.append(_add_headers)
 
     def _refusal(self, request: web.Request) -> web.Response | None:
-        """The answer to who may not look."""
+        """Return the answer to a request that is refused; None: it is allowed."""
         if not all(value.isascii() for name, value in request.headers.items() if name != "Cookie"):
             return web.Response(status=400, text="a header that is not ASCII\n")  # aiohttp would fail on some of them
         if self.token is None and not is_loopback(_name(request.host)):
@@ -64,7 +64,7 @@ class Guard:
         return None
 
     def _welcome(self, request: web.Request) -> web.Response | None:
-        """Put the token of the address into a cookie, and out of sight."""
+        """Move the token from the address into a cookie."""
         if self.token is None or TOKEN not in request.query or request.path != "/":
             return None
         response = web.Response(status=303, headers={"Location": "/"})
@@ -73,7 +73,7 @@ class Guard:
 
 
 def is_loopback(host: str) -> bool:
-    """Whether only this machine can be meant."""
+    """Whether the host can only be this machine."""
     try:
         return ipaddress.ip_address(host).is_loopback
     except ValueError:
@@ -81,13 +81,13 @@ def is_loopback(host: str) -> bool:
 
 
 def _cookie(request: web.Request) -> str:
-    """One for each port: cookies know no ports."""
+    """Return a name of the cookie for each port: cookies ignore ports."""
     place = request.transport.get_extra_info("sockname") if request.transport else None
     return f"lcf_edge_view_{place[1] if place else 0}"
 
 
 def _name(host: str) -> str:
-    """Without the port; empty: it is no name."""
+    """Return the host name without port; empty: invalid."""
     try:
         return urlsplit(f"//{host}").hostname or ""
     except ValueError:

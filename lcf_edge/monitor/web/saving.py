@@ -18,7 +18,7 @@ CHUNK_BYTES = 2**18
 
 
 class _Outflow:
-    """A file that is only ever appended to; what was written waits in ``data`` until it is taken."""
+    """An append-only file; what was written waits in ``data`` until it is taken."""
 
     def __init__(self) -> None:
         self.data = bytearray()
@@ -59,7 +59,7 @@ def mcap_parts(messages: Sequence[ReceivedMessage], prefix: str) -> Iterator[byt
 
 
 def _with_annotations(message: ReceivedMessage) -> Iterator[tuple[str, bytes]]:
-    """Topic and payload of a message, and of what is drawn of it over the picture."""
+    """Yield topic and payload of a message, and of its annotations."""
     yield message.topic, message.payload
     if message.topic == SCENE.name:
         yield ANNOTATIONS.name, encode_image_annotations(decode_scene(message.payload))

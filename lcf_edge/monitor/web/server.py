@@ -1,8 +1,8 @@
-"""Serves browsers: the page, the updates over a WebSocket, the file of the last seconds; of a replay what to play.
+"""Serves browsers: the page, the updates over a WebSocket, the file of the last seconds, and a replay's controls.
 
-A browser asks for each update when it has drawn the last one. So a slow one gets fewer, newer updates and nothing
-waits for it here; one that does not ask for ``SILENCE_S`` is let go. Pictures are subscribed to only while somebody
-looks.
+A browser asks for each update when it has drawn the last one. So a slow one gets fewer updates but never old ones,
+and nothing queues here; one that does not ask for ``SILENCE_S`` is disconnected. Previews are subscribed to only while
+somebody looks.
 """
 
 import asyncio
@@ -37,11 +37,11 @@ if TYPE_CHECKING:
     from lcf_edge.monitor.replay.player import Player
 
 INTERVAL_S = 0.1  # between two updates for one browser
-PULSE_S = 1.0  # an update comes, even with nothing new
+PULSE_S = 1.0  # an update is sent even without news
 SILENCE_S = 10.0
 MAX_BROWSERS = 16
-MAX_LINE = 300  # characters of the log, some of which strangers choose
-MAX_SAVES_AT_ONCE = 2  # at a time: each keeps the messages of its file
+MAX_LINE = 300  # characters of a log line, some chosen by strangers
+MAX_SAVES_AT_ONCE = 2  # each holds the messages of its file
 MAX_COMMAND_BYTES = 256
 
 PAGE = {
@@ -104,7 +104,7 @@ async def _listen(runner: web.AppRunner, door: Doorkeeper, host: str, port: int)
 
 
 class Server:
-    """What is served, of one daemon, or of a recording in place of it."""
+    """Serves one daemon, or a recording in place of it."""
 
     def __init__(self, shown: DaemonAddress | Replayed) -> None:
         self._history = History()
@@ -123,7 +123,7 @@ class Server:
             self._player.start()
 
     def application(self, guard: Guard, door: Doorkeeper) -> web.Application:
-        """All that it answers."""
+        """Return the application with all routes."""
         application = web.Application(middlewares=[door.busy])
         guard.protect(application)
         for name, kind in PAGE.items():
@@ -142,7 +142,7 @@ class Server:
         self._monitor.close()
 
     def _changed(self) -> None:
-        """In Zenoh's threads."""
+        """Called in Zenoh's threads."""
         with suppress(RuntimeError):  # the loop has ended
             self._loop.call_soon_threadsafe(self._came.set)
 
@@ -155,7 +155,7 @@ class Server:
         try:
             await self._switch_preview()
             await self._tell(browser)
-        except (TimeoutError, ConnectionError):  # it neither asks nor takes any more; it is gone
+        except (TimeoutError, ConnectionError):  # it is gone: it neither asks nor reads
             _abort(request)
         finally:
             self._sockets.pop(browser)
@@ -177,7 +177,7 @@ class Server:
                     await (browser.send_str(part) if isinstance(part, str) else browser.send_bytes(part))
 
     async def _obey(self, request: web.Request) -> web.Response:
-        """What the slider and its buttons ask for. As JSON alone, which no form of another page can send."""
+        """Obey slider and buttons; only JSON, which no form on another page can send."""
         if request.content_type != "application/json" or (request.content_length or 0) > MAX_COMMAND_BYTES:
             raise web.HTTPBadRequest(text="a command as JSON is wanted\n")
         try:
@@ -219,7 +219,7 @@ class Server:
                 async with asyncio.timeout(SILENCE_S):
                     await response.write(part)
             await response.write_eof()
-        except (TimeoutError, ConnectionError):  # it takes nothing any more, or has gone
+        except (TimeoutError, ConnectionError):  # it does not read, or has gone
             _abort(request)
         return response
 
@@ -228,12 +228,12 @@ class Server:
         with suppress(TimeoutError):
             async with asyncio.timeout(FAREWELL_S):
                 await asyncio.gather(*ends)
-        for request in self._sockets.values():  # who did not take it
+        for request in self._sockets.values():  # those that did not read it
             _abort(request)
 
 
 def _abort(request: web.Request) -> None:
-    """Drop the connection with what waits to be sent, which nobody takes."""
+    """Drop the connection with all unsent data."""
     if request.transport is not None:
         request.transport.abort()
 
@@ -255,7 +255,7 @@ def _address(host: str, port: int, token: str | None) -> str:
 
 
 def _own_address(host: str) -> str:
-    """By which other machines reach this one, as far as it knows; nothing is sent."""
+    """Return the address by which others probably reach this machine; nothing is sent."""
     if host not in {"0.0.0.0", "::", ""}:
         return f"[{host}]" if ":" in host else host
     with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
@@ -265,13 +265,13 @@ def _own_address(host: str) -> str:
 
 
 def _cannot_listen(error: OSError | OverflowError, host: str, port: int) -> str:
-    code = getattr(error, "errno", None) or 0  # of a name that is not known below 0, with a text of its own
+    code = getattr(error, "errno", None) or 0  # negative for an unknown name, with its own text
     reason = os.strerror(code) if code > 0 else getattr(error, "strerror", None) or str(error)
     return f"view: {host}:{port}: cannot be listened on ({reason}); choose with --listen HOST and --port N"
 
 
 class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
-    """What aiohttp complains about, on standard error; not that somebody sent what is no HTTP."""
+    """Logs aiohttp's complaints in one line each on standard error, without those about invalid HTTP."""
 
     def emit(self, record: logging.LogRecord) -> None:
         if not isinstance(_cause(record), HttpProcessingError):

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Audience:
-    """What one browser knows already."""
+    """What one browser has received already."""
 
     sent_version: int = -1
     diagnostics_ns: int = -1
@@ -26,7 +26,7 @@ class Audience:
     point_ns: int = -1
 
     def update(self, monitor: "Monitor | Player", endpoint: str) -> list[str | bytes]:
-        """What it does not know: a text, and perhaps the JPEG that belongs to it."""
+        """Return what is new for it: a text, and perhaps the JPEG that belongs to it."""
         snapshot, now_ns = monitor.snapshot(), time.time_ns()
         self.sent_version = snapshot.version
         update: dict[str, Any] = {

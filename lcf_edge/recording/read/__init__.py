@@ -1,7 +1,7 @@
-"""Reading recordings: EuRoC/ASL folders, MCAP files with ROS 2 messages, videos, folders of pictures.
+"""Reading recordings: EuRoC/ASL folders, MCAP files with ROS 2 messages, videos, folders of images.
 
 ``recording`` is what they have in common; ``asl``, ``rosbag`` and ``pictures`` are the kinds. ``decoding``
-makes luminance of pictures, ``mcap_file`` finds the messages of a damaged file, ``sensor_yaml`` and
+turns encoded images into luminance, ``mcap_file`` finds the messages of a damaged file, ``sensor_yaml`` and
 ``distortion`` read calibrations.
 """
 
@@ -18,7 +18,7 @@ __all__ = ["Recording", "is_recording", "open_recording"]
 
 
 def is_recording(path: Path) -> bool:
-    """Whether it is one recording, by its name and what lies in it. Raises ``OSError``.
+    """Whether it is one recording, by its name and contents. Raises ``OSError``.
 
     A folder of MCAP files is one when ``metadata.yaml`` says that they belong together; else each file is one.
     """
@@ -29,7 +29,7 @@ def is_recording(path: Path) -> bool:
 
 
 def open_recording(path: Path, config: Config) -> Recording:
-    """The recording at ``path``, of the kind that is found there. Raises ``RecordingError``."""
+    """Open the recording at ``path``, of whichever kind it is. Raises ``RecordingError``."""
     try:
         return _open(path, config)
     except OSError as error:

@@ -15,7 +15,7 @@ from lcf_edge.recording.read.decoding import read_image
 from lcf_edge.recording.read.recording import MAX_STAMP_NS, Recording, Sample, UndecodedFrame, interleave
 from lcf_edge.recording.read.sensor_yaml import Rotation, SensorYaml
 
-MAX_ROW_CHARACTERS = 4096  # characters; longer is no row
+MAX_ROW_CHARACTERS = 4096  # a longer row is malformed
 
 T = TypeVar("T", UndecodedFrame, ImuSample, SpeedSample)
 
@@ -84,7 +84,7 @@ class AslRecording(Recording):
         return increasing(self._parsed(csv, kind, parse), stray)
 
     def _parsed(self, csv: Path, kind: str, parse: Callable[[list[str]], T]) -> Iterator[tuple[int, T]]:
-        """Line numbers and items of the rows that can be used."""
+        """Yield line numbers and items of usable rows."""
         try:
             with csv.open(encoding="utf-8-sig", errors="replace") as file:
                 for line, text in enumerate(iter(partial(file.readline, MAX_ROW_CHARACTERS), ""), 1):
@@ -100,7 +100,7 @@ class AslRecording(Recording):
 
     def _image(self, fields: list[str]) -> UndecodedFrame:
         if len(fields) < 2 or not fields[1].isprintable() or Path(fields[1] or "/").name != fields[1]:
-            raise _RowError("malformed")  # a name that leaves the folder, or that no file can have
+            raise _RowError("malformed")  # a path out of the folder, or an impossible name
         path = self._cam.with_name("data") / fields[1]
         return UndecodedFrame(_stamp_ns(fields[0]), str(path), partial(read_image, path))
 
@@ -114,10 +114,10 @@ class AslRecording(Recording):
 
 
 def increasing(rows: Iterable[tuple[int, T]], stray: Callable[[int], None]) -> Iterator[T]:
-    """The items of ``rows`` (line, item) whose stamps increase; ``stray`` is called with the line of others.
+    """Yield items of ``rows`` (line, item) whose stamps increase; ``stray`` is called with the line of others.
 
-    Where time steps back, the row that does so may be the stray, or the one before it that lies far ahead:
-    the row after them tells. So one wrong stamp costs one row.
+    Where time steps back, the wrong row may be this one, or the one before it if that is far ahead: the row after
+    them decides. So one wrong stamp costs one row.
     """
     waiting: tuple[int, T] | None = None
     doubted: tuple[int, T] | None = None  # earlier than the held one, later than what was delivered

@@ -28,7 +28,7 @@ RAW_ENCODINGS = {"mono8": 1, "8uc1": 1} | dict.fromkeys(_COLOUR, 3) | dict.fromk
 """Encodings of ``sensor_msgs/msg/Image`` (in lower case) that can be read, and their bytes a pixel."""
 
 _PNG_CHUNKS = frozenset((b"IHDR", b"PLTE", b"tRNS", b"IDAT", b"IEND", b"eXIf"))
-_MAX_SCANS = 100  # of a JPEG: each costs a pass over the picture
+_MAX_SCANS = 100  # of a JPEG: each costs a pass over the image
 _BMP_HEADER = 40  # bytes
 _COMMENT = rb"(?:\s+(?:#[^\r\n]*[\r\n]\s*)*)"
 _NETPBM = re.compile(rb"P[1-6]" + _COMMENT + rb"(\d{1,9})" + _COMMENT + rb"(\d{1,9})\s")
@@ -41,7 +41,7 @@ _TIFF_SIZES = frozenset(
 _TIFF_ALL_ROWS = 2**32 - 1
 _MAX_TIFF_STRIP = 128 * 2**20  # bytes
 
-os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # quiet: what went wrong is reported once, by us
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")  # quiet: we report errors once
 _set_log_level = getattr(cv2, "setLogLevel", None) or cv2.utils.logging.setLogLevel  # moved in OpenCV 5
 _set_log_level(0)
 
@@ -51,7 +51,7 @@ class ImageDecodeError(LcfError):
 
 
 def read_image(path: Path) -> Grey:
-    """Luminance of a picture file (png, jpeg, bmp, pgm/ppm, tiff). Raises ``ImageDecodeError``."""
+    """Luminance of an image file (png, jpeg, bmp, pgm/ppm, tiff). Raises ``ImageDecodeError``."""
     try:
         if path.stat().st_size > MAX_FILE_BYTES:
             raise ImageDecodeError("too large")
@@ -63,10 +63,10 @@ def read_image(path: Path) -> Grey:
 
 
 def image_from_bytes(data: bytes | memoryview) -> Grey:
-    """Luminance of an encoded picture (png, jpeg, bmp, pgm/ppm, tiff).
+    """Luminance of an encoded image (png, jpeg, bmp, pgm/ppm, tiff).
 
-    The size comes from the header first, and from what the decoder will take for the header: a small file can decode
-    to gigabytes. Raises ``ImageDecodeError``.
+    The size is checked first, in the header as the decoder will read it: a small file can decode to gigabytes.
+    Raises ``ImageDecodeError``.
     """
     if not len(data):
         raise ImageDecodeError("empty")
@@ -105,7 +105,7 @@ def image_from_message(image: Image) -> Grey:
 
 
 def check_size(width: int, height: int) -> None:
-    """Refuse an empty or absurd picture size with ``ImageDecodeError``."""
+    """Refuse an empty or absurd image size with ``ImageDecodeError``."""
     if min(width, height) < 1:
         raise ImageDecodeError("empty")
     if width * height > MAX_PIXELS:
@@ -113,14 +113,14 @@ def check_size(width: int, height: int) -> None:
 
 
 def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
-    """Width and height by the header, and what of ``data`` the decoder needs."""
+    """Return width and height by the header, and the part of ``data`` that the decoder needs."""
     if data.startswith(b"\x89PNG\r\n\x1a\n"):
         return _png(data)
     if data.startswith(b"\xff\xd8"):
         return _jpeg_size(data), data
     if data.startswith(b"BM"):
         header, width, height = struct.unpack_from("<Iii", data, 14)
-        if header < _BMP_HEADER:  # in an older one, sizes stand elsewhere
+        if header < _BMP_HEADER:  # older headers have sizes elsewhere
             raise ImageDecodeError("of unknown format")
         return (abs(width), abs(height)), data
     if data.startswith((b"II*\0", b"MM\0*")):
@@ -131,9 +131,9 @@ def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
 
 
 def _png(data: bytes) -> tuple[tuple[int, int], bytes]:
-    """Checks every chunk, for the decoder would fill up what is missing and call it a picture.
+    """Check every chunk, because the decoder would make up what is missing.
 
-    Only the chunks that make the picture go on: texts and profiles unpack to megabytes, an animation has pictures of
+    Only chunks of the image itself are passed on: texts and profiles unpack to megabytes, an animation has images of
     other sizes.
     """
     if data[12:16] != b"IHDR":
@@ -163,11 +163,11 @@ def _jpeg_size(data: bytes) -> tuple[int, int]:
 
 
 def _tiff_size(data: bytes) -> tuple[int, int]:
-    """Checks the strips or tiles too: each is unpacked whole, at up to 8 bytes a sample."""
+    """Check strips or tiles too: each is unpacked whole, at up to 8 bytes a sample."""
     order = "<" if data.startswith(b"II") else ">"
     tags: dict[int, int] = {}
     for tag, value in _tiff_tags(data, order):
-        if tag in tags:  # which one counts is the reader's choice
+        if tag in tags:  # readers differ in which one they use
             raise ImageDecodeError("damaged")
         tags[tag] = value
     width, height = tags.get(_TIFF_WIDTH, 0), tags.get(_TIFF_HEIGHT, 0)
@@ -180,7 +180,7 @@ def _tiff_size(data: bytes) -> tuple[int, int]:
 
 
 def _tiff_tags(data: bytes, order: str) -> Iterator[tuple[int, int]]:
-    """The tags that tell a size, one number each."""
+    """Return the tags that give a size, one number each."""
     (directory,) = struct.unpack_from(f"{order}I", data, 4)
     (count,) = struct.unpack_from(f"{order}H", data, directory)
     for at in range(directory + 2, directory + 2 + 12 * count, 12):

@@ -1,4 +1,4 @@
-"""Names of lens distortion models in recordings, and what they are called here."""
+"""Names of lens distortion models in recordings, and their names here."""
 
 from typing import Literal
 
@@ -22,7 +22,7 @@ MODELS: dict[str, Model] = {
 
 
 def distortion(name: str, coefficients: tuple[float, ...]) -> tuple[Model, tuple[float, ...]]:
-    """Model and coefficients as ``Lens`` takes them; a model whose coefficients are all zero is none.
+    """Return model and coefficients as ``Lens`` takes them; a model whose coefficients are all zero is none.
 
     The rational model is the radial-tangential one where its denominator is 1. Raises ``ValueError`` that
     says what is wrong.

@@ -1,4 +1,4 @@
-"""Pictures without stamps: a video file, or a folder of pictures in the order of their names."""
+"""Images without stamps: a video file, or a folder of images in the order of their names."""
 
 import math
 import re
@@ -35,14 +35,14 @@ VIDEO_SUFFIXES = frozenset(
 )
 
 _DECODER_BYTES = 32 * 2**20
-_BYTES_A_PIXEL = 64  # of the first picture: 17 others that a later one may refer to, the colours, some to spare
-_GRABS_BEYOND = 2  # a picture that the decoder could not take is one or two calls behind
+_BYTES_A_PIXEL = 64  # of the first image: 17 reference images, colours, and a margin
+_GRABS_BEYOND = 2  # an image that the decoder refused is reported one or two calls later
 
-FASTEST_FPS = 10_000.0  # a container that claims more does not know
+FASTEST_FPS = 10_000.0  # a container that claims more is wrong
 
 
 class ImageFolder(Recording):
-    """A folder of pictures, sorted by name as a person would (2 before 10), at ``camera.fps``.
+    """A folder of images, sorted by name as a person would (2 before 10), at ``camera.fps``.
 
     Raises ``RecordingError`` and ``OSError``.
     """
@@ -68,8 +68,8 @@ class ImageFolder(Recording):
 class VideoFile(Recording):
     """A video file, at its own rate unless ``camera.fps`` differs from its default.
 
-    A later picture may be larger than the first, and the decoder sets itself no limit: its memory is bounded by what
-    the first one's size can need, and the video ends where that is not enough. Raises ``RecordingError``.
+    A later image may be larger than the first, and the decoder has no limit of its own: its memory is bounded by the
+    needs of the first one's size, and the video ends where that is not enough. Raises ``RecordingError``.
     """
 
     def __init__(self, path: Path, config: Config) -> None:
@@ -135,7 +135,7 @@ def _retrieve(capture: cv2.VideoCapture, allowance: MemoryAllowance) -> Grey:
     try:
         with allowance.limited():
             good, image = capture.retrieve()
-    except cv2.error as error:  # it gets no memory
+    except cv2.error as error:  # it was refused memory
         raise ImageDecodeError("too large") from error
     if not good or image is None:
         raise ImageDecodeError("damaged")

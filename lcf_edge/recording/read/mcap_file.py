@@ -1,4 +1,4 @@
-"""The messages of an MCAP file, as far as it is whole.
+"""The messages of an MCAP file, as far as it is intact.
 
 The ``mcap`` package gives up at the first damage; a recording that a power cut ended is read here up to the
 last whole message, even inside the chunk that was cut.
@@ -23,8 +23,8 @@ from mcap.opcode import Opcode
 from lcf_edge.errors import RecordingError
 
 MAGIC = b"\x89MCAP0\r\n"
-MAX_RECORD_BYTES = 128 * 2**20  # of a message, or a chunk, also unpacked: a colour picture of 8K fits
-MAX_RATIO = 256  # of an unpacked chunk to a packed one; beyond, it may take
+MAX_RECORD_BYTES = 128 * 2**20  # of a message, or a chunk, also unpacked: a colour image of 8K fits
+MAX_RATIO = 256  # of an unpacked chunk to a packed one, beyond this size:
 MAX_DENSE_BYTES = 16 * 2**20
 MAX_OTHER_BYTES = 2**20  # of a record that describes messages
 MAX_NAME = 1024  # bytes of a topic, its type and its encoding together
@@ -80,9 +80,9 @@ class McapFile:
             self._read_summary(file)
 
     def messages(self, warn: Callable[[str], None], skip: Callable[[str, str], None]) -> Iterator[McapMessage]:
-        """The messages in the order of the file.
+        """Yield the messages in the order of the file.
 
-        ``warn`` gets where the file is damaged, ``skip`` why a chunk is passed over, and where it lies.
+        ``warn`` gets where the file is damaged, ``skip`` why and where a chunk is skipped.
         """
         try:
             with self._path.open("rb") as file:
@@ -141,7 +141,7 @@ class McapFile:
 
 @dataclass(slots=True)
 class _Channels:
-    """What the schema and channel records so far tell about messages to come."""
+    """What the schema and channel records so far say about later messages."""
 
     schemas: dict[int, str] = field(default_factory=dict)
     topics: dict[int, McapTopic] = field(default_factory=dict)
@@ -167,7 +167,7 @@ class _Channels:
         return None
 
     def named(self, counts: dict[int, int]) -> Counter[McapTopic]:
-        """Counts by topic instead of by channel number."""
+        """Return counts by topic instead of channel number."""
         total: Counter[McapTopic] = Counter()
         for number, topic in self.topics.items():
             total[topic] += counts.get(number, 0)
@@ -182,8 +182,8 @@ def _named(record: _Record, *names: str) -> str:
 
 
 def _records(stream: BinaryIO, view: memoryview | None = None) -> Iterator[_Record]:
-    """Records from where ``stream`` is. Of those that are not used here the body is passed over, of a chunk
-    that is cut off the front part comes. ``view``: of the stream's memory, for bodies that are not copied. Raises
+    """Yield records from the position of ``stream``. Bodies of unused records are skipped; of a truncated chunk
+    the front part is yielded. ``view``: of the stream's memory, for bodies that are not copied. Raises
     ``_DamageError``.
     """
     at = stream.tell()
@@ -214,7 +214,7 @@ def _records(stream: BinaryIO, view: memoryview | None = None) -> Iterator[_Reco
 
 
 def _unpacked(record: _Record) -> bytes:
-    """The records of a chunk; of one that is cut off, as much as can be unpacked. Raises ``_DamageError``."""
+    """Return the records of a chunk; of a truncated one, as much as can be unpacked. Raises ``_DamageError``."""
     chunk = _parse(mcap.records.Chunk.read, record)
     size = chunk.uncompressed_size
     if size > MAX_RECORD_BYTES:
@@ -230,7 +230,7 @@ def _unpacked(record: _Record) -> bytes:
             data = zstandard.ZstdDecompressor().stream_reader(chunk.data).read(size)
         else:
             raise _DamageError(f"compression {chunk.compression!r} is not supported")
-    except (RuntimeError, zstandard.ZstdError) as error:  # lz4 has no error of its own
+    except (RuntimeError, zstandard.ZstdError) as error:  # lz4 has no exception of its own
         raise _DamageError("it cannot be unpacked") from error
     if record.whole and chunk.uncompressed_crc not in (0, zlib.crc32(data)):
         raise _DamageError("its checksum is wrong")
@@ -238,7 +238,7 @@ def _unpacked(record: _Record) -> bytes:
 
 
 def _parse(read: Callable[[ReadDataStream], Any], record: _Record) -> Any:
-    """A record of the ``mcap`` package from its body. Raises ``_DamageError``."""
+    """Parse a record's body with the ``mcap`` package. Raises ``_DamageError``."""
     try:
         return read(ReadDataStream(io.BytesIO(record.body)))
     except (McapError, struct.error, UnicodeDecodeError, OverflowError) as error:

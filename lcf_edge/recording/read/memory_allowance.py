@@ -1,4 +1,4 @@
-"""A limit for the memory of a library that has none."""
+"""A memory limit for a library that has none."""
 
 import os
 import resource
@@ -11,9 +11,9 @@ _DATA = 5  # its field: pages of memory that can be written
 
 
 class MemoryAllowance:
-    """So many bytes for what is called within ``limited``, all calls together; what goes beyond is refused to it.
+    """Bytes for all that is called within ``limited`` together; memory beyond is refused.
 
-    For work in the thread that calls, which copes with memory it does not get.
+    For work in the calling thread, by code that copes with failing allocations.
     """
 
     def __init__(self, allowed_bytes: int) -> None:
@@ -21,7 +21,7 @@ class MemoryAllowance:
 
     @contextmanager
     def limited(self) -> Iterator[None]:
-        """Within, the process gets what is left and no more."""
+        """Within, limit the process to what is left."""
         before_bytes = _data_bytes()
         soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
         limits = [before_bytes + max(self._left_bytes, 0), *(one for one in (soft, hard) if one >= 0)]

@@ -1,4 +1,4 @@
-"""What every kind of recording has in common: delivery order, one picture size, counted skips."""
+"""What every kind of recording has in common: delivery order, one image size, counted skips."""
 
 import bisect
 import heapq
@@ -18,7 +18,7 @@ from lcf_edge.recording.read.decoding import Grey, ImageDecodeError
 
 WARNINGS_OF_A_KIND = 5  # further skips for the same reason are only counted
 MAX_STAMP_NS = 2**63 - 1
-MAX_WAITING_FRAMES = 6  # that wait to be put in order
+MAX_WAITING_FRAMES = 6  # that wait for earlier ones
 MAX_WAITING_SAMPLES = 1024
 
 Sample = ImuSample | SpeedSample
@@ -26,7 +26,7 @@ Sample = ImuSample | SpeedSample
 
 @dataclass(frozen=True, slots=True)
 class UndecodedFrame:
-    """A frame whose image is decoded when its turn comes, so that none wait in memory."""
+    """A frame whose image is decoded when its turn comes, so that no decoded images wait in memory."""
 
     stamp_ns: int
     name: str  # for warnings
@@ -41,11 +41,11 @@ class Recording(ABC):
     exposures can be integrated exactly.
 
     What cannot be used is skipped, counted in ``skipped`` by reason, and reported in ``warnings``, which grow
-    while reading; ``seq`` of the frames has a gap at each skipped picture. Iterating raises
-    ``RecordingError`` at the end when not one picture could be read.
+    while reading; ``seq`` of the frames has a gap at each skipped image. Iterating raises
+    ``RecordingError`` at the end if no image could be read.
 
-    ``start_s`` after the first picture and for ``duration_s``: the part that ``iter`` gives; what comes before is not
-    decoded. ``first_ns``: the stamp of the first picture, once it was reached.
+    ``iter`` yields the part from ``start_s`` after the first frame on, for ``duration_s``; what comes before is not
+    decoded. ``first_ns``: the stamp of the first frame, once it was reached.
     """
 
     def __init__(self, path: Path) -> None:
@@ -119,7 +119,7 @@ class Recording(ABC):
 def interleave(
     frames: Iterable[UndecodedFrame], imu: Iterable[ImuSample], speed: Iterable[SpeedSample]
 ) -> Iterator[UndecodedFrame | Sample]:
-    """Three streams, each in the order of its stamps, in the order of delivery (see ``Recording``)."""
+    """Merge three streams, each in stamp order, into the order of delivery (see ``Recording``)."""
     streams: tuple[_Stream, _Stream] = (_Stream(imu), _Stream(speed))
     for frame in frames:
         yield from heapq.merge(*(stream.up_to(frame.stamp_ns) for stream in streams), key=_stamp_ns)
@@ -130,7 +130,7 @@ def interleave(
 def reorder(
     items: Iterable[UndecodedFrame | Sample], late: Callable[[UndecodedFrame | Sample], None]
 ) -> Iterator[UndecodedFrame | Sample]:
-    """One stream, only roughly in the order of its stamps, in the order of delivery (see ``Recording``).
+    """Sort one stream that is only roughly in stamp order into the order of delivery (see ``Recording``).
 
     At most ``MAX_WAITING_FRAMES`` and ``MAX_WAITING_SAMPLES`` wait for earlier ones; what comes later still, or repeats
     the stamp of its kind, goes to ``late``.

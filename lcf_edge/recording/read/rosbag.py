@@ -37,10 +37,10 @@ class _MessageError(LcfError):
 class RosBag(Recording):
     """One MCAP file, or the files of a bag's folder in the order of their names.
 
-    Read are the first topics of pictures, IMU samples and speed that can be used; stamps are those of the
+    Read are the first topics of images, IMU samples and speed that can be used; stamps are those of the
     headers, or the time of recording where a header has none. IMU samples pass in the axes in which they were
-    recorded, which are assumed to be the camera's: what a frame id means is not guessed, the configuration's
-    ``imu.axes`` says it, and a warning tells when it should. Raises ``RecordingError`` and ``OSError``.
+    recorded, which are assumed to be the camera's: frame ids are not interpreted; ``imu.axes`` turns them, and a
+    warning says when it should. Raises ``RecordingError`` and ``OSError``.
     """
 
     def __init__(self, path: Path, config: Config) -> None:
@@ -85,7 +85,7 @@ class RosBag(Recording):
         self._skip(f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s")
 
     def _open_files(self) -> list[McapFile]:
-        """The files that can be opened: of a bag that a power cut ended, the last may be empty."""
+        """Return the files that can be opened: after a power cut, a bag's last file may be empty."""
         files: list[McapFile] = []
         paths = bag_files(self.path)
         for path in paths:
@@ -101,11 +101,11 @@ class RosBag(Recording):
         return chain.from_iterable(file.messages(self._warn, self._skip) for file in self._files)
 
     def _survey(self) -> dict[McapTopic, bytes]:
-        """How the first message of every topic that can be used begins, in the order in which they appear."""
+        """Return the beginning of the first message of every usable topic, in the order of appearance."""
         expected: set[McapTopic] | None = set()
         for file in self._files:
             if file.counts is None or expected is None:
-                expected = None  # no summary says what is to come
+                expected = None  # without a summary, topics are unknown
             else:
                 expected |= {topic for topic, count in file.counts.items() if count and _is_read(topic)}
         firsts: dict[McapTopic, bytes | None] = {}
@@ -128,7 +128,7 @@ class RosBag(Recording):
         return topics[0] if topics else None
 
     def _read_lens(self, image: McapTopic) -> Lens | None:
-        """The lens by the CameraInfo in the namespace of the pictures' topic."""
+        """The lens by the CameraInfo in the namespace of the images' topic."""
         infos = [topic for topic in self._firsts if topic.schema == CAMERA_INFO]
         topics = [topic for topic in infos if image.name.startswith(f"{topic.name.rpartition('/')[0]}/")]
         if not topics:
@@ -136,7 +136,7 @@ class RosBag(Recording):
         topic = max(topics, key=lambda topic: topic.name.count("/"))
         try:
             info = cdr.decode_camera_info(self._firsts[topic])
-            if not info.k[0]:  # the message's way to say that nothing is calibrated
+            if not info.k[0]:  # 0 means uncalibrated
                 return None
             fx, _, cx, _, fy, cy, *_ = info.k
             return Lens(info.width, info.height, fx, fy, cx, cy, *distortion(info.distortion_model, info.d))
@@ -166,7 +166,7 @@ def _is_read(topic: McapTopic) -> bool:
 
 
 def _is_usable(topic: McapTopic, first: bytes) -> bool:
-    """Whether a topic has what its type promises, by its first message: depth pictures and IMU topics
+    """Whether a topic has usable contents, by its first message: depth images and IMU topics
     with half of the values do not.
     """
     try:
@@ -178,7 +178,7 @@ def _is_usable(topic: McapTopic, first: bytes) -> bool:
             imu = cdr.decode_imu(first)
             return imu.gyro is not None and imu.accel is not None
     except cdr.CdrError:
-        pass  # this one is broken, the next may be whole
+        pass  # this one is broken, the next may be intact
     return True
 
 

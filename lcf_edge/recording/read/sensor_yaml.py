@@ -1,6 +1,6 @@
 """``sensor.yaml`` of the EuRoC/ASL layout: a few keys with numbers, some nested once.
 
-Its dialects (``%YAML:1.0``, ``!!opencv-matrix``, lists over several lines) trip YAML libraries, so the few
+YAML libraries fail on its dialects (``%YAML:1.0``, ``!!opencv-matrix``, lists over several lines), so the few
 forms that occur are read line by line.
 """
 

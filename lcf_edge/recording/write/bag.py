@@ -1,4 +1,4 @@
-"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which says what is in the files together.
+"""A folder of recordings as a bag: ``metadata.yaml`` as rosbag2 writes it, which lists the contents of all files.
 
 Of version 5, which Humble and all later read. Values are written as JSON, which is YAML as well.
 """
@@ -29,7 +29,7 @@ class _Content:
 
     @property
     def times(self) -> tuple[str, str]:
-        """When its messages begin, and how long they go on."""
+        """Time of the first message, and duration of all."""
         return _times(self.statistics.message_start_time, self.statistics.message_end_time)
 
 

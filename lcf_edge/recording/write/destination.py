@@ -16,13 +16,13 @@ _OURS = re.compile(r"lcf-edge-(\d{6,200})-\d{8}T\d{6}Z\.mcap", re.ASCII)
 
 
 class Destination(Protocol):
-    """Where the next file goes. ``folder``: on whose disk; ``removed``: old files that gave way."""
+    """Where the next file goes. ``folder``: on the disk of the files; ``removed``: number of old files removed."""
 
     folder: Path
     removed: int
 
     def next(self, system_ns: int) -> Path:
-        """The path of a file that begins now. Raises ``OSError``."""
+        """Return the path of a file that begins now. Raises ``OSError``."""
         ...
 
 
@@ -39,7 +39,7 @@ class Folder:
         self._room_bytes = (record.total_mib - record.file_mib) * MIB
 
     def next(self, system_ns: int) -> Path:
-        """The path of a file that begins now, with room for it. Raises ``OSError``."""
+        """Return the path of a file that begins now, and make room for it. Raises ``OSError``."""
         self.folder.mkdir(parents=True, exist_ok=True)
         files = self._files()
         number = max((number for number, *_ in files), default=0) + 1
@@ -53,7 +53,7 @@ class Folder:
         return self.folder / f"lcf-edge-{number:06}-{utc(system_ns):%Y%m%dT%H%M%SZ}.mcap"
 
     def _files(self) -> list[tuple[int, Path, int]]:
-        """Number, path and size (bytes) of our files; a link or a folder with such a name is none of ours."""
+        """Return number, path and size (bytes) of our files; links and folders do not count."""
         files = []
         for path in self.folder.iterdir():
             name = _OURS.fullmatch(path.name)
@@ -64,7 +64,7 @@ class Folder:
 
 
 class Named:
-    """The file that the user names; what does not fit into it goes to ``FILE_2.mcap`` and so on. Nothing is removed."""
+    """The file that the user names; the recording continues in ``FILE_2.mcap`` and so on. Nothing is removed."""
 
     def __init__(self, path: Path) -> None:
         self.folder = path.absolute().parent
@@ -72,7 +72,7 @@ class Named:
         self._path = path
 
     def next(self, system_ns: int) -> Path:  # noqa: ARG002  # the name is given
-        """The first of these that is not there."""
+        """Return the first of these that does not exist."""
         others = (self._path.with_stem(f"{self._path.stem}_{number}") for number in count(2))
         path = self._path
         while path.exists():
@@ -87,7 +87,7 @@ class Bag(Named):
         super().__init__(folder.absolute() / f"{folder.absolute().name}_0.mcap")
 
     def next(self, system_ns: int) -> Path:  # noqa: ARG002
-        """The next number."""
+        """Return the path with the next number."""
         files = (self.folder / f"{self.folder.name}_{number}.mcap" for number in count())
         return next(path for path in files if not path.exists())
 

@@ -1,6 +1,6 @@
 """From records to messages: what is recorded of each, on which topic.
 
-A message waits with the stamp of the monotonic clock; the file that it gets into puts its own clock's in its place.
+A message waits with a stamp of the monotonic clock, which the file replaces by one of the system clock.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -22,10 +22,10 @@ from lcf_edge.standard_messages.markers import encode_markers
 from lcf_edge.standard_messages.positions import Setup
 
 KnownLens = Callable[[Config, int, int], Lens | None]
-"""The calibrated lens for pictures of a width and height; None: it is only guessed."""
+"""The calibrated lens for images of a width and height; None: it is only guessed."""
 
 _MODELS = {"none": "plumb_bob", "radial-tangential": "plumb_bob", "equidistant": "equidistant"}
-_PNG_COMPRESSION = 1  # of 9; more takes several times as long for a few percent
+_PNG_COMPRESSION = 1  # of 9; more takes several times as long to save a few percent
 
 
 class RecordedTopic(NamedTuple):
@@ -35,10 +35,10 @@ class RecordedTopic(NamedTuple):
     message: str
     is_global: bool = False  # not below it
     is_stamped: bool = True  # its messages begin with a stamp
-    is_lasting: bool = False  # who plays it keeps the last message for those who come later
+    is_lasting: bool = False  # the player keeps the last message for late subscribers
 
     def path(self, prefix: str) -> str:
-        """As ROS writes it."""
+        """The topic's full name in ROS."""
         return f"/{self.name}" if self.is_global else f"/{prefix}/{self.name}"
 
 

@@ -13,7 +13,7 @@ from lcf_edge.recording.write.messages import TOPICS, RecordedMessage
 from lcf_edge.recording.write.qos import offered_qos
 from lcf_edge.recording.write.schemas import ENCODING, schema
 
-CHUNK_BYTES = 2**19  # the library holds a chunk four times while it ends it
+CHUNK_BYTES = 2**19  # the library holds a chunk four times while it closes it
 
 
 class RecordingFile:
@@ -48,7 +48,7 @@ class RecordingFile:
         except OSError:
             self.abandon()
             with suppress(OSError):
-                path.unlink()  # there is nothing in it
+                path.unlink()  # it is empty
             raise
 
     @property
@@ -58,7 +58,7 @@ class RecordingFile:
 
     @property
     def vanished(self) -> bool:
-        """Whether somebody has removed it."""
+        """Whether the file was removed."""
         return os.fstat(self._file).st_nlink == 0
 
     def attach(self, config_text: str, now_ns: int) -> None:
@@ -74,7 +74,7 @@ class RecordingFile:
         self._in_chunk_bytes += len(payload)
 
     def sync(self) -> None:
-        """End the chunk and have it on the disk. Raises ``OSError``; then the next call tries again."""
+        """Close the chunk and sync it to the disk. Raises ``OSError``; then the next call tries again."""
         self._writer.flush()  # type: ignore[no-untyped-call]
         self._in_chunk_bytes = 0
         at = self.size_bytes
@@ -101,18 +101,18 @@ class RecordingFile:
             self.abandon()
 
     def abandon(self) -> None:
-        """Close it as it is."""
-        with suppress(OSError):  # the disk is gone; the number of the file is given back even so
+        """Close the file as it is."""
+        with suppress(OSError):  # the disk is gone; the descriptor is closed nevertheless
             os.close(self._file)
 
 
 def _written(stamp_ns: int) -> int:
-    """A stamp as MCAP can have it, until the year 2554."""
+    """Clamp a stamp to what MCAP can hold: unsigned ns, until the year 2554."""
     return min(max(stamp_ns, 0), 2**64 - 1)
 
 
 class _Pending:
-    """What the writer wrote and the disk has not; a file for ``Writer``."""
+    """A file for ``Writer`` that holds what is not on the disk yet."""
 
     def __init__(self) -> None:
         self.bytes = 0
@@ -128,17 +128,17 @@ class _Pending:
         return self._before + self.bytes
 
     def flush(self) -> None:
-        """Nothing: ``RecordingFile.sync`` writes it."""
+        """Do nothing: ``RecordingFile.sync`` writes it."""
 
     def forget(self) -> None:
-        """It is on the disk."""
+        """Drop what is on the disk."""
         self._before += self.bytes
         self.bytes = 0
         self.pieces.clear()
 
 
 def _sync_folder(folder: Path) -> None:
-    """Have a new name on the disk."""
+    """Sync a folder, so that a new name in it survives a power cut."""
     handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY | os.O_CLOEXEC)
     try:
         os.fsync(handle)

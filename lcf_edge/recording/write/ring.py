@@ -6,7 +6,7 @@ from lcf_edge.recording.write.messages import RecordedMessage
 
 
 class Ring:
-    """Messages of the last ``before_s``; the oldest leave."""
+    """Messages of the last ``before_s``; older ones are dropped."""
 
     def __init__(self, before_s: float) -> None:
         self.bytes = 0
@@ -23,7 +23,7 @@ class Ring:
             self.bytes -= size_bytes(self._messages.popleft())
 
     def take(self) -> list[RecordedMessage]:
-        """All that it keeps, oldest first."""
+        """Remove and return all messages, oldest first."""
         messages = list(self._messages)
         self._messages.clear()
         self.bytes = 0
@@ -31,5 +31,5 @@ class Ring:
 
 
 def size_bytes(message: RecordedMessage) -> int:
-    """What a message takes in memory, with the objects that hold it."""
+    """Return the memory that a message takes, bytes, with the objects that hold it."""
     return len(message.payload) + 256

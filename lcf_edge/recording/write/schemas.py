@@ -1,4 +1,4 @@
-"""The definitions of the recorded messages, each with all that it is made of, as ``ros2msg``."""
+"""The definitions of the recorded messages, each with its nested types, as ``ros2msg``."""
 
 import re
 
@@ -105,7 +105,7 @@ _DEFINITIONS = {
 
 
 def schema(message: str) -> bytes:
-    """The definition of a type (``sensor_msgs/msg/Imu``), and behind it those of the types that it names."""
+    """Return the definition of a type (``sensor_msgs/msg/Imu``), followed by those of its nested types."""
     if message == "lcf_msgs/msg/Scene":
         return scene_schema().encode()
     first, *others = _with_parts(message.replace("/msg/", "/"))
@@ -114,7 +114,7 @@ def schema(message: str) -> bytes:
 
 
 def _with_parts(name: str) -> list[str]:
-    """A type and all that it is made of, each once."""
+    """Return a type and its nested types, each once."""
     names = [name]
     for one in names:
         parts = re.findall(r"^(\w+/\w+)", _DEFINITIONS[one], re.MULTILINE)
