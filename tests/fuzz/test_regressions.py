@@ -2,6 +2,8 @@
 
 import shutil
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,17 +12,20 @@ import pytest
 from tests.fuzz import __main__ as command
 from tests.fuzz.hunt import alarmed, hunt, peak_mib, strict, tried
 from tests.fuzz.mutation import CORPUS_BYTES, MAX_BYTES, Mutator
-from tests.fuzz.targets import TARGETS, Take
+from tests.fuzz.targets import TARGETS, Opened, Take
 
 REGRESSIONS = Path(__file__).with_name("regressions")
 INPUTS = sorted(path.relative_to(REGRESSIONS) for path in REGRESSIONS.glob("*/*"))
 MAX_REGRESSION_BYTES = 16_384
+HUNT_S = 3.0
+TRIES = 50  # a page on a busy computer does not always answer in time
 
 
 @pytest.mark.parametrize("name", TARGETS)
 def test_the_inputs_that_others_are_made_of_are_taken(name: str, tmp_path: Path) -> None:
     with TARGETS[name].opened(tmp_path) as take, strict(), alarmed():
-        assert all(tried(take, data) for data in TARGETS[name].seeds())
+        for data in TARGETS[name].seeds():
+            assert any(tried(take, data) for _ in range(TRIES))
 
 
 @pytest.mark.parametrize("path", INPUTS, ids=str)
@@ -37,54 +42,36 @@ def test_a_regression_is_small_and_belongs_to_a_parser(path: Path) -> None:
     assert (REGRESSIONS / path).stat().st_size <= MAX_REGRESSION_BYTES
 
 
-class Planted:
-    """A parser with one mistake, made where an input holds `token`."""
+@contextmanager
+def divides(_: Path) -> Iterator[Take]:
+    """A parser that divides by zero where an input holds ``ff ff``."""
+    yield lambda data: str(1 // int(b"\xff\xff" not in data))
 
-    token: bytes
 
-    def __init__(self, folder: Path) -> None:
-        del folder
+@contextmanager
+def grows(_: Path) -> Iterator[Take]:
+    """A parser that keeps 64 MiB where an input holds "grow"."""
+    kept = []
 
-    def __enter__(self) -> Take:
-        self.kept = [b""]
-        return self._take
-
-    def __exit__(self, *_: object) -> None:
-        self.kept.clear()
-
-    def _take(self, data: bytes) -> str:
-        if self.token in data:
-            self._err()
+    def take(data: bytes) -> str:
+        if b"grow" in data:
+            kept.append(bytes(range(256)) * 4096 * 64)
         return "taken"
 
-    def _err(self) -> None:
-        raise NotImplementedError
+    yield take
 
 
-class Divides(Planted):
-    token = b"\xff\xff"
-
-    def _err(self) -> None:
-        self.kept.append(bytes(1 // len(self.kept[0])))
-
-
-class Grows(Planted):
-    token = b"grow"
-
-    def _err(self) -> None:
-        self.kept.append(bytes(range(256)) * 4096 * 64)
-
-
-@pytest.mark.parametrize(("parser", "found"), [(Divides, "ZeroDivisionError at "), (Grows, "memory grown by ")])
-def test_a_mistake_is_found_and_its_input_kept_small(parser: type[Planted], found: str, tmp_path: Path) -> None:
-    target = replace(
-        TARGETS["speeds"], opened=parser, tokens=(parser.token,), seeds=lambda: [bytes(range(200))], grows_mib=32
-    )
-    report = hunt(target, 1.0, 0, tmp_path / "findings", tmp_path / "current")
+@pytest.mark.parametrize(
+    ("parser", "token", "found"),
+    [(divides, b"\xff\xff", "ZeroDivisionError at "), (grows, b"grow", "memory grown by ")],
+)
+def test_a_mistake_is_found_and_its_input_kept_small(parser: Opened, token: bytes, found: str, tmp_path: Path) -> None:
+    target = replace(TARGETS["speeds"], opened=parser, tokens=(token,), seeds=lambda: [bytes(range(200))], grows_mib=32)
+    report = hunt(target, HUNT_S, 0, tmp_path / "findings", tmp_path / "current")
     ((what, where),) = report.findings.items()
     assert what.startswith(found)
-    assert parser.token in Path(where).read_bytes()
-    assert parser is Grows or Path(where).read_bytes() == parser.token
+    assert token in Path(where).read_bytes()
+    assert parser is grows or Path(where).read_bytes() == token
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Config, Filter, Memory
-from lcf_edge.filter import LineCircleFilter
+from lcf_edge.filter import Corners, LineCircleFilter, Motion
 from lcf_edge.filter.tables import ObjectTable
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
@@ -217,14 +217,20 @@ def test_where_nothing_breaks_the_flow_there_is_no_object(drive: Drive, clutter:
         assert tables.objects.count == 0
 
 
-def test_what_stands_before_a_vehicle_that_stops_stays_where_it_was(
-    drive: Drive, box: Landmarks, clutter: Landmarks
-) -> None:
-    """Nothing moves in the picture any more: it breaks no flow, and is still there; what is known of it stays."""
+def before_a_wall(drive: Drive, box: Landmarks, clutter: Landmarks) -> tuple[LineCircleFilter, Corners, Motion]:
+    """The filter after a drive towards a wall, and the last that it was given."""
     wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
     tables = LineCircleFilter(Config(), wall.lens)
     for corners, motion in wall:
         tables.step(corners, motion)
+    return tables, corners, motion
+
+
+def test_what_stands_before_a_vehicle_that_stops_stays_where_it_was(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """Nothing moves in the picture any more: it breaks no flow, and is still there; what is known of it stays."""
+    tables, corners, motion = before_a_wall(drive, box, clutter)
     (row,) = published(tables.objects)
     identity, numbers = tables.objects.id[row], []
     for _ in range(100):
@@ -239,10 +245,7 @@ def test_before_a_vehicle_that_stands_an_object_is_not_held_by_what_lies_beside_
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
     """Else what somebody hid would hold him at its place, long after he left."""
-    wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
-    tables = LineCircleFilter(Config(), wall.lens)
-    for corners, motion in wall:
-        tables.step(corners, motion)
+    tables, corners, motion = before_a_wall(drive, box, clutter)
     for _ in range(20):
         tables.step(corners, replace(motion, speed_mps=0.0))
     edges, (row,) = tables.edges, published(tables.objects)
