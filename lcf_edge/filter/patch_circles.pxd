@@ -11,8 +11,8 @@ from lcf_edge.filter.situation cimport Situation
 cdef double MIN_ELAPSED_S
 cdef double MIN_SIGMAS
 cdef double ALIKE_SIGMAS
+cdef double UNEVEN
 cdef double SLOWER_HORIZONS
-cdef double SMALL_TURN_RAD
 cdef double KNOWN_WIDTHS
 cdef double HALF_SHARE
 cdef double GROUND_MARGIN
@@ -34,20 +34,20 @@ cdef double INFINITY
 cdef class PatchGroups:
     cdef readonly unsigned char[::1] obstacle, taken
     cdef readonly Members members
-    cdef double left, top, right, bottom, weight, inverse
+    cdef double left, top, right, bottom, weight, inverse, uneven
 
-cdef double least_miss(double right_m, double range_m, Situation around) noexcept nogil
 cdef bint stands(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
 cdef bint is_obstacle(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
 cdef double ground_inverse(double y, Situation around) noexcept nogil
 cdef bint is_upright(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
-cdef bint is_in_way(Patches patches, Py_ssize_t p, bint is_known, Situation around) noexcept nogil
+cdef bint is_in_way(PatchGroups groups, Py_ssize_t g, Patches patches, bint is_known, Situation around) noexcept nogil
 cdef bint agree(Patches patches, Py_ssize_t p, Py_ssize_t q) noexcept nogil
 cdef void add(PatchGroups groups, Py_ssize_t g, Patches patches, Py_ssize_t p) noexcept nogil
 cdef bint gather(PatchGroups groups, Py_ssize_t p, Patches patches) noexcept nogil
+cdef bint grows_evenly(PatchGroups groups) noexcept nogil
 cdef void claim(PatchGroups groups, Py_ssize_t p, Patches patches, int circle) noexcept nogil
 @cython.locals(nearest=int, least=double)
 cdef int circle_of(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef void tell(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
-@cython.locals(seen=bint, is_shown=bint, evicted=int, c=int)
+@cython.locals(seen=bint, is_shown=bint, is_known=bint, evicted=int, c=int)
 cdef int update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

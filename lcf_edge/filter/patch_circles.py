@@ -18,8 +18,8 @@ from lcf_edge.messages import Cause
 MIN_ELAPSED_S = 0.5  # before that, a patch has not grown enough to be believed
 MIN_SIGMAS = 4.0  # by which the inverse range of what will be met is above zero,
 ALIKE_SIGMAS = 3.0  # and that of a patch that agrees
+UNEVEN = 3.0  # sigmas of a group's growth that half its difference between across and down counts as
 SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
-SMALL_TURN_RAD = 0.25  # of the path on the way to what is met, which may as well not come
 KNOWN_WIDTHS = 1.1  # half widths from the path within which what is known to be in the way still is
 HALF_SHARE = 0.6  # of half a side, by which what a patch shows reaches to the side at least
 GROUND_MARGIN = 0.3  # share by which the ground may be misjudged
@@ -43,20 +43,14 @@ class PatchGroups:
     """Patches that show one thing; a row a patch, by which the group was found.
 
     ``obstacle``: whether a patch shows one; ``taken``: whether it is of a group already. ``members``: as those of
-    circles, of the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m.
+    circles, of the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m;
+    ``uneven``: the same of half the difference between its growth across and down.
     """
 
     def __init__(self, patches: int) -> None:
         self.obstacle, self.taken = (octets(max(patches, 1)) for _ in range(2))
         self.members = Members(max(patches, 1))
-        self.left = self.top = self.right = self.bottom = self.weight = self.inverse = 0.0
-
-
-def least_miss(right_m: float, range_m: float, around: Situation) -> float:
-    """Lateral miss of the path, m: of its arc, or of the straight line where so small a turn may soon be over."""
-    arc_m = path.miss(right_m, range_m, around)
-    turn_rad = math.fabs(around.yaw_rate_radps) * range_m / around.speed_mps
-    return right_m if turn_rad < SMALL_TURN_RAD and math.fabs(right_m) < math.fabs(arc_m) else arc_m
+        self.left = self.top = self.right = self.bottom = self.weight = self.inverse = self.uneven = 0.0
 
 
 def stands(patches: Patches, p: int, around: Situation) -> bool:
@@ -114,13 +108,13 @@ def is_upright(patches: Patches, p: int, around: Situation) -> bool:
     return False
 
 
-def is_in_way(patches: Patches, p: int, is_known: bool, around: Situation) -> bool:
-    """Whether the path meets what a patch shows. What is known already must leave the way by more than the doubt."""
-    range_m = 1 / patches.inverse[p]
-    right_m = (patches.x[p] - around.focus_x) / around.pinhole.fx * range_m
-    beside_m = HALF_SHARE * patches.half_px[p] * patches.scale[p] / around.pinhole.fx * range_m
+def is_in_way(groups: PatchGroups, g: int, patches: Patches, is_known: bool, around: Situation) -> bool:
+    """Whether the path meets what a group shows. What is known already must leave the way by more than the doubt."""
+    range_m = 1 / groups.inverse
+    right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
+    beside_m = HALF_SHARE * patches.half_px[g] * patches.scale[g] / around.pinhole.fx * range_m
     half_m = around.half_width_m * (KNOWN_WIDTHS if is_known else 1.0)
-    return math.fabs(least_miss(right_m, range_m, around)) < half_m + beside_m
+    return math.fabs(path.least_miss(right_m, range_m, around)) < half_m + beside_m
 
 
 def agree(patches: Patches, p: int, q: int) -> bool:
@@ -151,6 +145,7 @@ def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
     groups.top, groups.bottom = min(groups.top, patches.y[p] - half), max(groups.bottom, patches.y[p] + half)
     groups.weight += weight
     groups.inverse += weight * patches.inverse[p]
+    groups.uneven += weight * patches.stretch[p] / patches.depth_m[p]
 
 
 def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
@@ -158,7 +153,7 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
     shared.clear(groups.members, p)
     groups.left = groups.top = INFINITY
     groups.right = groups.bottom = -INFINITY
-    groups.weight = groups.inverse = 0.0
+    groups.weight = groups.inverse = groups.uneven = 0.0
     for q in range(patches.capacity):
         if agree(patches, p, q):
             add(groups, p, patches, q)
@@ -166,11 +161,21 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
         return False
     add(groups, p, patches, p)
     groups.inverse /= groups.weight
+    groups.uneven /= groups.weight
     across, down = groups.right - groups.left, groups.bottom - groups.top
     groups.members.x[p], groups.members.y[p] = groups.left + 0.5 * across, groups.top + 0.5 * down
     groups.members.variance_x[p] = across * across / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
     groups.members.variance_y[p] = down * down / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
     return True
+
+
+def grows_evenly(groups: PatchGroups) -> bool:
+    """Whether a group grows as much down as across.
+
+    Things in a row beside the way flow apart, the nearer the farther from the focus, and seem to be a nearer one that
+    grows; but only along their row. The ground grows more down than across.
+    """
+    return groups.inverse > MIN_SIGMAS * flow.length(1 / math.sqrt(groups.weight), UNEVEN * groups.uneven)
 
 
 def claim(groups: PatchGroups, p: int, patches: Patches, circle: int) -> None:
@@ -204,7 +209,7 @@ def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Si
         rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, 1 / circles.ttc[c], rate)
     circles.cause[c] = INCOMING
     circles.ttc[c], circles.range[c] = 1 / rate, range_m
-    circles.lateral[c] = least_miss(right_m, range_m, around)
+    circles.lateral[c] = path.least_miss(right_m, range_m, around)
     dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
     circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * flow.length(dx, dy)
 
@@ -234,7 +239,8 @@ def update(
         if not groups.obstacle[p] or groups.taken[p] or not gather(groups, p, patches):
             continue
         c = circle_of(groups, p, circles, settings)
-        if not is_in_way(patches, p, c >= 0 and circles.cause[c] == INCOMING, around):
+        is_known = c >= 0 and circles.cause[c] == INCOMING
+        if not is_in_way(groups, p, patches, is_known, around) or (c < 0 and not grows_evenly(groups)):
             continue
         is_shown = c >= 0 and updated[c] != 0  # by rebels, to which it is left
         if c < 0:

@@ -22,6 +22,7 @@ cdef int BIRTHS
 cdef double MIN_CONTRAST_GREY
 cdef double NOISE_GREY
 cdef double MAX_SCALE_SIGMA
+cdef double MIN_ALONE
 cdef double MIN_SCALE_SIGMA
 cdef double FAR_PX
 cdef int ROUNDS
@@ -42,8 +43,9 @@ cdef class Patches:
     cdef readonly int[::1] misses, circle
     cdef readonly double[::1] x, y, first_x, first_y, half_px, scale, sigma, elapsed_s, depth_m, inverse, doubt
     cdef readonly double[::1] contrast, unit, weight, sampled
-    cdef readonly double[:, ::1] grey, across, down, growing, sums, inverted
-    cdef double u, v, right_u, right_v, down_u, down_v, mean, square, shared, on_across, on_down, on_growing, tried
+    cdef readonly double[:, ::1] grey, across, down, growing, stretching, sums, inverted, coupled
+    cdef readonly double[::1] alone, stretch
+    cdef double u, v, right_u, right_v, down_u, down_v, mean, square, shared, on_across, on_down, on_growing, on_stretching, tried
 
 @cython.locals(k=int)
 cdef void weigh(Patches patches) noexcept nogil
@@ -68,7 +70,7 @@ cdef int next_place(Patches patches, EdgeColumns edges, double half, Situation a
 @cython.locals(mean=double, k=int)
 cpdef bint give_birth(Patches patches, Py_ssize_t p, double x, double y, double half, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
 cdef double slope(Patches patches, Py_ssize_t p, int k, int place, int stride) noexcept nogil
-@cython.locals(square=double, xx=double, xy=double, xs=double, yy=double, ys=double, ss=double, k=int, row=int, column=int)
+@cython.locals(square=double, xx=double, xy=double, xs=double, yy=double, ys=double, ss=double, xt=double, yt=double, st=double, tt=double, k=int, row=int, column=int)
 cdef bint set_template(Patches patches, Py_ssize_t p) noexcept nogil
 @cython.locals(i=int, p=int)
 cpdef void renew(Patches patches, EdgeColumns edges, const unsigned char[::1] image, ImagePlane plane, Situation around) noexcept nogil

@@ -31,6 +31,7 @@ BIRTHS = 3  # in one frame, at most
 MIN_CONTRAST_GREY = 6.0
 NOISE_GREY = 2.0  # 1 sigma of a sample, at least
 MAX_SCALE_SIGMA = 0.0125  # of a newborn; what does not show its scale is of no use
+MIN_ALONE = 1e-6  # share that shift and scale leave of what stretching changes, at least
 MIN_SCALE_SIGMA = 0.01  # what a patch shows is not flat
 FAR_PX = 1e9
 ROUNDS = 4
@@ -51,13 +52,15 @@ class Patches:
 
     ``x``, ``y``: its middle, px; ``first_x``, ``first_y``: where that was first seen, derotated to now, px;
     ``half_px``: half a side when it was first seen; ``scale``: s since then, and ``sigma`` of it; ``elapsed_s``;
-    ``depth_m``: ΔZ;
+    ``depth_m``: ΔZ; ``stretch``: half of what it grew more across than down, as a share of its size;
     ``misses``: frames in a row that did not show it; ``inverse``, ``doubt``: 1/Z as if it stood still, and its sigma,
     1/m; ``circle``: row of C_r that it supports in this frame, -1: none.
 
-    The template, over its samples: ``grey``, less its mean; ``across``, ``down``, ``growing``: what shift and scale
-    change of it, weighed; ``sums`` of these and their products with ``grey`` (6); ``inverted``, of the normal
-    equations (9); ``contrast``: 1 sigma of ``grey``; ``unit``: sigma of the scale for a noise of one grey level.
+    The template, over its samples: ``grey``, less its mean; ``across``, ``down``, ``growing``, ``stretching``: what
+    shift, scale and stretch change of it, weighed; ``sums`` of these and their products with ``grey`` (8);
+    ``inverted``, of the normal equations of the first three (9); ``coupled``: their products with ``stretching`` (3);
+    ``alone``: what of the square of that they leave; ``contrast``: 1 sigma of ``grey``; ``unit``: sigma of the scale
+    for a noise of one grey level.
 
     ``weight`` of the samples. ``tried``: how far from the path a place was tried, px. The rest is what one comparison
     gives.
@@ -72,10 +75,14 @@ class Patches:
         self.depth_m, self.inverse, self.doubt = (doubles(max(capacity, 1)) for _ in range(3))
         self.contrast, self.unit = (doubles(max(capacity, 1)) for _ in range(2))
         self.grey, self.across, self.down, self.growing = (doubles(max(capacity, 1), SAMPLES) for _ in range(4))
-        self.sums, self.inverted = doubles(max(capacity, 1), 6), doubles(max(capacity, 1), 9)
+        self.stretching = doubles(max(capacity, 1), SAMPLES)
+        self.sums, self.inverted = doubles(max(capacity, 1), 8), doubles(max(capacity, 1), 9)
+        self.coupled = doubles(max(capacity, 1), 3)
+        self.alone, self.stretch = (doubles(max(capacity, 1)) for _ in range(2))
         self.weight, self.sampled = doubles(SAMPLES), doubles(SAMPLES)
         self.u = self.v = self.right_u = self.right_v = self.down_u = self.down_v = 0.0
-        self.mean = self.square = self.shared = self.on_across = self.on_down = self.on_growing = 0.0
+        self.mean = self.square = self.shared = 0.0
+        self.on_across = self.on_down = self.on_growing = self.on_stretching = 0.0
         self.tried = 0.0
         weigh(self)
 
@@ -168,7 +175,7 @@ def look(patches: Patches, image: Bytes, width: int) -> None:
 def compare(patches: Patches, p: int) -> None:
     """Sums over the samples that matching takes."""
     patches.mean = patches.square = patches.shared = 0.0
-    patches.on_across = patches.on_down = patches.on_growing = 0.0
+    patches.on_across = patches.on_down = patches.on_growing = patches.on_stretching = 0.0
     for k in range(SAMPLES):
         grey = patches.sampled[k]
         weighed = patches.weight[k] * grey
@@ -178,6 +185,7 @@ def compare(patches: Patches, p: int) -> None:
         patches.on_across += patches.across[p, k] * grey
         patches.on_down += patches.down[p, k] * grey
         patches.on_growing += patches.growing[p, k] * grey
+        patches.on_stretching += patches.stretching[p, k] * grey
 
 
 def bounded(value: float, most: float) -> float:
@@ -188,7 +196,8 @@ def bounded(value: float, most: float) -> float:
 def step(patches: Patches, p: int, gain: float) -> float:
     """One round of the search: shift and scale that make the samples, times ``gain``, like the template.
 
-    Return by how much that changed the patch, in shares of what ends the search.
+    What it is stretched besides is told and not undone. Return by how much the patch was changed, in shares of what
+    ends the search.
     """
     across = gain * (patches.on_across - patches.mean * patches.sums[p, 0]) - patches.sums[p, 3]
     down = gain * (patches.on_down - patches.mean * patches.sums[p, 1]) - patches.sums[p, 4]
@@ -197,6 +206,9 @@ def step(patches: Patches, p: int, gain: float) -> float:
     x = patches.inverted[p, 0] * across + patches.inverted[p, 1] * down + patches.inverted[p, 2] * growing
     y = patches.inverted[p, 3] * across + patches.inverted[p, 4] * down + patches.inverted[p, 5] * growing
     grown = patches.inverted[p, 6] * across + patches.inverted[p, 7] * down + patches.inverted[p, 8] * growing
+    stretching = gain * (patches.on_stretching - patches.mean * patches.sums[p, 6]) - patches.sums[p, 7]
+    stretching -= patches.coupled[p, 0] * x + patches.coupled[p, 1] * y + patches.coupled[p, 2] * grown
+    patches.stretch[p] = -stretching / patches.alone[p]
     x, y, grown = bounded(x, most), bounded(y, most), bounded(grown, STEP_SCALE)
     patches.x[p] -= patches.scale[p] * x
     patches.y[p] -= patches.scale[p] * y
@@ -282,8 +294,6 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
     """
     fx, fy = around.pinhole.fx, around.pinhole.fy
     halfway_m = 0.5 * around.speed_mps * around.horizon_s
-    beside_m = path.miss(0.0, halfway_m, around)
-    middle_x = around.focus_x - fx * beside_m / halfway_m
     reach = max(BESIDE * around.half_width_m * fx / halfway_m, BESIDE_HALVES * half)
     top = around.horizon_y - max(around.height_m - around.camera_height_m, 0.0) / halfway_m * fy - half
     bottom = around.horizon_y + fy * around.camera_height_m / (around.speed_mps * NEAREST_S)
@@ -292,8 +302,11 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
     best, least = -1, FAR_PX
     for i in range(edges.count):
         x, y = edges.x[i], edges.y[i]
-        away = math.fabs(x - middle_x)
-        if away >= reach or y <= top or y >= bottom or not edges.matched[i]:
+        if y <= top or y >= bottom or not edges.matched[i]:
+            continue
+        right_m = (x - around.focus_x) / fx * halfway_m
+        away = math.fabs(path.least_miss(right_m, halfway_m, around)) / halfway_m * fx
+        if away >= reach:
             continue
         away += ROW_SHARE * math.fabs(y - around.horizon_y)
         if patches.tried < away < least and not is_covered(patches, x, y, half):
@@ -335,14 +348,15 @@ def slope(patches: Patches, p: int, k: int, place: int, stride: int) -> float:
 def set_template(patches: Patches, p: int) -> bool:
     """What shift and scale change of the template, and the inverse of its normal equations; False: it is of no use."""
     half, spacing = patches.half_px[p], 2 * patches.half_px[p] / (SIDE - 1)
-    square = xx = xy = xs = yy = ys = ss = 0.0
-    for k in range(6):
+    square = xx = xy = xs = yy = ys = ss = xt = yt = st = tt = 0.0
+    for k in range(8):
         patches.sums[p, k] = 0.0
     for k in range(SAMPLES):
         row, column = k // SIDE, k % SIDE
         weight, grey = patches.weight[k], patches.grey[p, k]
         x, y = slope(patches, p, k, column, 1) / spacing, slope(patches, p, k, row, SIDE) / spacing
         grows = half * (x * offset(column) + y * offset(row))
+        stretches = half * (x * offset(column) - y * offset(row))
         square += weight * grey * grey
         xx += weight * x * x
         xy += weight * x * y
@@ -350,6 +364,11 @@ def set_template(patches: Patches, p: int) -> bool:
         yy += weight * y * y
         ys += weight * y * grows
         ss += weight * grows * grows
+        xt += weight * x * stretches
+        yt += weight * y * stretches
+        st += weight * grows * stretches
+        tt += weight * stretches * stretches
+        patches.stretching[p, k] = weight * stretches
         patches.across[p, k], patches.down[p, k], patches.growing[p, k] = weight * x, weight * y, weight * grows
         patches.sums[p, 0] += weight * x
         patches.sums[p, 1] += weight * y
@@ -357,6 +376,8 @@ def set_template(patches: Patches, p: int) -> bool:
         patches.sums[p, 3] += weight * x * grey
         patches.sums[p, 4] += weight * y * grey
         patches.sums[p, 5] += weight * grows * grey
+        patches.sums[p, 6] += weight * stretches
+        patches.sums[p, 7] += weight * stretches * grey
     patches.contrast[p] = math.sqrt(square)
     xx_minor, xy_minor, xs_minor = yy * ss - ys * ys, xy * ss - ys * xs, xy * ys - yy * xs
     determinant = xx * xx_minor - xy * xy_minor + xs * xs_minor
@@ -368,6 +389,11 @@ def set_template(patches: Patches, p: int) -> bool:
     patches.inverted[p, 4] = (xx * ss - xs * xs) / determinant
     patches.inverted[p, 5] = patches.inverted[p, 7] = (xs * xy - xx * ys) / determinant
     patches.inverted[p, 8] = (xx * yy - xy * xy) / determinant
+    across = patches.inverted[p, 0] * xt + patches.inverted[p, 1] * yt + patches.inverted[p, 2] * st
+    down = patches.inverted[p, 3] * xt + patches.inverted[p, 4] * yt + patches.inverted[p, 5] * st
+    growing = patches.inverted[p, 6] * xt + patches.inverted[p, 7] * yt + patches.inverted[p, 8] * st
+    patches.coupled[p, 0], patches.coupled[p, 1], patches.coupled[p, 2] = xt, yt, st
+    patches.alone[p] = max(tt - across * xt - down * yt - growing * st, MIN_ALONE * tt)
     patches.unit[p] = math.sqrt(patches.inverted[p, 8] / (EFFECTIVE_SHARE * SAMPLES))
     return patches.unit[p] < MAX_SCALE_SIGMA
 

@@ -4,7 +4,9 @@ from lcf_edge.filter.situation cimport Situation
 cdef double INFINITY
 cdef double MIN_CURVATURE
 cdef double MIN_SPEED_MPS
+cdef double SMALL_TURN_RAD
 
 cdef double arc_radius_m(Situation around) noexcept nogil
 cpdef double miss(double right_m, double ahead_m, Situation around) noexcept nogil
+cpdef double least_miss(double right_m, double ahead_m, Situation around) noexcept nogil
 cpdef double way_to(double right_m, double ahead_m, Situation around) noexcept nogil

@@ -7,6 +7,7 @@ from lcf_edge.filter.situation import Situation
 INFINITY = float("inf")
 MIN_CURVATURE = 1e-3  # 1/m, an arc with less is as good as straight
 MIN_SPEED_MPS = 0.05  # below it a yaw rate says nothing about a path
+SMALL_TURN_RAD = 0.4  # may as well not come: it may be noise, or soon be over
 
 
 def arc_radius_m(around: Situation) -> float:
@@ -25,6 +26,19 @@ def miss(right_m: float, ahead_m: float, around: Situation) -> float:
         return right_m
     distance = math.sqrt((right_m + radius) * (right_m + radius) + ahead_m * ahead_m) - math.fabs(radius)
     return -distance if radius < 0 else (distance if radius > 0 else 0.0)
+
+
+def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
+    """Distance of a point from the path, m, right positive; the least of those between arc and straight line, where
+    the turn on the way there is small.
+    """
+    arc_m = miss(right_m, ahead_m, around)
+    turn_rad = math.fabs(around.yaw_rate_radps) * ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
+    if not turn_rad < SMALL_TURN_RAD:
+        return arc_m
+    if right_m * arc_m < 0:
+        return 0.0
+    return right_m if math.fabs(right_m) < math.fabs(arc_m) else arc_m
 
 
 def way_to(right_m: float, ahead_m: float, around: Situation) -> float:

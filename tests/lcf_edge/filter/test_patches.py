@@ -71,6 +71,22 @@ def test_over_many_pictures_the_scale_is_that_since_the_first_one() -> None:
     assert (patches.x[0], patches.y[0]) == pytest.approx(MIDDLE, abs=0.2)
 
 
+@given(st.floats(-0.06, 0.06), st.floats(1.0, 1.06), st.integers(0, 50))
+@settings(max_examples=30)
+def test_what_grows_more_one_way_than_the_other_is_told(stretch: float, scale: float, seed: int) -> None:
+    """As do things in a row, of which the nearer go outward faster: no one thing grows like that."""
+    image = pattern(640, 480, seed)
+    patches = born(image)
+    assume(patches is not None)
+    assert patches is not None
+    x, y = MIDDLE
+    across, down = scale + stretch, scale - stretch
+    matrix = np.array([[across, 0, x - across * x], [0, down, y - down * y]])
+    follow(patches, np.asarray(cv2.warpAffine(image, matrix, (640, 480), flags=cv2.INTER_CUBIC), np.uint8))
+    assume(not patches.misses[0])
+    assert patches.stretch[0] == pytest.approx(stretch, abs=0.02)
+
+
 def test_the_lens_is_in_what_is_compared() -> None:
     """Towards the rim a fisheye shows things smaller; what turns there has not gone away."""
     image = pattern(1200, 1200, 5, 4.0)
