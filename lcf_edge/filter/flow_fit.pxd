@@ -29,8 +29,12 @@ cdef double NARROWING
 cdef double MIN_WIDTH_PX
 cdef double FIRST_WIDTH
 cdef int SLOT_EDGES
+cdef int UNSURE_SLOT_EDGES
+cdef double UNSURE_PX
+cdef double UNSURE_SIGMAS
 cdef int SLOT_ROUNDS
 cdef double SLOT_WIDTH_PX
+cdef double SLOT_NARROWING
 cdef double SLOT_SHARE
 cdef double SLOT_SIGMA_RAD
 cdef double SCALE_SHARE
@@ -57,7 +61,7 @@ cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double explained(FlowFit fit) noexcept nogil
 cdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
 cpdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
-cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad) noexcept nogil
+cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad, double width) noexcept nogil
 cdef int slot_edges(FlowFit fit, int k) noexcept nogil
 cdef void apply(FlowFit fit, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
 cdef void learn_turn_share(FlowFit fit, double dt_s) noexcept nogil

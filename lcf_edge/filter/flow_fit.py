@@ -44,9 +44,13 @@ ROUNDS = 8
 NARROWING = 0.7  # of the width beyond which an edge is an outlier, from round to round,
 MIN_WIDTH_PX = 0.7  # down to this
 FIRST_WIDTH = 3.0  # of the median drift, to begin with
-SLOT_EDGES = 10  # for a rotation of a key frame's own
-SLOT_ROUNDS = 3
-SLOT_WIDTH_PX = 1.0
+SLOT_EDGES = 10  # for a rotation of a key frame's own,
+UNSURE_SLOT_EDGES = 5  # where the gyro's bias leaves that uncertain by more than
+UNSURE_PX = 2.0
+UNSURE_SIGMAS = 2.0  # of that uncertainty by which an edge is no outlier yet
+SLOT_ROUNDS = 4
+SLOT_WIDTH_PX = 1.0  # beyond which an edge is an outlier in the end,
+SLOT_NARROWING = 0.5  # and how much narrower that is from round to round
 SLOT_SHARE = 0.3  # of the sigma of ω, by which key frames may differ,
 SLOT_SIGMA_RAD = 0.002  # and at least by this
 SCALE_SHARE = 0.35  # of the edges stay nearer to their lines than the quantile that tells the scale: movers do not,
@@ -220,8 +224,13 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
         width = max(MIN_WIDTH_PX, NARROWING * width)
 
 
-def turn_slot(fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float) -> None:
-    """A rotation of key frame ``k``'s own, of what is left; the key frame keeps it."""
+def turn_slot(
+    fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float, width: float
+) -> None:
+    """A rotation of key frame ``k``'s own, of what is left; the key frame keeps it.
+
+    ``width``: px, beyond which an edge is an outlier at first.
+    """
     fit.equations.solution[0] = fit.equations.solution[1] = fit.equations.solution[2] = 0.0
     for _ in range(SLOT_ROUNDS):
         least_squares.begin(fit.equations, 3)
@@ -232,8 +241,9 @@ def turn_slot(fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinho
             if fit.slot[j] == k:
                 fit.equations.row[0], fit.equations.row[1], fit.equations.row[2] = fit.pitch[j], fit.yaw[j], fit.roll[j]
                 left = fit.rest[j] - (turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j])
-                least_squares.add(fit.equations, weight_of(left, SLOT_WIDTH_PX), fit.rest[j])
+                least_squares.add(fit.equations, weight_of(left, width), fit.rest[j])
         least_squares.solve(fit.equations)
+        width = max(SLOT_WIDTH_PX, SLOT_NARROWING * width)
     turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
     for j in range(fit.count):
         if fit.slot[j] == k:
@@ -272,9 +282,12 @@ def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole,
         baselines.focus_x[k] += fit.focus_x
         baselines.focus_y[k] += fit.focus_y
         lines.turn(baselines, k, pinhole, t * turn_x, t * turn_y, t * turn_z)
-        if slot_edges(fit, k) >= SLOT_EDGES:
-            sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, baselines.sigma_px[k] / pinhole.focal)
-            turn_slot(fit, k, keys, baselines, pinhole, sigma_rad)
+        unsure_rad = keys.rate_sigma_radps * t
+        unsure_px = unsure_rad * pinhole.focal
+        if slot_edges(fit, k) >= (UNSURE_SLOT_EDGES if unsure_px > UNSURE_PX else SLOT_EDGES):
+            own_rad = max(baselines.sigma_px[k] / pinhole.focal, unsure_rad if unsure_px > UNSURE_PX else 0.0)
+            sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, own_rad)
+            turn_slot(fit, k, keys, baselines, pinhole, sigma_rad, max(SLOT_WIDTH_PX, UNSURE_SIGMAS * unsure_px))
     fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
 
 

@@ -22,7 +22,7 @@ class KeyFrames:
         self.step = doubles(1, 3, 3)
         self.elapsed_s, self.sigma_rad = doubles(KEYS), doubles(KEYS)
         self.number = 0
-        self.since_s = 0.0
+        self.since_s = self.rate_sigma_radps = 0.0
 
 
 def turn_one(keys: KeyFrames, k: int, rotation: Doubles) -> None:
@@ -73,8 +73,9 @@ def advance(
     keys.since_s += dt_s
 
 
-def inflate(keys: KeyFrames, sigma_rad: float) -> None:
+def inflate(keys: KeyFrames, sigma_rad: float, dt_s: float) -> None:
     """Account for what the rotation of the last interval leaves uncertain."""
+    keys.rate_sigma_radps = sigma_rad / dt_s
     for k in range(KEYS):
         keys.sigma_rad[k] = math.sqrt(keys.sigma_rad[k] * keys.sigma_rad[k] + sigma_rad * sigma_rad)
 

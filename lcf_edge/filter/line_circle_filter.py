@@ -320,7 +320,7 @@ class LineCircleFilter:
             derotation.derotate_predictions(edges, self._homography)
         else:
             self._missing_px = settings.leap_px  # lost: look everywhere
-        key_frames.inflate(self._keys, sigma_rad)
+        key_frames.inflate(self._keys, sigma_rad, self._around.dt_s)
         return sigma_rad, residual
 
     def _update(self, sigma_rad: float) -> None:

@@ -154,9 +154,9 @@ def test_a_correction_counts_as_if_the_gyro_had_measured_it() -> None:
 def test_uncertainties_of_rotation_add_as_independent_ones_since_each_key_frame() -> None:
     keys = KeyFrames()
     first = key_frames.mark(keys)
-    key_frames.inflate(keys, 0.003)
+    key_frames.inflate(keys, 0.003, 0.05)
     second = key_frames.mark(keys)
-    key_frames.inflate(keys, 0.004)
+    key_frames.inflate(keys, 0.004, 0.05)
     assert keys.sigma_rad[first] == pytest.approx(0.005)
     assert keys.sigma_rad[second] == pytest.approx(0.004)
 

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from lcf_edge.config import Config, Filter
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow_fit
+from lcf_edge.filter import flow_fit, key_frames
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
@@ -167,6 +167,18 @@ def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation() -> None:
     seen.measured(14)  # too few for a fit: those that told it are gone
     assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
     assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
+
+
+@pytest.mark.parametrize(("bias_sigma_radps", "turned_rad"), [(0.05, -0.02), (0.0, 0.0)])
+def test_few_edges_tell_the_rotation_of_a_key_frame_while_the_gyro_s_bias_is_unknown(
+    bias_sigma_radps: float, turned_rad: float
+) -> None:
+    """At the start of a drive: else the far end of a street, all that is followed for long, seems to cross."""
+    seen = Seen(slot_turn_rad=0.02, number=90, seed=1)
+    key_frames.inflate(seen.keys, bias_sigma_radps * 0.05, 0.05)
+    rotation = np.asarray(seen.measured().keys.rotation)
+    assert 5 <= np.count_nonzero(np.asarray(seen.fit.slot)[: seen.fit.count] == 0) < 10
+    assert rotation[0, 0, 2] == pytest.approx(turned_rad, abs=0.006)
 
 
 def test_a_key_frame_that_the_flow_says_nothing_of_stays_as_uncertain_as_the_gyro_leaves_it() -> None:
