@@ -591,19 +591,23 @@ def page(_: Path) -> Iterator[Take]:
     logging.getLogger("aiohttp").propagate = False
     server = _Page()
 
-    def exchanged(data: bytes, patience_s: float) -> bytes:
-        with socket.create_connection(server.address) as browser, suppress(ConnectionError, TimeoutError):
-            browser.sendall(data)
-            browser.settimeout(patience_s)  # what is not whole is not answered
+    def received(browser: socket.socket, patience_s: float) -> bytes:
+        with suppress(ConnectionError, TimeoutError):
+            browser.settimeout(patience_s)
             return browser.recv(4096)
         return b""
 
     def take(data: bytes) -> str:
-        answer = exchanged(data, 0.02)
+        with socket.create_connection(server.address) as attacker, socket.create_connection(server.address) as browser:
+            with suppress(ConnectionError):
+                attacker.sendall(data)
+            browser.sendall(b"GET /icon.svg HTTP/1.1\r\nHost: localhost\r\n\r\n")
+            served = received(browser, 4.0)
+            answer = received(attacker, 0.02)  # by now it is there, or what was asked is not whole
         assert b"Traceback" not in answer
         assert not server.complaints, server.complaints
         assert b" 500 " not in answer[:16], answer
-        assert exchanged(b"GET /icon.svg HTTP/1.1\r\nHost: localhost\r\n\r\n", 4.0).startswith(b"HTTP/1.1 200")
+        assert served.startswith(b"HTTP/1.1 200")
         return answer[9:12].decode("latin-1")
 
     try:

@@ -17,7 +17,7 @@ from lcf_edge.filter import key_frames, rebel_detection
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.key_frames import KeyFrames
-from lcf_edge.filter.path import miss, way_to
+from lcf_edge.filter.path import least_miss, miss, way_to
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
@@ -240,6 +240,25 @@ def test_the_way_to_a_point_is_as_long_as_the_arc_that_ends_beside_it(situation:
             arc_m, turn = 2.0 / yaw_rate_radps, 0.7  # 2.8 m on the arc
             right, ahead = (arc_m + off) * math.cos(turn) - arc_m, abs(arc_m + off) * math.sin(turn)
         assert way_to(right, ahead, around) == pytest.approx(2.8, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("yaw_rate_radps", "right_m", "least_m"),
+    [
+        pytest.param(0.1, -0.2, 0.0, id="between the straight line and the arc"),
+        pytest.param(0.1, 0.3, 0.3, id="on the other side: of the straight line"),
+        pytest.param(0.1, -0.7, None, id="beyond the arc: of the arc"),
+        pytest.param(0.5, -0.2, None, id="a turn that is not small comes: of the arc"),
+    ],
+)
+def test_a_small_turn_may_as_well_not_come(
+    situation: Around, yaw_rate_radps: float, right_m: float, least_m: float | None
+) -> None:
+    """At 1 m/s to the left, 3 m ahead: 0.3 rad and 1.5 rad."""
+    around = situation(speed_mps=1.0, yaw_rate_radps=yaw_rate_radps)
+    arc_m = miss(right_m, 3.0, around)
+    assert arc_m != pytest.approx(right_m, abs=0.1)
+    assert least_miss(right_m, 3.0, around) == pytest.approx(arc_m if least_m is None else least_m)
 
 
 def test_neighbours_tell_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
