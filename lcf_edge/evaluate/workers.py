@@ -41,7 +41,7 @@ def by_processes(tasks: Sequence[Task], jobs: int) -> Iterator[Outcome]:
                     yield task, _result(future)
         for task in suspects:
             with _pool(1) as pool:
-                with _interrupts_held():
+                with interrupts_held():
                     future = pool.submit(evaluate, task, task.frames_before())
                 yield task, _result(future)
 
@@ -57,13 +57,27 @@ def _pool(jobs: int) -> Iterator[Executor]:
 
 
 @contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold back Ctrl-C while a worker starts, which inherits it: before it is ready, it would print a traceback."""
+def interrupts_held() -> Iterator[None]:
+    """Hold back Ctrl-C while a worker starts: one that is not yet ready, or loses its parent, prints a traceback.
+
+    The worker inherits the mask. Here the mask is not enough: another thread takes the signal, and Python runs
+    its handler in this one.
+    """
+    came = False
+
+    def keep(_signal: int, _frame: object) -> None:
+        nonlocal came
+        came = True
+
+    before = signal.signal(signal.SIGINT, keep)
     signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
     try:
         yield
     finally:
+        signal.signal(signal.SIGINT, before)
         signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
+        if came:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _end_by_interrupt() -> None:
@@ -123,7 +137,7 @@ def _ended(
     while running or (waiting and not is_broken):
         while waiting and len(running) < width and not is_broken:
             try:
-                with _interrupts_held():
+                with interrupts_held():
                     future = executor.submit(evaluate, waiting[0], waiting[0].frames_before())
                 running[future] = waiting.popleft()
             except BrokenProcessPool:

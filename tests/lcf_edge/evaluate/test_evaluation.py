@@ -5,6 +5,7 @@ import re
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from html.parser import HTMLParser
@@ -20,7 +21,7 @@ from lcf_edge.errors import UsageError
 from lcf_edge.evaluate import report
 from lcf_edge.evaluate.one_recording import Task
 from lcf_edge.evaluate.report import FrameLine
-from lcf_edge.evaluate.workers import by_processes
+from lcf_edge.evaluate.workers import by_processes, interrupts_held
 
 FRAMES = 18
 INTERRUPTED = 130
@@ -208,6 +209,31 @@ def test_a_recording_that_ends_its_process_takes_no_other_with_it(drive: Path) -
     failed = [name for name, done in outcomes.items() if isinstance(done, str)]
     assert failed == ["bad"]
     assert "its process ended" in str(outcomes["bad"])
+
+
+def test_an_interrupt_that_another_thread_takes_waits_until_the_worker_has_started() -> None:
+    holding, sent = threading.Event(), threading.Event()
+
+    def interrupt() -> None:
+        holding.wait()
+        signal.pthread_kill(threading.get_ident(), signal.SIGINT)
+        sent.set()
+
+    other = threading.Thread(target=interrupt)
+    other.start()  # before the mask is set, which it would inherit
+    steps = []
+
+    def start() -> None:
+        with interrupts_held():
+            holding.set()
+            sent.wait()
+            other.join()  # here Python would run the handler
+            steps.append("started")
+
+    with pytest.raises(KeyboardInterrupt):
+        start()
+    assert steps == ["started"]
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
 def test_an_interrupt_ends_it_without_a_traceback(corpus: Path, drive: Path, tmp_path: Path) -> None:
