@@ -28,6 +28,7 @@ cdef double MIRROR_SIGMAS
 cdef double SURE_REBELS
 cdef double MOVER_SHARE
 cdef double LIKELY_OWN_S
+cdef double SEEN_TO_MOVE_PX
 cdef double OWN_SHARE
 cdef double SPREAD_NOISE_PX
 cdef int STRAY_ROUNDS
@@ -86,6 +87,7 @@ cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcep
 cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
 cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
+cdef bint ground_would_flow(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
 @cython.locals(few=bint, stands=bint)
 cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 @cython.locals(inside=bint)

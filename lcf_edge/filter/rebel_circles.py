@@ -32,6 +32,7 @@ MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group
 SURE_REBELS = 5.0  # fewer say less, and must be seen once more before their circle is reported
 MOVER_SHARE = 0.25  # of the edges in a circle that moves must be rebels: where things repeat, edges swap places
 LIKELY_OWN_S = 0.9  # what has not moved in the picture for so long may be of an own part;
+SEEN_TO_MOVE_PX = 3.0  # by which the ground there would have moved, else it may be far off;
 OWN_SHARE = 0.1  # so many of these, as a share of the rebels that they lie among, make them own parts too
 SPREAD_NOISE_PX = 0.85  # 1 sigma of how far an edge went, of two places
 STRAY_ROUNDS = 2
@@ -403,6 +404,18 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     return members.y[g] - half > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
 
 
+def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
+    """Whether the ground, seen where an edge is, would have been seen to move in ``LIKELY_OWN_S``.
+
+    What is far off does not, near the focus, though it is no own part. Without a camera height: as if it would.
+    """
+    if not around.camera_height_m > 0:
+        return True
+    range_m = situation.ground_range_m(around, edges.y[i])
+    away_px = flow.length(edges.x[i] - around.focus_x, edges.y[i] - around.focus_y)
+    return away_px * math.fabs(around.speed_mps) * LIKELY_OWN_S > SEEN_TO_MOVE_PX * range_m
+
+
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
     """A few odd ones among edges that follow the flow are no object; nor is what is flat, shifted, or an own part."""
     for g in range(groups.groups):
@@ -412,7 +425,7 @@ def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: 
             dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
             if not edges.matched[i] or dx * dx + dy * dy >= radius * radius:
                 continue
-            if edges.fixed_s[i] >= LIKELY_OWN_S:
+            if edges.fixed_s[i] >= LIKELY_OWN_S and ground_would_flow(edges, i, around):
                 own_parts += 1
             elif edges.trust[i] > settings.tr_s and not edges.own_way(i):
                 groups.flowing[g] += 1

@@ -103,3 +103,16 @@ def test_a_vehicle_that_stands_has_own_parts_everywhere_until_it_drives(street: 
     moving = np.flatnonzero(far & tables.edges.matched[: tables.edges.count])
     assert len(moving) > 50
     assert sum(is_own_part(tables, row) for row in moving) < 0.1 * len(moving)
+
+
+def test_a_walker_before_what_is_too_far_off_to_flow_is_a_rebel(drive: Drive, clutter: Landmarks) -> None:
+    random, n = np.random.default_rng(3), 60
+    far = np.stack([random.uniform(-36, 36, n), random.uniform(-24, -3, n), random.uniform(300, 400, n)], axis=1)
+    walker = np.stack([random.uniform(-0.3, 0.3, 20), random.uniform(-1.2, 0.4, 20), np.full(20, 10.0)], axis=1)
+    way = replace(drive(clutter(150)) + drive(far) + drive(walker, velocity_mps=(0.6, 0, 0)), frames=40)
+    tables = LineCircleFilter(Config(), way.lens)
+    for seq, (corners, motion) in enumerate(way):
+        tables.step(corners, motion)
+        if seq >= ONE_SECOND:
+            assert sum(is_own_part(tables, row) for row in range(tables.edges.count)) > 20
+            assert (tables.rebel.active & (tables.rebel.trust >= 3)).any()
