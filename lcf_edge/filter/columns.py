@@ -138,10 +138,11 @@ class GroupColumns:
 
 
 class CornerColumns:
-    """Of a ``CornerTable``; the first ``count`` rows are in use."""
+    """Of a ``CornerTable``; the first ``count`` rows are in use, of which ``detected`` are the detector's."""
 
     def __init__(self, memory: Memory) -> None:
-        self.count = 0
+        self.count = self.detected = 0
+        self.capacity = len(memory["x"])
         self.x, self.y, self.pixel_x, self.pixel_y = memory["x"], memory["y"], memory["pixel_x"], memory["pixel_y"]
         self.words, self.psi = memory["words"], memory["psi"]
         self.omitted, self.free, self.taken = memory["omitted"], memory["free"], memory["taken"]

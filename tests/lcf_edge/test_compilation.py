@@ -65,11 +65,11 @@ def test_no_function_of_a_compiled_module_silently_stays_python(declarations: Pa
 
 _APPEARANCE = """
 import zlib, numpy as np
-from lcf_edge.corners.appearance import appearance
+from lcf_edge.corners.appearance import appearance, smoothed
 random = np.random.default_rng(3)
 image = random.integers(0, 256, (48, 64), np.uint8)
 pixel = np.stack((random.integers(7, 57, 40), random.integers(7, 41, 40)), axis=1).astype(np.int32)
-print(zlib.crc32(appearance(image, pixel).tobytes()))
+print(zlib.crc32(appearance(smoothed(image), pixel).tobytes()))
 """
 
 _EGO_MOTION = """
