@@ -2,47 +2,54 @@
 
 from typing import Any, TypeAlias
 
-import cv2
 import numpy as np
 import numpy.typing as npt
-
-from lcf_edge.filter.inputs import SAMPLES_PX
 
 Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
 Grid: TypeAlias = Any  # and [i, j]
 
 BORDER_PX = 7  # corners this far from the border have all samples inside the image
+RING_PX = (
+    (4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3),
+    (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
+)  # fmt: skip
 MEAN_GREY = 128
 
-_RING = np.array(SAMPLES_PX)
+_RING = np.array(RING_PX)
 
 
-def smoothed(image: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint8]:
-    """Each pixel of a (height, width) image as the mean, rounded, of 3x3: a shift below 1 px changes it little."""
-    return np.asarray(cv2.blur(image, (3, 3)), np.uint8)
+def appearance(image: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.uint8]:
+    """Grey samples around whole pixels, each the mean of a square; shifted to a mean of 128, whatever the light.
 
-
-def appearance(smooth: npt.NDArray[np.uint8], pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.uint8]:
-    """Grey samples around whole pixels, shifted to a mean of 128, whatever the light.
-
-    ``smooth``: what ``smoothed`` makes of the image. ``pixel``: int32 (n, 2), x and y, ``BORDER_PX`` or more from the
-    border, which is not checked. Return uint8 (n, 16).
+    ``image``: uint8 (height, width). ``pixel``: int32 (n, 2), x and y, ``BORDER_PX`` or more from the border,
+    which is not checked. Return uint8 (n, 16).
     """
-    samples = np.empty((len(pixel), len(SAMPLES_PX)), np.uint8)
-    sample(smooth.reshape(-1).data, pixel.data, (_RING @ (1, smooth.shape[1])).data, smooth.shape[1], samples.data)
+    samples = np.empty((len(pixel), len(RING_PX)), np.uint8)
+    width = image.shape[1]
+    flat = np.ascontiguousarray(image).reshape(-1)
+    sample(flat.data, width, pixel.data, (_RING @ (1, width)).data, samples.data)
     return samples
 
 
-def sample(smooth: Column, pixel: Grid, ring: Column, width: int, samples: Grid) -> None:
+def mean_around(image: Column, width: int, at: int) -> int:
+    """The mean, rounded, of a pixel and the 8 around it: a shift below 1 px changes it little."""
+    above, below = at - width, at + width
+    total = image[above - 1] + image[above] + image[above + 1] + image[at - 1] + image[at] + image[at + 1]
+    total += image[below - 1] + image[below] + image[below + 1]
+    mean: int = (total + 4) // 9
+    return mean
+
+
+def sample(image: Column, width: int, pixel: Grid, ring: Column, samples: Grid) -> None:
     """Fill ``samples``, uint8 (n, 16), with the grey values around each pixel, mean moved to 128.
 
-    ``smooth``: row after row of ``width`` px; ``ring``: how much farther on in it each of the samples lies.
+    ``image``: row after row of ``width`` px; ``ring``: how much farther on in it each of the samples lies.
     """
     for i in range(pixel.shape[0]):
         at = pixel[i, 1] * width + pixel[i, 0]
         total = 0
         for k in range(16):  # a constant, so that the compiler unrolls the loop
-            grey = smooth[at + ring[k]]
+            grey = mean_around(image, width, at + ring[k])
             samples[i, k] = grey
             total += grey
         shift = MEAN_GREY - total // 16

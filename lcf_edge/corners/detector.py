@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from lcf_edge.config import Filter
 from lcf_edge.corners.along_edge import keep_round
-from lcf_edge.corners.appearance import BORDER_PX, appearance, smoothed
+from lcf_edge.corners.appearance import BORDER_PX, appearance
 from lcf_edge.corners.fast import Fast, Found, Grey, Parts, Pixels, Strengths
 from lcf_edge.corners.fast_threshold import FollowingThreshold
 from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, keep_spread, keep_strongest, leave_poor
@@ -66,10 +66,9 @@ class CornerDetector:
         """
         image = np.ascontiguousarray(image)
         self._fast.look(image)
-        smooth = smoothed(image)
-        pixel, strength = self._look(image, smooth, self._strong.value, self._whole)
+        pixel, strength = self._look(image, self._strong.value, self._whole)
         if self._settings.fast_adaptive:
-            pixel, strength = self._shared_out(image, smooth, pixel, strength, highest_row)
+            pixel, strength = self._shared_out(image, pixel, strength, highest_row)
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
         if self._lens.is_distorted:
             placed = np.isfinite(position[:, 0]).nonzero()[0]
@@ -78,15 +77,15 @@ class CornerDetector:
         if evicted:
             kept = strongest_spread(self._budget_squares, pixel, strength, self._capacity)
             pixel, position = pixel.take(kept, axis=0), position.take(kept, axis=0)
-        return Corners(pixel, position, appearance(smooth, pixel), smooth), evicted
+        return Corners(pixel, position, appearance(image, pixel)), evicted
 
-    def _look_for_faint(self, image: Grey, smooth: Grey, parts: Parts) -> Found:
+    def _look_for_faint(self, image: Grey, parts: Parts) -> Found:
         """Return the corners of poor parts of the image: on what is dark, also fainter ones."""
-        pixel, strength = self._look(image, smooth, round(DARK_SHARE * self._weak.value), parts)
+        pixel, strength = self._look(image, round(DARK_SHARE * self._weak.value), parts)
         kept = (image[pixel[:, 1], pixel[:, 0]] < DARK) | (strength >= self._weak.value)
         return pixel[kept], strength[kept]
 
-    def _look(self, image: Grey, smooth: Grey, threshold: int, parts: Parts) -> Found:
+    def _look(self, image: Grey, threshold: int, parts: Parts) -> Found:
         """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
         within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
         pixel, strength = self._fast.corners(threshold, within)
@@ -97,12 +96,12 @@ class CornerDetector:
             count = keep_round(image.reshape(-1).data, image.shape[1], pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]
         if self._settings.fast_adaptive:
-            samples, beaten = appearance(smooth, pixel), np.empty(len(pixel), np.uint8)
+            samples, beaten = appearance(image, pixel), np.empty(len(pixel), np.uint8)
             count = keep_distinct(pixel.data, strength.data, samples.data, beaten.data, CLOSE_PX)
             pixel, strength = pixel[:count], strength[:count]
         return pixel, strength
 
-    def _shared_out(self, image: Grey, smooth: Grey, pixel: Pixels, strength: Strengths, highest_row: float) -> Found:
+    def _shared_out(self, image: Grey, pixel: Pixels, strength: Strengths, highest_row: float) -> Found:
         """Limit every square to its share, and search poor ones again."""
         squares = self._squares
         pixel, strength = strongest(squares, pixel, strength, self._most)
@@ -111,7 +110,7 @@ class CornerDetector:
             first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
             square = np.empty(len(pixel), np.int32)
             poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
-            faint, how_faint = self._look_for_faint(image, smooth, self._rectangles[:poor])
+            faint, how_faint = self._look_for_faint(image, self._rectangles[:poor])
             found = len(faint)
             if found:  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, square.data)

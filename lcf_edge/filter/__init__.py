@@ -19,7 +19,6 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one
 ``leaps``            where whole parts of the image lost their corners: a leap that they share
-``second_look``      edges that the detector does not see again, in the picture itself
 ``edge_equations``   the Circle expert's equations for edges: prediction, the five classes λ*, updates, trust
 ``edge_expert``      applies them to the table
 ``baselines``        what the displacement since each key frame implies for this picture

@@ -61,8 +61,7 @@ cdef class GroupColumns:
     cdef int[::1] row
 
 cdef class CornerColumns:
-    cdef public Py_ssize_t count, detected
-    cdef readonly Py_ssize_t capacity
+    cdef public Py_ssize_t count
     cdef double[::1] x, y, cost
     cdef int[::1] pixel_x, pixel_y, edge, psi
     cdef unsigned long long[:, ::1] words

@@ -138,11 +138,10 @@ class GroupColumns:
 
 
 class CornerColumns:
-    """Of a ``CornerTable``; the first ``count`` rows are in use, of which ``detected`` are the detector's."""
+    """Of a ``CornerTable``; the first ``count`` rows are in use."""
 
     def __init__(self, memory: Memory) -> None:
-        self.count = self.detected = 0
-        self.capacity = len(memory["x"])
+        self.count = 0
         self.x, self.y, self.pixel_x, self.pixel_y = memory["x"], memory["y"], memory["pixel_x"], memory["pixel_y"]
         self.words, self.psi = memory["words"], memory["psi"]
         self.omitted, self.free, self.taken = memory["omitted"], memory["free"], memory["taken"]

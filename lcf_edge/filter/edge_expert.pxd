@@ -7,7 +7,6 @@ from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
 cdef double MIN_CORR
-cdef double SECOND_LOOK_COSTS
 cdef int CROSSING
 cdef double SWING_SHARE
 cdef double MIN_ORIGIN_PX

@@ -11,7 +11,6 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
 MIN_CORR = 0.25
-SECOND_LOOK_COSTS = 0.5  # trust that an edge loses whose corner the detector does not see
 CROSSING = int(Cause.CROSSING)
 SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
@@ -102,8 +101,6 @@ def update(
             correct(edges, i, normal, rebel, x, y, dt_s, settings)
             take_corner(edges, i, corners, corner, dt_s)
         change = edge_equations.trust_change(relation)
-        if corner >= corners.detected:
-            change = min(change, -SECOND_LOOK_COSTS)
         edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
         if relation in (edge_equations.BREAKS, edge_equations.STAYS) and edges.count < edges.capacity:
             stray(edges, i, x0, y0, corners, corner, dt_s, settings)

@@ -5,12 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-SAMPLES_PX = (
-    (4, 0), (3, 3), (0, 4), (-3, 3), (-4, 0), (-3, -3), (0, -4), (3, -3),
-    (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
-)  # fmt: skip
-"""Where the samples of an appearance lie around their corner."""
-APPEARANCE_SAMPLES = len(SAMPLES_PX)
+APPEARANCE_SAMPLES = 16
 KEYS = 16  # key frames that an edge remembers
 
 
@@ -20,14 +15,11 @@ class Corners:
 
     ``pixel``: int32 (n, 2), x and y in the input frame. ``position``: float32 (n, 2), px of the ideal pinhole, lens
     distortion removed. ``appearance``: uint8 (n, 16), grey samples around the corner, their mean moved to 128.
-    ``smooth``: uint8 (height, width), the frame that they are of, each pixel the mean of 3x3; None: nobody can look
-    there again.
     """
 
     pixel: npt.NDArray[np.int32]
     position: npt.NDArray[np.float32]
     appearance: npt.NDArray[np.uint8]
-    smooth: npt.NDArray[np.uint8] | None = None
 
     def __len__(self) -> int:
         return len(self.pixel)

@@ -23,7 +23,6 @@ from lcf_edge.filter import (
     patches,
     rebel_circles,
     rest,
-    second_look,
     square_expert,
 )
 from lcf_edge.filter import baselines as lines
@@ -48,7 +47,6 @@ from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.rest import RestTest
-from lcf_edge.filter.second_look import SecondLook
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.square_expert import Squares
@@ -141,7 +139,6 @@ class LineCircleFilter:
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
         self._leaps = Leaps(capacity)
-        self._second_look = SecondLook(lens.width)
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
         self._flowing = Flowing(capacity, memory.circles_normal)
@@ -194,7 +191,7 @@ class LineCircleFilter:
         self._predict()
         omitted = self._omit()
         evicted = self._collect()
-        self._find(motion, corners.smooth)
+        self._find(motion)
         sigma_rad, residual = self._refine(motion)
         self._update(sigma_rad)
         evicted += self._add()
@@ -295,15 +292,12 @@ class LineCircleFilter:
         normal, rebel = self.normal.columns, self.rebel.columns
         return line_expert.collect(self.groups.columns, normal, rebel, self._settings.tr_cr)
 
-    def _find(self, motion: Motion, smooth: Grey | None) -> None:
-        """Corners for edges. ``smooth``: the frame, for a second look."""
+    def _find(self, motion: Motion) -> None:
+        """Corners for edges."""
         slack_px = self._slack_px(motion)
         edges, corners, settings = self.edges.columns, self.corners.columns, self._settings
         matching.find(self._index, self._plane, edges, corners, slack_px, settings)
         leaps.find(self._leaps, self._index, self._plane, edges, corners, settings)
-        if smooth is not None:
-            frame = memory_of(np.ascontiguousarray(smooth).reshape(-1))
-            second_look.find(self._second_look, frame, self._index, self._plane, edges, corners, settings)
 
     def _slack_px(self, motion: Motion) -> float:
         """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""

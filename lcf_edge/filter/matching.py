@@ -45,7 +45,7 @@ def take_corners(corners: CornerColumns, pixel: Integers, position: Doubles, wor
 
     ``pixel``: int32 (n, 2). ``position``: float32 (n, 2). ``words``: appearances as uint64 (n, 2).
     """
-    corners.count = corners.detected = len(pixel)
+    corners.count = len(pixel)
     for i in range(corners.count):
         corners.pixel_x[i], corners.pixel_y[i] = pixel[i, 0], pixel[i, 1]
         corners.x[i], corners.y[i] = position[i, 0], position[i, 1]

@@ -110,9 +110,7 @@ EDGE_COLUMNS = (
     Column("predicted_speed", "V', in this frame", "px/s", ("edge_expert",)),
     Column("cos", "cos of the direction of the prediction", "1", ("edge_expert",)),
     Column("sin", "sin of the direction of the prediction", "1", ("edge_expert",)),
-    Column(
-        "corner", "row of its corner in this frame, -1: none", "row", ("matching", "leaps", "second_look"), np.int32
-    ),
+    Column("corner", "row of its corner in this frame, -1: none", "row", ("matching", "leaps"), np.int32),
     Column("best", "row of the corner that it would choose, -1: none", "row", ("matching",), np.int32),
     Column("cost", "of that choice", "grey", ("matching",)),
     Column("psi", "row of the ψ region that holds L', -1: none", "row", ("line_expert",), np.int32),
@@ -239,16 +237,14 @@ GROUP_COLUMNS = (
 """λ, the circles above Tr_cr, the least trusted first; packed in the first ``count`` rows."""
 
 CORNER_COLUMNS = (
-    Column("x", "place in the ideal pinhole, to the right", "px", ("matching", "second_look")),
-    Column("y", "place in the ideal pinhole, down", "px", ("matching", "second_look")),
-    Column("pixel_x", "place in the input frame", "px", ("matching", "second_look"), np.int32),
-    Column("pixel_y", "place in the input frame", "px", ("matching", "second_look"), np.int32),
-    Column(
-        "appearance", "grey samples around it", "grey", ("matching", "second_look"), np.uint8, (APPEARANCE_SAMPLES,)
-    ),
-    Column("omitted", "inside ψ", "", ("line_expert", "second_look"), np.bool_),
-    Column("free", "may still be found by an edge", "", ("line_expert", "matching", "leaps", "second_look"), np.bool_),
-    Column("taken", "an edge has made it its own", "", ("matching", "edge_expert", "second_look"), np.bool_),
+    Column("x", "place in the ideal pinhole, to the right", "px", ("matching",)),
+    Column("y", "place in the ideal pinhole, down", "px", ("matching",)),
+    Column("pixel_x", "place in the input frame", "px", ("matching",), np.int32),
+    Column("pixel_y", "place in the input frame", "px", ("matching",), np.int32),
+    Column("appearance", "grey samples around it", "grey", ("matching",), np.uint8, (APPEARANCE_SAMPLES,)),
+    Column("omitted", "inside ψ", "", ("line_expert",), np.bool_),
+    Column("free", "may still be found by an edge", "", ("line_expert", "matching", "leaps"), np.bool_),
+    Column("taken", "an edge has made it its own", "", ("matching", "edge_expert"), np.bool_),
     Column("expected", "under ψ, and an edge is predicted there", "", ("line_expert",), np.bool_),
     Column("edge", "row of the edge that would choose it at the least cost, -1: none", "row", ("matching",), np.int32),
     Column("cost", "of that choice", "grey", ("matching",)),

@@ -6,8 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.corners.appearance import BORDER_PX, appearance, smoothed
-from lcf_edge.filter.inputs import SAMPLES_PX
+from lcf_edge.corners.appearance import BORDER_PX, RING_PX, appearance
 
 Grey = npt.NDArray[np.uint8]
 Pixels = npt.NDArray[np.int32]
@@ -18,7 +17,7 @@ def by_whole_arrays(image: Grey, pixel: Pixels) -> Grey:
     x, y = pixel.T
     nine = [np.roll(image.astype(int), (-down, -right), (0, 1)) for down in (-1, 0, 1) for right in (-1, 0, 1)]
     smooth = np.rint(sum(nine) / 9).astype(int)  # what comes round the border is not within reach
-    looks = np.stack([smooth[y + dy, x + dx] for dx, dy in SAMPLES_PX], axis=1)
+    looks = np.stack([smooth[y + dy, x + dx] for dx, dy in RING_PX], axis=1)
     return np.asarray(np.clip(looks + 128 - looks.sum(axis=1, keepdims=True) // 16, 0, 255), np.uint8)
 
 
@@ -43,7 +42,7 @@ def test_samples_are_the_ring_with_its_mean_at_128(
     if black_and_white:  # where moving the mean leads out of the range
         image = np.asarray((image > 230) * 255, np.uint8)
     pixel = places(width, height, count, seed)
-    samples = appearance(smoothed(image), pixel)
+    samples = appearance(image, pixel)
     assert (samples.dtype, samples.shape) == (np.uint8, (count, 16))
     assert np.array_equal(samples, by_whole_arrays(image, pixel))
 
@@ -54,10 +53,10 @@ def test_any_picture_is_looked_at_in_place(view: str) -> None:
     whole.flags.writeable = view != "read-only"
     image = {"rows of a larger picture": whole[10:70, 20:120], "every second column": whole[:, ::2]}.get(view, whole)
     pixel = places(image.shape[1], image.shape[0], 50, 2)
-    assert np.array_equal(appearance(smoothed(image), pixel), by_whole_arrays(image.copy(), pixel))
+    assert np.array_equal(appearance(image, pixel), by_whole_arrays(image.copy(), pixel))
 
 
 def test_samples_reach_as_far_as_the_border_that_is_kept_free() -> None:
-    assert np.abs(SAMPLES_PX).max() < BORDER_PX
+    assert np.abs(RING_PX).max() < BORDER_PX
     image = np.zeros((15, 15), np.uint8)
-    assert (appearance(smoothed(image), np.array([(7, 7)], np.int32)) == 128).all()
+    assert (appearance(image, np.array([(7, 7)], np.int32)) == 128).all()

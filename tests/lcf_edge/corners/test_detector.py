@@ -13,9 +13,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcf_edge.config import Filter
-from lcf_edge.corners.appearance import BORDER_PX
+from lcf_edge.corners.appearance import BORDER_PX, RING_PX
 from lcf_edge.corners.detector import SPREAD_PX, THRESHOLDS, CornerDetector
-from lcf_edge.filter.inputs import SAMPLES_PX, Corners
+from lcf_edge.filter.inputs import Corners
 from lcf_edge.lens import Lens
 
 Grey = npt.NDArray[np.uint8]
@@ -59,7 +59,7 @@ def test_a_bright_square_has_four_corners() -> None:
 def test_no_corner_is_nearer_to_the_border_than_its_samples_reach(noise: Noise) -> None:
     image = noise(width=100, height=60)
     corners, _ = detector(image).detect(image)
-    assert corners.pixel.min() == BORDER_PX == 1 + np.abs(SAMPLES_PX).max()
+    assert corners.pixel.min() == BORDER_PX == 1 + np.abs(RING_PX).max()
     assert corners.pixel[:, 0].max() == 100 - 1 - BORDER_PX
     assert corners.pixel[:, 1].max() == 60 - 1 - BORDER_PX
 
@@ -241,15 +241,15 @@ def test_the_appearance_is_the_ring_of_samples_around_the_corner_with_its_mean_a
     assert len(corners) > 50
     x, y = corners.pixel.T
     smooth = cv2.blur(image, (3, 3))
-    for number, (dx, dy) in enumerate(SAMPLES_PX):
+    for number, (dx, dy) in enumerate(RING_PX):
         sample = smooth[y + dy, x + dx].astype(int)
         assert (np.diff(sample - corners.appearance[:, number]) == np.diff(mean_of(smooth, x, y))).all()
     assert np.abs(corners.appearance.mean(axis=1) - 128).max() <= 1
 
 
 def mean_of(image: Grey, x: npt.NDArray[np.int32], y: npt.NDArray[np.int32]) -> npt.NDArray[np.int64]:
-    ring = np.array([image[y + dy, x + dx] for dx, dy in SAMPLES_PX], np.int64)
-    return ring.sum(axis=0) // len(SAMPLES_PX)
+    ring = np.array([image[y + dy, x + dx] for dx, dy in RING_PX], np.int64)
+    return ring.sum(axis=0) // len(RING_PX)
 
 
 def test_a_brighter_picture_looks_the_same() -> None:
@@ -259,9 +259,9 @@ def test_a_brighter_picture_looks_the_same() -> None:
 
 
 def test_samples_stand_all_around_at_4_to_6_px() -> None:
-    ring = np.array(SAMPLES_PX)
-    assert len({*SAMPLES_PX}) == 16
-    assert {*map(tuple, (-ring).tolist())} == {*SAMPLES_PX}  # a corner and its mirror image are seen alike
+    ring = np.array(RING_PX)
+    assert len({*RING_PX}) == 16
+    assert {*map(tuple, (-ring).tolist())} == {*RING_PX}  # a corner and its mirror image are seen alike
     assert (np.hypot(*ring.T) >= 4).all()
     assert (np.hypot(*ring.T) < 6.5).all()
 

@@ -137,12 +137,12 @@ def test_the_same_again_differs_in_no_frame_and_another_configuration_in_some(
     assert main([*again, "--out", str(tmp_path / "same")]) == 0
     assert rows(tmp_path / "same")["with-truth"].differing == 0
     capsys.readouterr()
-    assert main([*again, "--out", str(tmp_path / "other"), "--set", "vehicle.horizon_s=0.5"]) == 0
+    assert main([*again, "--out", str(tmp_path / "other"), "--set", "filter.corners_target=20"]) == 0
     row = rows(tmp_path / "other")["with-truth"]
     assert row.differing
     assert f"(was {found} of {FRAMES})" in capsys.readouterr().out
     page = (tmp_path / "other/index.html").read_text()
-    assert "vehicle.horizon_s=0.5" in page
+    assert "filter.corners_target=20" in page
     different = [image for image in row.pictures if image.why]
     assert different
     pair = cv2.imread(str(tmp_path / "other" / different[0].file))
