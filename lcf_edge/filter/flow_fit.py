@@ -148,16 +148,21 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     fit.count += 1
 
 
-def quantile(fit: FlowFit, share: float, turned_px: float, turn_share: float) -> float:
+def tells_of_turn(fit: FlowFit, k: int) -> bool:
+    """Whether a turn moved an edge, and by more than it is off its line: no lens is so wrong, it moves by itself."""
+    return fit.turned[k] >= max(MIN_TURN_PX, math.fabs(fit.rest[k]))
+
+
+def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -> float:
     """Distance that this share of the edges stay within, px, of ``rest``; at most ``BINS``·``BIN_PX``.
 
-    Of those that turned by ``turned_px`` at least, their distances less what ``turn_share`` makes of them.
+    Of all or of those that tell of a turn, their distances less what ``turn_share`` makes of them.
     """
     for b in range(BINS):
         fit.bins[b] = 0
     counted = 0
     for k in range(fit.count):
-        if fit.turned[k] >= turned_px:
+        if not only_turned or tells_of_turn(fit, k):
             more = turn_share * fit.turned[k] / NOISE_PX
             rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
             fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
@@ -207,7 +212,7 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
     """ω and ΔO, round by round narrower."""
     for k in range(fit.count):
         fit.rest[k] = fit.drift[k]
-    width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5, 0.0, 0.0))
+    width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5, False, 0.0))
     for _ in range(ROUNDS):
         least_squares.begin(fit.equations, UNKNOWNS)
         for i in range(3):
@@ -269,7 +274,7 @@ def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole,
     turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
     fit.focus_x, fit.focus_y = fit.equations.solution[FOCUS_X], fit.equations.solution[FOCUS_Y]
     least_squares.invert(fit.equations)
-    fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
+    fit.scale_px = quantile(fit, SCALE_SHARE, False, fit.turn_share) / SCALE_SIGMAS
     variance = max(NOISE_PX, fit.scale_px) * max(NOISE_PX, fit.scale_px)
     fit.focus_sigma_x = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_X, FOCUS_X])
     fit.focus_sigma_y = NOISE_PX * math.sqrt(fit.equations.inverse[FOCUS_Y, FOCUS_Y])
@@ -288,19 +293,19 @@ def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole,
             own_rad = max(baselines.sigma_px[k] / pinhole.focal, unsure_rad if unsure_px > UNSURE_PX else 0.0)
             sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, own_rad)
             turn_slot(fit, k, keys, baselines, pinhole, sigma_rad, max(SLOT_WIDTH_PX, UNSURE_SIGMAS * unsure_px))
-    fit.scale_px = quantile(fit, SCALE_SHARE, 0.0, fit.turn_share) / SCALE_SIGMAS
+    fit.scale_px = quantile(fit, SCALE_SHARE, False, fit.turn_share) / SCALE_SIGMAS
 
 
 def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
     """What edges that a turn moved stay off their lines by, beyond the noise of all, as a share of that way."""
     turned, way2 = 0, 0.0
     for k in range(fit.count):
-        if fit.turned[k] >= MIN_TURN_PX:
+        if tells_of_turn(fit, k):
             turned += 1
             way2 += fit.turned[k] * fit.turned[k]
     if turned < MIN_TURNED:
         return
-    off_px = quantile(fit, SCALE_SHARE, MIN_TURN_PX, 0.0) / SCALE_SIGMAS
+    off_px = quantile(fit, SCALE_SHARE, True, 0.0) / SCALE_SIGMAS
     turn2 = max(off_px * off_px - NOISE_PX * NOISE_PX, 0.0) * turned / way2
     gain = 1 - math.exp(-dt_s / TURN_MEMORY_S)
     fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (turn2 - fit.turn_share * fit.turn_share))

@@ -210,6 +210,13 @@ def test_a_turn_is_doubted_as_much_as_the_lens_deserves() -> None:
     assert shares[2] < 0.2
 
 
+def test_movers_are_no_fault_of_the_lens() -> None:
+    fit = FlowFit()
+    for seed in range(40):
+        Seen(known_radps=0.03, movers=0.8, seed=seed, fit=fit).measured()
+    assert fit.turn_share < 0.1
+
+
 def test_without_a_turn_nothing_is_learnt_of_it() -> None:
     before = FlowFit().turn_share
     assert Seen().measured().fit.turn_share == before
