@@ -55,8 +55,8 @@ FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a t
 SMALL = ["-Os"]
 LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
 LITTLE |= {"feedback", "flow_fit", "ground_speed", "group_motion", "heading", "key_frames", "leaps", "least_squares"}
-LITTLE |= {"line_expert", "normal_circles", "patch_circles", "path", "range_belief", "rebel_circles", "rest"}
-LITTLE |= {"sample_ring", "scene_records", "settings", "situation", "square_expert"}
+LITTLE |= {"line_expert", "normal_circles", "patch_circles", "patches", "path", "range_belief", "rebel_circles"}
+LITTLE |= {"rebel_detection", "rest", "sample_ring", "scene_records", "settings", "situation", "square_expert"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))

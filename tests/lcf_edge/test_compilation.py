@@ -2,6 +2,7 @@
 
 import ast
 import os
+import platform
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ import pytest
 
 from lcf_edge import compilation
 from lcf_edge.compilation import examined, extension, sources, uncompiled
+from release.trial import MAX_EXTENSION_KB
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "lcf_edge"
@@ -46,6 +48,13 @@ def test_every_module_with_declarations_is_in_the_extension_and_comes_from_it() 
     names = {".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PAIRS}
     assert extension().modules == {*names, "lcf_edge._memoryviews"}
     assert {import_module(name).__file__ for name in names} == {extension().path}
+
+
+@needs_extension
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="the size is that for x86-64")
+def test_the_extension_is_so_small_that_the_one_for_64_bit_arm_stays_below_what_a_release_allows() -> None:
+    larger_kb = 70.0  # its pages have 64 kB
+    assert Path(str(extension().path)).stat().st_size / 1e3 + larger_kb < MAX_EXTENSION_KB
 
 
 @pytest.mark.parametrize("declarations", sorted(PAIRS), ids=lambda path: path.stem)
