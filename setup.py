@@ -51,7 +51,7 @@ FLAGS += ["-fno-align-functions", "-fno-align-jumps", "-fno-align-loops"]  # as 
 FLAGS += ["-fno-math-errno", "-fno-trapping-math"]  # nobody asks for either: square roots without a call
 FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a tenth smaller
 
-# What takes little of a frame is made small instead: a quarter smaller, and a tenth slower.
+# What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower.
 SMALL = ["-Os"]
 LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
 LITTLE |= {"feedback", "flow_fit", "ground_speed", "group_motion", "heading", "key_frames", "leaps", "least_squares"}

@@ -149,7 +149,7 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
 
 
 def tells_of_turn(fit: FlowFit, k: int) -> bool:
-    """Whether a turn moved an edge, and by more than it is off its line: no lens is so wrong, it moves by itself."""
+    """Whether a turn moved an edge by at least what it is off its line: what is off by more moves by itself."""
     return fit.turned[k] >= max(MIN_TURN_PX, math.fabs(fit.rest[k]))
 
 
