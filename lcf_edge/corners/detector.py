@@ -22,8 +22,7 @@ SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such
 CLOSE_PX = 3  # corners as close as this are mistaken for each other if they look alike
 THRESHOLDS = (13, 90)
 WEAKEST = THRESHOLDS[0]  # half of what is fainter is noise
-DARK = 48  # grey level; what reflects little has few levels between its parts, and less noise
-DARK_SHARE = 0.6  # of the faint threshold, which is enough there
+DARK_SHARE = 0.6  # of the faint threshold, which is enough for what is dark
 ROWS_ABOVE = 2  # of squares: margin for how high things that can be met may reach
 WEAK_SHARE = 0.5  # of the wanted corners, at most, come from there
 
@@ -79,16 +78,10 @@ class CornerDetector:
             pixel, position = pixel.take(kept, axis=0), position.take(kept, axis=0)
         return Corners(pixel, position, appearance(image, pixel)), evicted
 
-    def _look_for_faint(self, image: Grey, parts: Parts) -> Found:
-        """Return the corners of poor parts of the image: on what is dark, also fainter ones."""
-        pixel, strength = self._look(image, round(DARK_SHARE * self._weak.value), parts)
-        kept = (image[pixel[:, 1], pixel[:, 0]] < DARK) | (strength >= self._weak.value)
-        return pixel[kept], strength[kept]
-
-    def _look(self, image: Grey, threshold: int, parts: Parts) -> Found:
+    def _look(self, image: Grey, threshold: int, parts: Parts, on_dark: int | None = None) -> Found:
         """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
         within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
-        pixel, strength = self._fast.corners(threshold, within)
+        pixel, strength = self._fast.corners(threshold, within, on_dark)
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
@@ -110,7 +103,8 @@ class CornerDetector:
             first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
             square = np.empty(len(pixel), np.int32)
             poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
-            faint, how_faint = self._look_for_faint(image, self._rectangles[:poor])
+            threshold = self._weak.value
+            faint, how_faint = self._look(image, threshold, self._rectangles[:poor], round(DARK_SHARE * threshold))
             found = len(faint)
             if found:  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, square.data)

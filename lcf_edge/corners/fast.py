@@ -20,6 +20,7 @@ Found = tuple[Pixels, Strengths]
 Parts = npt.NDArray[np.int32]
 """(n, 4): left, top, right, bottom, px; the last two beyond it."""
 
+DARK = 48  # grey level; what reflects little has few levels between its parts, and less noise
 _REACH_PX = max(max(pixel) for pixel in RING_PX)
 
 
@@ -30,7 +31,7 @@ class Fast:
         self._image = np.empty((0, 0), np.uint8)
         self._scores = None
         if not uncompiled() if compiled is None else compiled:
-            self._scores = Scores(width, height)
+            self._scores = Scores(width, height, DARK)
             self._pixel = np.empty((width * height, 2), np.int32)  # untouched pages take no memory
             self._strength = np.empty(width * height, np.float32)
 
@@ -40,13 +41,21 @@ class Fast:
         if self._scores is not None:
             bound(self._scores, image.reshape(-1).data)
 
-    def corners(self, threshold: int, parts: Parts) -> Found:
-        """Corners of parts of the image, part by part and row by row; 3 px or more inside the image."""
+    def corners(self, threshold: int, parts: Parts, on_dark: int | None = None) -> Found:
+        """Corners of parts of the image, part by part and row by row; 3 px or more inside the image.
+
+        ``on_dark``: the threshold of pixels darker than ``DARK``, if it is lower.
+        """
+        on_dark = threshold if on_dark is None else min(on_dark, threshold)
         if self._scores is None:
-            return self._by_opencv(threshold, parts)
+            pixel, strength = self._by_opencv(on_dark, parts)
+            kept = (self._image[pixel[:, 1], pixel[:, 0]] < DARK) | (strength >= threshold)
+            return pixel[kept], strength[kept]
         pixel, strength = self._pixel, self._strength
         flat = self._image.reshape(-1).data
-        count = find(self._scores, flat, threshold, np.ascontiguousarray(parts).data, pixel.data, strength.data)
+        count = find(
+            self._scores, flat, threshold, on_dark, np.ascontiguousarray(parts).data, pixel.data, strength.data
+        )
         return pixel[:count].copy(), strength[:count].copy()
 
     def _by_opencv(self, threshold: int, parts: Parts) -> Found:

@@ -4,7 +4,7 @@ cdef int REACH_PX, BLOCK
 cdef unsigned long long LOW_BITS, HIGH_BITS, ONES
 
 cdef class Scores:
-    cdef int width
+    cdef int width, dark
     cdef unsigned char[::1] plane
     cdef unsigned long long[::1] words
     cdef int[::1] above
@@ -15,9 +15,11 @@ cdef class Scores:
                bright=cython.uchar, dark=cython.uchar)
 cpdef void bound(Scores scores, const unsigned char[::1] image) noexcept nogil
 @cython.locals(i=cython.int, part=cython.int, above=cython.int, start=cython.int, corners=cython.int, x=cython.int,
-               y=cython.int, left=cython.int, top=cython.int, right=cython.int, bottom=cython.int)
-cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, const int[:, ::1] parts,
-               int[:, ::1] pixel, float[::1] strength) noexcept nogil
+               y=cython.int, at=cython.int, least=cython.int, left=cython.int, top=cython.int, right=cython.int, bottom=cython.int)
+cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int on_dark,
+               const int[:, ::1] parts, int[:, ::1] pixel, float[::1] strength) noexcept nogil
+@cython.locals(y=cython.int, at=cython.int, darkest=cython.uchar)
+cdef bint is_dark(Scores scores, const unsigned char[::1] image, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(y=cython.int, first=cython.int, last=cython.int, w=cython.int, at=cython.int, count=cython.int,
                word=cython.ulonglong, add=cython.ulonglong)
 cdef int list_above(Scores scores, int threshold, int left, int top, int right, int bottom) noexcept nogil

@@ -28,15 +28,15 @@ LOW_BITS, HIGH_BITS, ONES = 0x7F7F7F7F7F7F7F7F, 0x8080808080808080, 0x0101010101
 
 
 class Scores:
-    """Scores of the pixels of an image, row after row, and work space.
+    """Scores of the pixels of an image, row after row, and work space. ``dark``: grey level below which a pixel is.
 
     ``plane``: uint8, of each pixel, or a bound of it; ``words``: the same memory, 8 pixels each; ``above``: int32,
     the pixels above a threshold; ``ring``: how much farther on each of the 16 lies. ``around``, ``least``,
     ``best``: of the pixels that are scored together those of the ring, uint8 (16, ``BLOCK``), and work space.
     """
 
-    def __init__(self, width: int, height: int) -> None:
-        self.width = width
+    def __init__(self, width: int, height: int, dark: int) -> None:
+        self.width, self.dark = width, dark
         words = np.zeros(width * height // 8 + 1, np.uint64)
         self.words, self.plane = memory_of(words), memory_of(words.view(np.uint8))
         self.above = integers(width * height)
@@ -64,29 +64,49 @@ def bound(scores: Scores, image: Column) -> None:
         plane[at] = max(max(bright, grey) - grey, grey - min(dark, grey))
 
 
-def find(scores: Scores, image: Column, threshold: int, parts: Grid, pixel: Grid, strength: Column) -> int:
+def find(
+    scores: Scores, image: Column, threshold: int, on_dark: int, parts: Grid, pixel: Grid, strength: Column
+) -> int:
     """Find the corners of parts of an image whose pixels have their ``bound``, part by part, row by row.
 
-    ``parts``: int32 (n, 4), left, top, right, bottom, px, the last two beyond it, at least ``REACH_PX`` inside. What
-    lies outside of a part does not keep a pixel from being a corner. Written are ``pixel``, int32 (m, 2), x and y, and
-    ``strength``, float32 (m,), the highest threshold with which it is a corner. Return how many there are.
+    ``on_dark``: at most ``threshold``, and enough for dark pixels. ``parts``: int32 (n, 4), left, top, right, bottom,
+    px, the last two beyond it, at least ``REACH_PX`` inside. What lies outside of a part does not keep a pixel from
+    being a corner. Written are ``pixel``, int32 (m, 2), x and y, and ``strength``, float32 (m,), the highest threshold
+    with which it is a corner. Return how many there are.
     """
     found = 0
     for part in range(parts.shape[0]):
         left, top, right, bottom = parts[part, 0], parts[part, 1], parts[part, 2], parts[part, 3]
-        above = list_above(scores, threshold, left, top, right, bottom)
+        least = threshold
+        if on_dark < threshold and is_dark(scores, image, left, top, right, bottom):
+            least = on_dark
+        above = list_above(scores, least, left, top, right, bottom)
         start = corners = 0
         while start < above:
-            corners = score_block(scores, image, threshold, start, min(start + BLOCK, above), corners)
+            corners = score_block(scores, image, least, start, min(start + BLOCK, above), corners)
             start += BLOCK
         for i in range(corners):
-            y = scores.above[i] // scores.width
-            x = scores.above[i] - y * scores.width
+            at = scores.above[i]
+            if scores.plane[at] <= threshold and image[at] >= scores.dark:
+                continue
+            y = at // scores.width
+            x = at - y * scores.width
             if is_peak(scores, x, y, left, top, right, bottom):
                 pixel[found, 0], pixel[found, 1] = x, y
-                strength[found] = scores.plane[scores.above[i]] - 1
+                strength[found] = scores.plane[at] - 1
                 found += 1
     return found
+
+
+def is_dark(scores: Scores, image: Column, left: int, top: int, right: int, bottom: int) -> bool:
+    """Whether any pixel of a part is dark."""
+    for y in range(top, bottom):
+        darkest = scores.dark
+        for at in range(y * scores.width + left, y * scores.width + right):
+            darkest = min(darkest, image[at])
+        if darkest < scores.dark:
+            return True
+    return False
 
 
 def list_above(scores: Scores, threshold: int, left: int, top: int, right: int, bottom: int) -> int:

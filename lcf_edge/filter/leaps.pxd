@@ -10,6 +10,7 @@ cdef int COLUMNS
 cdef int ROWS
 cdef double REACH_SHARE
 cdef int BINS
+cdef int SIDE
 cdef int MIN_LOST
 cdef double LOST_SHARE
 cdef int MIN_VOTES
@@ -18,20 +19,23 @@ cdef double RIVAL_SHARE
 cdef int MAX_ASKING
 
 cdef class Leaps:
-    cdef readonly int[::1] part, seen, lost
+    cdef readonly int[::1] part, rows, seen, lost, votes, voter, shifts
     cdef readonly double[::1] u, v
-    cdef readonly int[:, ::1] votes, voter
-    cdef public int across, down, most
+    cdef public int asking, count, across, down, most
 
 cdef void ask(Leaps leaps, ImagePlane plane, EdgeColumns edges) noexcept nogil
 cdef bint is_lost(Leaps leaps, int part) noexcept nogil
-@cython.locals(astray=bint, across=int, down=int, a=int, b=int)
-cdef void vote(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
-@cython.locals(a=int, b=int)
+@cython.locals(count=int)
+cdef int list_far(CornerIndex index, CornerColumns corners, double u, double v, double reach, double near_px) noexcept nogil
+@cython.locals(i=int, across=int, down=int, a=int, b=int)
+cdef void vote(Leaps leaps, CornerIndex index, EdgeColumns edges, int k, CornerColumns corners, double reach, Settings settings) noexcept nogil
+cdef void add_vote(Leaps leaps, int shift, int i) noexcept nogil
+@cython.locals(best=int, shift=int, votes=int)
 cdef void most_votes(Leaps leaps) noexcept nogil
-@cython.locals(near=bint, rival=int, a=int, b=int)
+@cython.locals(near=bint, rival=int, shift=int)
 cdef int rival_votes(Leaps leaps) noexcept nogil
-@cython.locals(best=int)
-cdef int take(Leaps leaps, CornerIndex index, EdgeColumns edges, int i, CornerColumns corners, double reach, Settings settings) noexcept nogil
-@cython.locals(agree=bint, part=int, i=int, a=int, b=int)
+cdef void forget(Leaps leaps) noexcept nogil
+@cython.locals(best=int, i=int)
+cdef int take(Leaps leaps, CornerIndex index, EdgeColumns edges, int k, CornerColumns corners, double reach, Settings settings) noexcept nogil
+@cython.locals(agree=bint, part=int, asked=int, i=int)
 cpdef int find(Leaps leaps, CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, Settings settings) noexcept nogil

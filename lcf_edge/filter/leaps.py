@@ -16,6 +16,7 @@ COLUMNS = 8  # parts of the picture
 ROWS = 6
 REACH_SHARE = 0.16  # of the picture's width, by which something may leap
 BINS = 50  # of shifts, each way
+SIDE = BINS + 1  # of the table of shifts
 MIN_LOST = 4  # edges without a corner that a part needs
 LOST_SHARE = 0.6  # of those that were just seen
 MIN_VOTES = 4
@@ -25,25 +26,28 @@ MAX_ASKING = 120  # edges in a frame
 
 
 class Leaps:
-    """Work space. A row an edge: ``part``, -1: it does not ask; ``u``, ``v``: where it was, px of the input frame.
+    """Work space. A row an asking edge: ``rows``, its own; ``part``; ``u``, ``v``: where it was, px of the input frame.
 
-    A row a part: ``seen``, ``lost``. ``votes``, ``voter``: of each shift, and the edge that voted for it last.
+    A row a part: ``seen``, ``lost``. A row a shift, which is ``across`` * ``SIDE`` + ``down``: ``votes``, and ``voter``
+    (the edge that voted for it last). ``shifts``: the ``count`` of them that have votes; the others have 0 and -1.
     """
 
     def __init__(self, capacity: int) -> None:
-        self.part = integers(capacity)
+        self.rows, self.part = integers(capacity), integers(capacity)
         self.u, self.v = doubles(capacity), doubles(capacity)
         self.seen, self.lost = (integers(COLUMNS * ROWS) for _ in range(2))
-        self.votes, self.voter = (integers(BINS + 1, BINS + 1) for _ in range(2))
-        self.across = self.down = self.most = 0
+        self.votes, self.voter, self.shifts = (integers(SIDE * SIDE) for _ in range(3))
+        for shift in range(SIDE * SIDE):
+            self.voter[shift] = -1
+        self.asking = self.count = self.across = self.down = self.most = 0
 
 
 def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
     """Which edges were seen in the last frame and have no corner now, by parts of the picture."""
     for p in range(COLUMNS * ROWS):
         leaps.seen[p] = leaps.lost[p] = 0
+    leaps.asking = 0
     for i in range(edges.count):
-        leaps.part[i] = -1
         if not edges.matched[i] or edges.held[i] or edges.is_own_part(i):
             continue
         if not image_plane.project(plane, edges.x[i], edges.y[i]):
@@ -54,7 +58,9 @@ def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
         leaps.seen[part] += 1
         if edges.corner[i] < 0:
             leaps.lost[part] += 1
-            leaps.part[i], leaps.u[i], leaps.v[i] = part, plane.u, plane.v
+            leaps.rows[leaps.asking], leaps.part[leaps.asking] = i, part
+            leaps.u[leaps.asking], leaps.v[leaps.asking] = plane.u, plane.v
+            leaps.asking += 1
 
 
 def is_lost(leaps: Leaps, part: int) -> bool:
@@ -62,70 +68,99 @@ def is_lost(leaps: Leaps, part: int) -> bool:
     return leaps.lost[part] >= MIN_LOST and leaps.lost[part] > LOST_SHARE * leaps.seen[part]
 
 
-def vote(
-    leaps: Leaps,
-    index: CornerIndex,
-    edges: EdgeColumns,
-    i: int,
-    corners: CornerColumns,
-    reach: float,
-    settings: Settings,
-) -> None:
-    """One edge votes for its shift to each free corner within ``reach``, px, but not near by, that looks like it."""
-    u, v = leaps.u[i], leaps.v[i]
-    most = matching.likeness_needed(matching.contrast(edges, i), settings)
+def list_far(index: CornerIndex, corners: CornerColumns, u: float, v: float, reach: float, near_px: float) -> int:
+    """List the places of the free corners within ``reach`` of (u, v), px, but not near by. Return how many."""
+    count, reach2, near2 = 0, reach * reach, near_px * near_px
     left, right = matching.first_cell(u, reach, index.columns), matching.last_cell(u, reach, index.columns)
     for row in range(matching.first_cell(v, reach, index.rows), matching.last_cell(v, reach, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - u, index.y[place] - v
             away2 = dx * dx + dy * dy
-            astray = away2 >= reach * reach or away2 <= settings.leap_px * settings.leap_px
-            if astray or not corners.free[index.order[place]] or matching.difference(edges, i, index, place) >= most:
-                continue
-            across = rounding.whole((dx / reach + 1) * (BINS / 2.0))
-            down = rounding.whole((dy / reach + 1) * (BINS / 2.0))
-            for a in range(max(across - 1, 0), across + 1):
-                for b in range(max(down - 1, 0), down + 1):
-                    if leaps.voter[a, b] != i:
-                        leaps.voter[a, b] = i
-                        leaps.votes[a, b] += 1
+            index.listed[count] = place  # no branch, as in ``matching.list_near``
+            count += (away2 < reach2) & (away2 > near2) & corners.free[index.order[place]]
+    return count
+
+
+def vote(
+    leaps: Leaps,
+    index: CornerIndex,
+    edges: EdgeColumns,
+    k: int,
+    corners: CornerColumns,
+    reach: float,
+    settings: Settings,
+) -> None:
+    """An asking edge votes for its shift to each free corner that looks like it: within ``reach``, px, not near by."""
+    i, u, v = leaps.rows[k], leaps.u[k], leaps.v[k]
+    most = matching.likeness_needed(matching.contrast(edges, i), settings)
+    for n in range(list_far(index, corners, u, v, reach, settings.leap_px)):
+        place = index.listed[n]
+        if matching.difference(edges, i, index, place) >= most:
+            continue
+        across = rounding.whole(((index.x[place] - u) / reach + 1) * (BINS / 2.0))
+        down = rounding.whole(((index.y[place] - v) / reach + 1) * (BINS / 2.0))
+        for a in range(max(across - 1, 0), across + 1):
+            for b in range(max(down - 1, 0), down + 1):
+                add_vote(leaps, a * SIDE + b, i)
+
+
+def add_vote(leaps: Leaps, shift: int, i: int) -> None:
+    """One edge votes for a shift, once."""
+    if leaps.voter[shift] == i:
+        return
+    if not leaps.votes[shift]:
+        leaps.shifts[leaps.count] = shift
+        leaps.count += 1
+    leaps.voter[shift] = i
+    leaps.votes[shift] += 1
 
 
 def most_votes(leaps: Leaps) -> None:
-    """The shift with the most votes."""
-    leaps.most = 0
-    for a in range(BINS + 1):
-        for b in range(BINS + 1):
-            if leaps.votes[a, b] > leaps.most:
-                leaps.most, leaps.across, leaps.down = leaps.votes[a, b], a, b
+    """The shift with the most votes; of equals the first in the table."""
+    best = leaps.most = 0
+    for k in range(leaps.count):
+        shift = leaps.shifts[k]
+        votes = leaps.votes[shift]
+        if votes > leaps.most or (votes == leaps.most and shift < best):
+            leaps.most, best = votes, shift
+    leaps.across, leaps.down = best // SIDE, best % SIDE
 
 
 def rival_votes(leaps: Leaps) -> int:
     """How many votes the best shift has that is another one."""
     rival = 0
-    for a in range(BINS + 1):
-        for b in range(BINS + 1):
-            near = abs(a - leaps.across) <= 2 and abs(b - leaps.down) <= 2
-            if not near and leaps.votes[a, b] > rival:
-                rival = leaps.votes[a, b]
+    for k in range(leaps.count):
+        shift = leaps.shifts[k]
+        near = abs(shift // SIDE - leaps.across) <= 2 and abs(shift % SIDE - leaps.down) <= 2
+        if not near and leaps.votes[shift] > rival:
+            rival = leaps.votes[shift]
     return rival
+
+
+def forget(leaps: Leaps) -> None:
+    """Take back all votes."""
+    for k in range(leaps.count):
+        leaps.votes[leaps.shifts[k]] = 0
+        leaps.voter[leaps.shifts[k]] = -1
+    leaps.count = 0
 
 
 def take(
     leaps: Leaps,
     index: CornerIndex,
     edges: EdgeColumns,
-    i: int,
+    k: int,
     corners: CornerColumns,
     reach: float,
     settings: Settings,
 ) -> int:
-    """An edge takes the corner that looks most like it where the shift of its part puts it; return how many it found.
+    """An asking edge takes the corner that looks most like it where the shift of its part puts it; how many it found.
 
     A shift of ``across`` stands for all between it and the next one but one.
     """
     step = reach / (BINS / 2.0)
-    u, v = leaps.u[i] + (leaps.across + 1) * step - reach, leaps.v[i] + (leaps.down + 1) * step - reach
+    i = leaps.rows[k]
+    u, v = leaps.u[k] + (leaps.across + 1) * step - reach, leaps.v[k] + (leaps.down + 1) * step - reach
     least = matching.likeness_needed(matching.contrast(edges, i), settings)
     best = -1
     left, right = matching.first_cell(u, step, index.columns), matching.last_cell(u, step, index.columns)
@@ -156,22 +191,19 @@ def find(
     ask(leaps, plane, edges)
     reach = REACH_SHARE * plane.width
     found = 0
-    asking = 0
+    asked = 0
     for part in range(COLUMNS * ROWS):
-        if not is_lost(leaps, part) or asking + leaps.lost[part] > MAX_ASKING:
+        if not is_lost(leaps, part) or asked + leaps.lost[part] > MAX_ASKING:
             continue
-        asking += leaps.lost[part]
-        for a in range(BINS + 1):
-            for b in range(BINS + 1):
-                leaps.votes[a, b] = 0
-                leaps.voter[a, b] = -1
-        for i in range(edges.count):
-            if leaps.part[i] == part:
-                vote(leaps, index, edges, i, corners, reach, settings)
+        asked += leaps.lost[part]
+        for k in range(leaps.asking):
+            if leaps.part[k] == part:
+                vote(leaps, index, edges, k, corners, reach, settings)
         most_votes(leaps)
         agree = leaps.most >= max(1.0 * MIN_VOTES, AGREEING_SHARE * leaps.lost[part])
         if agree and rival_votes(leaps) <= RIVAL_SHARE * leaps.most:
-            for i in range(edges.count):
-                if leaps.part[i] == part:
-                    found += take(leaps, index, edges, i, corners, reach, settings)
+            for k in range(leaps.asking):
+                if leaps.part[k] == part:
+                    found += take(leaps, index, edges, k, corners, reach, settings)
+        forget(leaps)
     return found

@@ -25,8 +25,8 @@ class CornerIndex:
 
     What a look-up costs follows from the corners that it finds, not from the size of the gate or of the picture.
     ``start``: of each cell's run. In that order: ``order``, row of the frame's corners; and what a look needs, copied,
-    so that a run of corners is a run of memory: ``x``, ``y`` (px of the input frame), ``appearance``. ``nbytes``: that
-    the index occupies from start to end.
+    so that a run of corners is a run of memory: ``x``, ``y`` (px of the input frame), ``appearance``. ``listed``: work
+    space of a look. ``nbytes``: that all of it occupies.
     """
 
     def __init__(self, width: int, height: int, capacity: int) -> None:
@@ -34,10 +34,11 @@ class CornerIndex:
         self.rows = (height >> CELL_SHIFT) + 1
         self.start = integers(self.columns * self.rows + 1)
         self.order = integers(capacity)
+        self.listed = integers(capacity + 1)
         self.x, self.y = doubles(capacity), doubles(capacity)
         appearance = np.zeros((capacity, APPEARANCE_SAMPLES), np.uint8)
         self.appearance, self.words = memory_of(appearance), memory_of(appearance.view(np.uint64))
-        self.nbytes = 4 * (self.columns * self.rows + 1) + capacity * (4 + 8 + 8 + APPEARANCE_SAMPLES)
+        self.nbytes = 4 * (self.columns * self.rows + 1) + capacity * (4 + 4 + 8 + 8 + APPEARANCE_SAMPLES)
 
 
 def take_corners(corners: CornerColumns, pixel: Integers, position: Doubles, words: Words) -> None:
@@ -114,6 +115,18 @@ def likeness_needed(own_contrast: float, settings: Settings) -> float:
     return min(LIKENESS_FLOOR + settings.appearance_share * own_contrast, settings.appearance_max)
 
 
+def list_near(index: CornerIndex, x: float, y: float, gate: float) -> int:
+    """List the places of the corners within ``gate`` of (x, y), px. Return how many there are."""
+    count, gate2 = 0, gate * gate
+    left, right = first_cell(x, gate, index.columns), last_cell(x, gate, index.columns)
+    for row in range(first_cell(y, gate, index.rows), last_cell(y, gate, index.rows) + 1):
+        for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
+            dx, dy = index.x[place] - x, index.y[place] - y
+            index.listed[count] = place  # no branch: which corners are near cannot be guessed
+            count += dx * dx + dy * dy <= gate2
+    return count
+
+
 def choose(
     index: CornerIndex, edges: EdgeColumns, i: int, corners: CornerColumns, x: float, y: float, gate: float, most: float
 ) -> None:
@@ -121,28 +134,24 @@ def choose(
 
     ``most``: mean grey difference of its looks that is still the same corner.
     """
-    left, right = first_cell(x, gate, index.columns), last_cell(x, gate, index.columns)
-    for row in range(first_cell(y, gate, index.rows), last_cell(y, gate, index.rows) + 1):
-        for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
-            dx, dy = index.x[place] - x, index.y[place] - y
-            away2 = dx * dx + dy * dy
-            if away2 > gate * gate:
-                continue
-            corner = index.order[place]
-            if not corners.free[corner]:
-                continue
-            far = DISTANCE_COST * math.sqrt(away2)
-            edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]
-            if edge_has_better and corners.edge[corner] >= 0 and far >= corners.cost[corner]:
-                continue  # however alike they look
-            unlike = difference(edges, i, index, place)
-            if unlike >= most:
-                continue
-            cost = unlike + far
-            if edges.best[i] < 0 or cost < edges.cost[i]:
-                edges.best[i], edges.cost[i] = corner, cost
-            if corners.edge[corner] < 0 or cost < corners.cost[corner]:
-                corners.edge[corner], corners.cost[corner] = i, cost
+    for k in range(list_near(index, x, y, gate)):
+        place = index.listed[k]
+        corner = index.order[place]
+        if not corners.free[corner]:
+            continue
+        dx, dy = index.x[place] - x, index.y[place] - y
+        far = DISTANCE_COST * math.sqrt(dx * dx + dy * dy)
+        edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]
+        if edge_has_better and corners.edge[corner] >= 0 and far >= corners.cost[corner]:
+            continue  # however alike they look
+        unlike = difference(edges, i, index, place)
+        if unlike >= most:
+            continue
+        cost = unlike + far
+        if edges.best[i] < 0 or cost < edges.cost[i]:
+            edges.best[i], edges.cost[i] = corner, cost
+        if corners.edge[corner] < 0 or cost < corners.cost[corner]:
+            corners.edge[corner], corners.cost[corner] = i, cost
 
 
 def gate_px(edges: EdgeColumns, i: int, slack_px: float, wide: bool, settings: Settings) -> float:

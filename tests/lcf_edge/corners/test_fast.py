@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from lcf_edge.compilation import uncompiled
-from lcf_edge.corners.fast import Fast
+from lcf_edge.corners.fast import DARK, Fast
 from tests.lcf_edge.corners.test_detector import clutter
 
 Grey = npt.NDArray[np.uint8]
@@ -25,12 +25,14 @@ WHOLE = np.array([(3, 3, WIDTH - 3, HEIGHT - 3)], np.int32)
 PARTS = np.array([(3, 3, 40, 20), (40, 3, 41, 30), (50, 10, 93, 61), (60, 30, 60, 40), (70, 50, 65, 40)], np.int32)
 
 
-def found(image: Grey, threshold: int, parts: npt.NDArray[np.int32], *, compiled: bool) -> list[tuple[float, ...]]:
+def found(
+    image: Grey, threshold: int, parts: npt.NDArray[np.int32], *, compiled: bool, on_dark: int | None = None
+) -> list[tuple[float, ...]]:
     """x, y and strength of each corner, in order."""
     height, width = image.shape
     fast = Fast(width, height, compiled=compiled)
     fast.look(image)
-    pixel, strength = fast.corners(threshold, parts)
+    pixel, strength = fast.corners(threshold, parts, on_dark)
     return [(*place, strong) for place, strong in zip(pixel.tolist(), strength.tolist(), strict=True)]
 
 
@@ -50,6 +52,21 @@ def test_a_part_has_the_corners_that_it_has_as_a_picture_of_its_own(threshold: i
     noise = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
     for image in (noise, clutter(5, WIDTH, HEIGHT)):
         assert found(image, threshold, PARTS, compiled=True) == found(image, threshold, PARTS, compiled=False)
+
+
+@needs_extension
+@given(
+    image=arrays(np.uint8, (HEIGHT, WIDTH), elements=st.sampled_from([0, 20, 30, 40, 47, 48, 60, 70, 90])),
+    on_dark=st.integers(1, 40),
+)
+def test_what_is_dark_has_a_threshold_of_its_own(image: Grey, on_dark: int) -> None:
+    corners = found(image, 30, PARTS, compiled=True, on_dark=on_dark)
+    assert corners == [
+        (x, y, strength)
+        for x, y, strength in found(image, min(on_dark, 30), PARTS, compiled=True)
+        if strength >= 30 or image[int(y), int(x)] < DARK
+    ]
+    assert corners == found(image, 30, PARTS, compiled=False, on_dark=on_dark)
 
 
 @needs_extension
@@ -85,11 +102,11 @@ _DIGEST = """
 import zlib, numpy as np
 from lcf_edge.corners.fast_scores import Scores, bound, find
 image = np.random.default_rng(3).integers(0, 256, (24, 40), np.uint8)
-scores = Scores(40, 24)
+scores = Scores(40, 24, 48)
 flat, pixel, strength = image.reshape(-1).data, np.zeros((960, 2), np.int32), np.zeros(960, np.float32)
 bound(scores, flat)
 parts = np.array([(3, 3, 37, 21), (5, 7, 20, 9)], np.int32)
-count = find(scores, flat, 40, parts.data, pixel.data, strength.data)
+count = find(scores, flat, 40, 9, parts.data, pixel.data, strength.data)
 print(count, zlib.crc32(pixel.tobytes() + strength.tobytes()))
 """
 
