@@ -93,7 +93,7 @@ deb: wheels
 
 # As root. HIL: what pytest is told. ARCH=arm64: Debian 13 for 64-bit Arm.
 hil: $(VENV)/.dev $(VENV)/.compiled
-	$(if $(ARCH),$(RELEASE))
+	$(RELEASE)
 	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pytest hil_mocks/vm -o timeout=$(if $(ARCH),1800,600) \
 		-p no:cacheprovider --durations=5 $(if $(ARCH),--arch $(ARCH) --ignore hil_mocks/vm/scenarios/test_drive.py) $(HIL)
 

@@ -1,4 +1,4 @@
-"""One machine for all scenarios, but for those whose module has a ``SYSTEM`` of its own; failures show the journal."""
+"""One machine for all scenarios, but for those whose module has ``SYSTEMS`` of its own; failures show the journal."""
 
 import os
 import shutil
@@ -41,8 +41,8 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     if session.config.option.collectonly:
         return
     modules = {item.getparent(pytest.Module) for item in session.items}
-    wanted = (getattr(module.obj, "SYSTEM", DEBIAN_12) for module in modules if module is not None)
-    systems = {_for_arch(session.config, system) for system in wanted}
+    wanted = (getattr(module.obj, "SYSTEMS", (DEBIAN_12,)) for module in modules if module is not None)
+    systems = {_for_arch(session.config, system) for of_module in wanted for system in of_module}
     try:
         session.config.stash[_IMAGES] = {system: image(system) for system in systems}
     except ImageError as error:

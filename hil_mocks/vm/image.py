@@ -65,7 +65,7 @@ SOURCES = (
     LOCK,
 )
 HERE = "x86_64"
-TOOLS = {"mmdebstrap": "mmdebstrap", "mke2fs": "e2fsprogs", "openssl": "openssl"}
+TOOLS = {"mmdebstrap": "mmdebstrap", "mke2fs": "e2fsprogs", "openssl": "openssl", "dh_builddeb": "debhelper"}
 """What brings them on Debian and its relatives."""
 
 MORE_TOOLS = {
@@ -147,9 +147,7 @@ class Image:
 
 def missing(processor: str = HERE) -> str:
     """What stands in the way of a machine here and how to get it, in one line; empty: nothing does."""
-    needed = TOOLS | MORE_TOOLS[processor]
-    if processor != HERE:
-        needed |= MACHINES[processor].tools
+    needed = {**TOOLS, **MORE_TOOLS[processor], **MACHINES[processor].tools}
     tools = sorted({package for tool, package in needed.items() if shutil.which(tool) is None})
     wants = [f"{', '.join(tools)} (apt-get install {' '.join(tools)})"] if tools else []
     wants += ["root (sudo make hil)"] if os.geteuid() != 0 else []

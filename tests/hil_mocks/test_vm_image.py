@@ -47,7 +47,7 @@ def test_where_it_cannot_be_it_says_so_and_does_not_pretend(tmp_path: Path, wher
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, env=environment, timeout=120)
     assert done.returncode == status
     (line,) = [line for line in (done.stdout + done.stderr).splitlines() if "hil:" in line]
-    assert "apt-get install e2fsprogs mmdebstrap openssl qemu-system-x86" in line
+    assert "apt-get install debhelper e2fsprogs gcc-x86-64-linux-gnu mmdebstrap openssl qemu-system-x86" in line
     assert "passed" not in done.stdout
 
 

@@ -9,7 +9,7 @@ from hil_mocks.vm.daemon import LISTENS, Daemon, Subscriber
 from hil_mocks.vm.image import DEBIAN_13_WITH_LIBCAMERA
 from hil_mocks.vm.machine import Machine
 
-SYSTEM = DEBIAN_13_WITH_LIBCAMERA
+SYSTEMS = (DEBIAN_13_WITH_LIBCAMERA,)
 CAMERA = (
     """[camera]
 device = "{device}"
@@ -34,7 +34,7 @@ PROCESS = "systemctl show lcf-edge --property=ControlGroup --value | xargs -I{} 
 @pytest.fixture(scope="module")
 def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
     """With a camera of the kernel's media controller."""
-    with booted(pytestconfig, SYSTEM, RESULTS / "libcamera") as running:
+    with booted(pytestconfig, SYSTEMS[0], RESULTS / "libcamera") as running:
         running.run(f"modprobe vimc && udevadm settle; mkdir -p {DROP_IN}; printf '{PATIENT}' > {DROP_IN}/patient.conf")
         running.run("systemctl daemon-reload")
         yield running
