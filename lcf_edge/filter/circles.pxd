@@ -17,7 +17,8 @@ cdef class Ids:
 cdef class Members:
     cdef public Py_ssize_t capacity
     cdef readonly int[::1] size
-    cdef readonly double[::1] x, y, variance_x, variance_y
+    cdef readonly double[::1] x, y, variance_y
+    cdef double[::1] variance_x
 
 cdef unsigned int new_id(Ids ids) noexcept nogil
 cdef void clear(Members members, Py_ssize_t g) noexcept nogil

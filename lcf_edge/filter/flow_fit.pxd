@@ -48,8 +48,10 @@ cdef int FOCUS_Y
 cdef class FlowFit:
     cdef public int count
     cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px, turn_share
-    cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, on_x, on_y, share, turned, rest
-    cdef readonly int[::1] slot, cell, cells, bins
+    cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, share, turned, rest
+    cdef double[::1] on_x, on_y
+    cdef readonly int[::1] slot, cells
+    cdef int[::1] cell, bins
     cdef public NormalEquations equations
 
 cdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil

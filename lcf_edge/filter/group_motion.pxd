@@ -16,8 +16,9 @@ cdef double LIKE_GROUND
 
 cdef class MotionSums:
     cdef readonly int[::1] count
-    cdef readonly double[::1] weight, x, y, vx, vy, focus_x, focus_y, forward, elapsed, common
-    cdef readonly double[::1] b2v0, b4v0, b1v1, b2v1, b0v2
+    cdef readonly double[::1] x, y, vx, vy, focus_x, focus_y, forward
+    cdef double[::1] weight, elapsed, common
+    cdef double[::1] b2v0, b4v0, b1v1, b2v1, b0v2
     cdef readonly double[::1] left, top, right, bottom
     cdef double[::1] xx, yy, xvx, yvy
     cdef double expansion, spread
@@ -26,7 +27,7 @@ cdef void clear(MotionSums sums, Py_ssize_t k) noexcept nogil
 cdef void add_motion(MotionSums sums, Py_ssize_t k, double weight, double x, double y, double vx, double vy) noexcept nogil
 cdef void add_edge(MotionSums sums, Py_ssize_t k, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(across=double, down=double, corner=int)
-cpdef void add_patch(MotionSums sums, Py_ssize_t k, Patches patches, Py_ssize_t p, Situation around) noexcept nogil
+cdef void add_patch(MotionSums sums, Py_ssize_t k, Patches patches, Py_ssize_t p, Situation around) noexcept nogil
 cdef void add(MotionSums sums, Py_ssize_t k, MotionSums part, Py_ssize_t c) noexcept nogil
 @cython.locals(weight=double, x=double, y=double, wide=double, tall=double, parting=double, growing=double, parting_hz=double, noise=double, share=double)
 cdef void fit_expansion(MotionSums sums, Py_ssize_t k) noexcept nogil

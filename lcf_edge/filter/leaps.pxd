@@ -19,7 +19,8 @@ cdef double RIVAL_SHARE
 cdef int MAX_ASKING
 
 cdef class Leaps:
-    cdef readonly int[::1] part, rows, seen, lost, votes, voter, shifts
+    cdef readonly int[::1] part, rows, seen, lost
+    cdef int[::1] votes, voter, shifts
     cdef readonly double[::1] u, v
     cdef public int asking, count, across, down, most
 

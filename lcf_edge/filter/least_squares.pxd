@@ -7,7 +7,8 @@ cdef double MIN_PIVOT
 cdef class NormalEquations:
     cdef readonly int unknowns
     cdef readonly double[::1] row, right, solution
-    cdef readonly double[:, ::1] matrix, factor, inverse
+    cdef readonly double[:, ::1] matrix, inverse
+    cdef double[:, ::1] factor
 
 cpdef void begin(NormalEquations equations, int unknowns) noexcept nogil
 cpdef void add_prior(NormalEquations equations, Py_ssize_t i, double weight) noexcept nogil

@@ -24,6 +24,7 @@ from lcf_edge.filter import (
     rebel_circles,
     rest,
     square_expert,
+    turmoil,
 )
 from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import heading as headings
@@ -51,6 +52,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.square_expert import Squares
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable, Mask, ObjectTable, PsiTable
+from lcf_edge.filter.turmoil import Turmoil
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Sizes
 
@@ -145,6 +147,7 @@ class LineCircleFilter:
         self._rebel_groups = RebelGroups(memory.edges_rebel, memory.circles_rebel)
         self.patches = Patches(config.filter.patches)
         self._patch_groups = PatchGroups(config.filter.patches)
+        self._turmoil = Turmoil(lens.width, lens.height)
         self._squares = Squares(memory.circles_rebel, memory.objects, capacity)
         self._candidates = Candidates(memory.circles_normal)
         self._ids = Ids()  # one count, so that an id names one circle of either kind
@@ -193,6 +196,7 @@ class LineCircleFilter:
         evicted = self._collect()
         self._find(motion)
         sigma_rad, residual = self._refine(motion)
+        turmoil.count(self._turmoil, self.edges.columns, self._around, self._settings)
         self._update(sigma_rad)
         evicted += self._add()
         pixels = None if image is None else memory_of(np.ascontiguousarray(image).reshape(-1))
@@ -427,6 +431,7 @@ class LineCircleFilter:
             rebels,
             self.patches,
             self._patch_groups,
+            self._turmoil,
             self._baselines,
             around,
             settings,

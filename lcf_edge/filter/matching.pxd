@@ -18,7 +18,8 @@ cdef int ROUNDS
 
 cdef class CornerIndex:
     cdef readonly int columns, rows, nbytes
-    cdef readonly int[::1] start, order, listed
+    cdef readonly int[::1] start, order
+    cdef int[::1] listed
     cdef readonly double[::1] x, y
     cdef readonly unsigned char[:, ::1] appearance
     cdef unsigned long long[:, ::1] words

@@ -41,9 +41,12 @@ cdef class Patches:
     cdef readonly int capacity
     cdef readonly unsigned char[::1] active
     cdef readonly int[::1] misses, circle
-    cdef readonly double[::1] x, y, first_x, first_y, half_px, scale, sigma, elapsed_s, depth_m, inverse, doubt
-    cdef readonly double[::1] contrast, unit, weight, sampled
-    cdef readonly double[:, ::1] grey, across, down, growing, stretching, sums, inverted, coupled
+    cdef readonly double[::1] x, y, scale, sigma, elapsed_s, depth_m, inverse, doubt
+    cdef double[::1] first_x, first_y, half_px
+    cdef readonly double[::1] contrast, unit
+    cdef double[::1] weight, sampled
+    cdef readonly double[:, ::1] grey, across, down, inverted
+    cdef double[:, ::1] growing, stretching, sums, coupled
     cdef readonly double[::1] alone, stretch
     cdef double u, v, right_u, right_v, down_u, down_v, mean, square, shared, on_across, on_down, on_growing, on_stretching, tried
 

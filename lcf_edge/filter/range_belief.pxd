@@ -48,7 +48,8 @@ cdef class Evidence:
 
 cdef class Belief:
     cdef public double stands, log_odds, met, middle, middle_sigma
-    cdef readonly double[::1] weight, mean, sigma, inverse, standing, moving
+    cdef readonly double[::1] mean, sigma, inverse, standing, moving
+    cdef double[::1] weight
     cdef double inner_forward, inner_right, inner_forward_var, inner_right_var, inner_rate, inner_rate_var
 
 cdef double log_normal2(double dm, double dq, double mm, double qq, double mq) noexcept nogil

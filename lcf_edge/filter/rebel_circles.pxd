@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, image_plane, patch_circles, path, situation
+from lcf_edge.filter cimport edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
@@ -11,6 +11,7 @@ from lcf_edge.filter.patches cimport Patches
 from lcf_edge.filter.rebel_detection cimport Verdicts
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
+from lcf_edge.filter.turmoil cimport Turmoil
 
 cdef double VELOCITY_NOISE_PX
 cdef double STILL_PX
@@ -48,6 +49,7 @@ cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE
 cdef double MAX_TURN_RAD
+cdef int NONE
 cdef int CROSSING
 cdef int INCOMING
 cdef int LEADING
@@ -56,12 +58,16 @@ cdef double NAN
 
 cdef class RebelGroups:
     cdef public Py_ssize_t count, groups
-    cdef readonly int[::1] verdict, label, group
+    cdef readonly int[::1] verdict, label
+    cdef int[::1] group
     cdef readonly double[::1] vx, vy, elapsed_s
     cdef readonly Members members
-    cdef readonly double[::1] mean_vx, mean_vy, mean_s, closing_mps, focus_rate, focus_r2, below2, below_vy
-    cdef readonly double[::1] rate_below, r2_below2, then_x, then_y, spread, spreading
-    cdef readonly double[::1] expansion, weight, weighed_rate
+    cdef readonly double[::1] mean_s, closing_mps, focus_rate, focus_r2
+    cdef double[::1] mean_vx, mean_vy, below2, below_vy
+    cdef readonly double[::1] then_x, then_y, spread
+    cdef double[::1] rate_below, r2_below2, spreading
+    cdef readonly double[::1] expansion
+    cdef double[::1] weight, weighed_rate
     cdef readonly int[::1] standing, inwards, flowing, circle
     cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
@@ -110,4 +116,4 @@ cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint 
 cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
 @cython.locals(near=bint, waits=bint)
 cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Turmoil disorder, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

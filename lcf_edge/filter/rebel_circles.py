@@ -3,7 +3,7 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, image_plane, patch_circles, path, situation
+from lcf_edge.filter import edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
@@ -14,6 +14,7 @@ from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
+from lcf_edge.filter.turmoil import Turmoil
 from lcf_edge.messages import Cause
 
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
@@ -53,7 +54,7 @@ COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by cor
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
 MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
-CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
+NONE, CROSSING, INCOMING, LEADING = int(Cause.NONE), int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -156,11 +157,14 @@ def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, se
 
 
 def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) -> int:
-    """Circle that holds a point, the nearest; -1: none. Only circles from Tr_s up speak for what is inside them."""
+    """Circle that holds a point, the nearest; -1: none.
+
+    Only circles from Tr_s up speak for what is inside them, and none does for turmoil.
+    """
     nearest = -1
     least = 0.0
     for c in range(circles.capacity):
-        if circles.active[c] and circles.trust[c] >= settings.tr_s:
+        if circles.active[c] and circles.trust[c] >= settings.tr_s and circles.cause[c] != NONE:
             away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - settings.member_margin_px
             if away < least:
                 nearest, least = c, away
@@ -501,7 +505,12 @@ def involve(
 def is_aligned(
     groups: RebelGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
 ) -> bool:
-    """Whether a group goes on as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction."""
+    """Whether a group goes on as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction.
+
+    Of turmoil it is not known how it goes on.
+    """
+    if circles.cause[c] == NONE:
+        return True
     beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), flow.length(groups.mean_vx[g], groups.mean_vy[g])
     still = STILL_PX / groups.mean_s[g]
     turn = math.fabs(flow.wrap(beta - circles.beta[c]))
@@ -679,12 +688,15 @@ def update(
     rebels: int,
     patches: Patches,
     patch_groups: PatchGroups,
+    disorder: Turmoil,
     baselines: Baselines,
     around: Situation,
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), and patches; return evictions.
+    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), patches, and turmoil.
+
+    Return evictions.
 
     The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
     """
@@ -711,6 +723,7 @@ def update(
         if groups.group[k] >= 0:
             edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
     evicted += patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
+    evicted += turmoil.update(disorder, edges, circles, groups.updated, around, settings, ids)
     lose_trust(groups, circles, around, settings)
     shared.release(edges, circles, True)
     return evicted

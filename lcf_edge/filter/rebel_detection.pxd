@@ -31,7 +31,8 @@ cdef double MIN_FIRST_LINK_PX
 
 cdef class Verdicts:
     cdef public Py_ssize_t count
-    cdef readonly int[::1] row, slot, oldest, near
+    cdef readonly int[::1] row, slot, near
+    cdef int[::1] oldest
     cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count

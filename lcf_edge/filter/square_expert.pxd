@@ -46,6 +46,7 @@ cdef double SHRINKS_S
 cdef double FOOT_S
 cdef double FOOT_BELOW_S
 cdef double EDGE_PX
+cdef double TURMOIL_HZ
 cdef double FRAMES_UNREPORTED
 cdef double UNSURE
 cdef int SURE_EDGES
@@ -74,6 +75,7 @@ cdef int CROSSING
 cdef int ONCOMING
 cdef int LEADING
 cdef int CUTTING_IN
+cdef int UNKNOWN_CAUSE
 cdef int CROSSES
 cdef int COMES
 cdef int LEADS
@@ -85,7 +87,8 @@ cdef double NAN
 
 cdef class Squares:
     cdef readonly MotionSums parts, wholes, bounds
-    cdef readonly int[::1] members, resting
+    cdef readonly int[::1] members
+    cdef int[::1] resting
     cdef unsigned char[::1] obedient
     cdef readonly Evidence evidence
     cdef readonly Belief belief
@@ -104,11 +107,17 @@ cdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, Situation around) noexcept nogil
 cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cdef bint is_turmoil(CircleColumns circles, Py_ssize_t c) noexcept nogil
+@cython.locals(nearest=int, least=double, meets=bint)
+cdef int object_in_turmoil(ObjectColumns objects, CircleColumns circles, Py_ssize_t c) noexcept nogil
 @cython.locals(least=double)
 cdef int nearest_object(ObjectColumns objects, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 cdef int free_row(ObjectColumns objects) noexcept nogil
 cdef int least_row(ObjectColumns objects) noexcept nogil
+cdef void give_birth(ObjectColumns objects, Py_ssize_t o, Settings settings, Ids ids) noexcept nogil
 cdef void found(ObjectColumns objects, Py_ssize_t o, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef void found_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(in_turmoil=bint)
 cdef int gather(ObjectColumns objects, Squares squares, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
 cdef void leave(CircleColumns circles, Py_ssize_t o, int to) noexcept nogil
 cdef void hand_over(EdgeColumns edges, Py_ssize_t o, int to) noexcept nogil
@@ -118,6 +127,7 @@ cdef void update_rate(ObjectColumns objects, Py_ssize_t o, double h_m, double h_
 @cython.locals(repeated=double, rate=double, variance=double, speed_mps=double)
 cdef void observe(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around) noexcept nogil
 cdef void show(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around) noexcept nogil
+cdef void fit(ObjectColumns objects, Py_ssize_t o, double left, double right, double top, double bottom, Situation around) noexcept nogil
 @cython.locals(time_s=double)
 cdef double follow(double side, double shown, double outwards, Situation around) noexcept nogil
 @cython.locals(whole=double, shown=double, per_m=double, bottom=double, kept=double)
@@ -135,6 +145,7 @@ cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence ev
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
 cdef void go_on(ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef bint obeys(ObjectColumns objects, Py_ssize_t o, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, double share, Situation around) noexcept nogil
 cdef void set_reach(MotionSums bounds, MotionSums wholes, Py_ssize_t o) noexcept nogil
 cdef bint is_in_reach(MotionSums bounds, Py_ssize_t o, double x, double y) noexcept nogil

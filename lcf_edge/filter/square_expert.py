@@ -54,6 +54,7 @@ SHRINKS_S = 0.3  # and edges that show it smaller,
 FOOT_S = 1.2  # and with which a foot is forgotten that is not seen,
 FOOT_BELOW_S = 3.0  # below the picture
 EDGE_PX = 1.0  # by which a corner lies inside of what it is a corner of
+TURMOIL_HZ = 1.0  # 1 sigma of m and q of what shows no motion that could be followed
 FRAMES_UNREPORTED = 2.0  # of a new object,
 UNSURE = 0.25  # and three more with fewer edges than
 SURE_EDGES = 7
@@ -79,7 +80,12 @@ MAX_RANGE_M = 1000.0  # farther off nothing is known
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
-CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
+UNKNOWN_CAUSE, CROSSES, COMES, LEADS = (
+    int(Cause.NONE),
+    int(Cause.CROSSING),
+    int(Cause.INCOMING),
+    int(Cause.LEADING),
+)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -277,6 +283,25 @@ def keep_members(
             circles.square[c] = -1
 
 
+def is_turmoil(circles: CircleColumns, c: int) -> bool:
+    """Whether a circle shows where something is, and not how it moves."""
+    return circles.active[c] != 0 and circles.cause[c] == UNKNOWN_CAUSE
+
+
+def object_in_turmoil(objects: ObjectColumns, circles: CircleColumns, c: int) -> int:
+    """The object that is where a circle in turmoil is, the nearest; -1: none."""
+    nearest = -1
+    least = INFINITY
+    for o in range(objects.capacity):
+        dx, dy = math.fabs(objects.x[o] - circles.x[c]), math.fabs(objects.y[o] - circles.y[c])
+        meets = dx < 0.5 * max(objects.width[o], circles.width[c]) and dy < 0.5 * max(
+            objects.height[o], circles.height[c]
+        )
+        if objects.active[o] and meets and flow.length(dx, dy) < least:
+            nearest, least = o, flow.length(dx, dy)
+    return nearest
+
+
 def nearest_object(
     objects: ObjectColumns, squares: Squares, circles: CircleColumns, c: int, around: Situation, settings: Settings
 ) -> int:
@@ -308,6 +333,18 @@ def least_row(objects: ObjectColumns) -> int:
     return least
 
 
+def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> None:
+    """A new object. It is not told in its first frames: its numbers would be those of a few edges."""
+    objects.active[o] = 1
+    objects.id[o] = shared.new_id(ids)
+    objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
+    objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
+    objects.class_id[o], objects.state[o], objects.support[o] = UNKNOWN, SEEN, 0
+    objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
+    objects.probability[o] = 0.0
+    forget_motion(objects, o)
+
+
 def found(
     objects: ObjectColumns,
     o: int,
@@ -318,23 +355,29 @@ def found(
     settings: Settings,
     ids: Ids,
 ) -> None:
-    """A new object from a circle. It is not told in its first frames: its numbers would be those of a few edges."""
-    objects.active[o] = 1
-    objects.id[o] = shared.new_id(ids)
+    """A new object from a circle."""
+    give_birth(objects, o, settings, ids)
     left, right = squares.parts.left[c], squares.parts.right[c]
     top, bottom = squares.parts.top[c], squares.parts.bottom[c]
     objects.x[o], objects.width[o] = 0.5 * (left + right), right - left
     objects.y[o], objects.height[o] = 0.5 * (top + bottom), bottom - top
-    objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
-    objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
-    objects.class_id[o], objects.state[o], objects.support[o] = UNKNOWN, SEEN, 0
-    objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
-    objects.probability[o] = 0.0
-    forget_motion(objects, o)
     circles.square[c] = o
     group_motion.clear(squares.wholes, o)
     group_motion.add(squares.wholes, o, squares.parts, c)
     observe(objects, o, squares.wholes, around)
+
+
+def found_in_turmoil(
+    objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings, ids: Ids
+) -> None:
+    """A new object from a circle in turmoil: only its place is known."""
+    give_birth(objects, o, settings, ids)
+    objects.x[o], objects.y[o] = circles.x[c], circles.y[c]
+    objects.width[o], objects.height[o] = circles.width[c], circles.height[c]
+    circles.square[c] = o
+    objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
+    objects.mm[o] = objects.qq[o] = TURMOIL_HZ * TURMOIL_HZ
+    objects.reference[o] = around.speed_mps
 
 
 def forget_motion(objects: ObjectColumns, o: int) -> None:
@@ -356,19 +399,28 @@ def gather(
     """Circles without an object join one, or found a new one; return how many found no place."""
     evicted = 0
     for c in range(circles.capacity):
-        if not circles.active[c] or circles.square[c] >= 0 or squares.parts.count[c] < MIN_EDGES:
+        in_turmoil = is_turmoil(circles, c)
+        if not circles.active[c] or circles.square[c] >= 0:
             continue
-        o = nearest_object(objects, squares, circles, c, around, settings)
+        if squares.parts.count[c] < MIN_EDGES and not in_turmoil:
+            continue
+        if in_turmoil:
+            o = object_in_turmoil(objects, circles, c)
+        else:
+            o = nearest_object(objects, squares, circles, c, around, settings)
         if o >= 0:
             circles.square[c] = o
-        elif circles.trust[c] >= settings.tr_s and not group_motion.is_ground(squares.parts, c, around):
+        elif circles.trust[c] >= settings.tr_s and (in_turmoil or not group_motion.is_ground(squares.parts, c, around)):
             o = free_row(objects)
             if o < 0:
                 evicted += 1
                 o = least_row(objects)
                 leave(circles, o, -1)
                 hand_over(edges, o, -1)
-            found(objects, o, squares, circles, c, around, settings, ids)
+            if in_turmoil:
+                found_in_turmoil(objects, o, circles, c, around, settings, ids)
+            else:
+                found(objects, o, squares, circles, c, around, settings, ids)
     return evicted
 
 
@@ -495,12 +547,20 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
 
 
 def show(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
-    """The box around all edges of an object: it grows soon, and shrinks slowly."""
+    """The box around all edges of an object."""
+    left, right = wholes.left[o] - EDGE_PX, wholes.right[o] + EDGE_PX
+    fit(objects, o, left, right, wholes.top[o] - EDGE_PX, wholes.bottom[o] + EDGE_PX, around)
+
+
+def fit(
+    objects: ObjectColumns, o: int, left: float, right: float, top: float, bottom: float, around: Situation
+) -> None:
+    """The box of an object, on its way to what is seen of it: it grows soon, and shrinks slowly."""
     half_width, half_height = 0.5 * objects.width[o], 0.5 * objects.height[o]
-    left = follow(objects.x[o] - half_width, wholes.left[o] - EDGE_PX, -1.0, around)
-    right = follow(objects.x[o] + half_width, wholes.right[o] + EDGE_PX, 1.0, around)
-    top = follow(objects.y[o] - half_height, wholes.top[o] - EDGE_PX, -1.0, around)
-    bottom = follow(objects.y[o] + half_height, wholes.bottom[o] + EDGE_PX, 1.0, around)
+    left = follow(objects.x[o] - half_width, left, -1.0, around)
+    right = follow(objects.x[o] + half_width, right, 1.0, around)
+    top = follow(objects.y[o] - half_height, top, -1.0, around)
+    bottom = follow(objects.y[o] + half_height, bottom, 1.0, around)
     objects.x[o], objects.width[o] = 0.5 * (left + right), right - left
     objects.y[o], objects.height[o] = 0.5 * (top + bottom), bottom - top
 
@@ -692,6 +752,21 @@ def go_on(objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation, 
         objects.active[o] = 0
 
 
+def go_on_in_turmoil(
+    objects: ObjectColumns, o: int, circles: CircleColumns, around: Situation, settings: Settings
+) -> bool:
+    """An object of which a circle in turmoil tells that it is still there, and no edge more; False: none does."""
+    for c in range(circles.capacity):
+        if is_turmoil(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
+            objects.unseen_s[o], objects.state[o], objects.support[o] = 0.0, SEEN, circles.support[c]
+            objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
+            half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
+            left, right = circles.x[c] - half_width, circles.x[c] + half_width
+            fit(objects, o, left, right, circles.y[c] - half_height, circles.y[c] + half_height, around)
+            return True
+    return False
+
+
 def obeys(
     objects: ObjectColumns,
     o: int,
@@ -868,7 +943,9 @@ def tell_circles(objects: ObjectColumns, circles: CircleColumns, settings: Setti
     """
     for c in range(circles.capacity):
         o = circles.square[c]
-        if o < 0 or not circles.active[c] or objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
+        if o < 0 or not circles.active[c] or is_turmoil(circles, c):
+            continue
+        if objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
             continue
         if circles.cause[c] == COMES and objects.class_id[o] != CROSSING:
             continue
@@ -919,7 +996,7 @@ def update(
             objects.unseen_s[o], objects.state[o] = 0.0, SEEN
             objects.looming[o] = objects.sideways[o] = 0.0
             objects.reference[o] = around.speed_mps
-        else:
+        elif not go_on_in_turmoil(objects, o, circles, around, settings):
             go_on(objects, o, plane, around, settings)
         collect_evidence(squares.evidence, objects, o, plane, around)
         if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or rests(objects, o, around)):

@@ -21,6 +21,7 @@ from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable
+from lcf_edge.filter.turmoil import Turmoil
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Cause
 
@@ -99,6 +100,7 @@ class Scene:
             seen.count,
             Patches(0),
             PatchGroups(0),
+            Turmoil(640, 480),
             seen.baselines,
             self.around,
             self.settings,
@@ -122,7 +124,7 @@ def standing(around: Any, x: Floats, y: Floats, vx: Floats, vy: Floats) -> Circl
     seen = Seen(scene.edges, x, y, vx, vy, around)
     np.asarray(seen.verdicts.mover)[:], np.asarray(seen.verdicts.incoming)[:] = 0, 1
     columns, circles = scene.edges.columns, scene.circles.columns
-    none = Patches(0), PatchGroups(0)
+    none = Patches(0), PatchGroups(0), Turmoil(640, 480)
     rebel_circles.update(
         scene.groups, columns, circles, seen.verdicts, seen.breaking, seen.count, *none, seen.baselines, around,
         scene.settings, scene.ids,

@@ -1,0 +1,56 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport circles as shared
+from lcf_edge.filter cimport edge_equations, flow, rounding, situation
+from lcf_edge.filter.circles cimport Ids, Members
+from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef int ACROSS
+cdef double HALF_LIFE_S
+cdef double MIN_EDGES
+cdef double MIN_LOST
+cdef double FOUND_SHARE
+cdef double FOUND_NOW_SHARE
+cdef double FOUND_ELSEWHERE
+cdef int MIN_CELLS
+cdef double MIN_S
+cdef double MET_S
+cdef double SLOW_MPS
+cdef int NONE
+
+cdef class Turmoil:
+    cdef readonly int across, down
+    cdef readonly double side_px
+    cdef double per_px
+    cdef readonly double[::1] found, lost, longest_s
+    cdef double[::1] found_now, lost_now, lasts_s, weight
+    cdef unsigned char[::1] unruly
+    cdef readonly int[::1] place, size
+    cdef readonly Members members
+
+cdef int cell_at(Turmoil turmoil, double x, double y) noexcept nogil
+cdef double middle_x(Turmoil turmoil, int k) noexcept nogil
+cdef double middle_y(Turmoil turmoil, int k) noexcept nogil
+@cython.locals(k=int)
+cpdef void count(Turmoil turmoil, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cdef bint is_inner(Turmoil turmoil, int k) noexcept nogil
+@cython.locals(total=double, row=int, middle=int)
+cdef double with_those_around(double[::1] values, Turmoil turmoil, int k) noexcept nogil
+cdef double stays_px(Turmoil turmoil, int k, Situation around) noexcept nogil
+cdef bint is_unruly(Turmoil turmoil, int k, Situation around, Settings settings) noexcept nogil
+@cython.locals(row=int, column=int)
+cdef void mark(Turmoil turmoil, int k) noexcept nogil
+cdef bint is_found_elsewhere(Turmoil turmoil) noexcept nogil
+@cython.locals(is_any=bint)
+cdef bint see(Turmoil turmoil, Situation around, Settings settings) noexcept nogil
+@cython.locals(changed=bint, x=int, y=int, k=int, other=int)
+cdef void join_cells(Turmoil turmoil) noexcept nogil
+@cython.locals(k=int, g=int)
+cdef void gather(Turmoil turmoil) noexcept nogil
+@cython.locals(nearest=int, least=double)
+cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
+cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
+@cython.locals(evicted=int, c=int)
+cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

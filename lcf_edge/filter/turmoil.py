@@ -1,0 +1,288 @@
+"""Turmoil: places where edges come and go and hardly one is found again, though what stands there would hardly move.
+
+What tumbles, spins or bursts keeps no corner for two frames, and so shows no rebel: the flow breaks there as a whole.
+The picture is divided into cells, and edges that were found and lost are counted in each. Near O, or when the vehicle
+rests, even what will be met in a second is found again from frame to frame. Where nearly all is lost, for several
+frames, while the rest of the picture is found, is a circle of C_r. When it is met is not known.
+"""
+
+import math
+
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import edge_equations, flow, rounding, situation
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, octets
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause
+
+ACROSS = 20  # cells in a row; a place is judged with those around it
+HALF_LIFE_S = 0.15  # of what was counted
+MIN_EDGES = 25.0  # counted in a place lately,
+MIN_LOST = 6.0  # and of these lost in this frame: one bad picture is no turmoil
+FOUND_SHARE = 0.1  # of them, that are found at most lately,
+FOUND_NOW_SHARE = 0.2  # and in this frame; more than that elsewhere,
+FOUND_ELSEWHERE = 0.35  # and lately this share, where edges are found at all
+MIN_CELLS = 3  # of a place, that are in turmoil
+MIN_S = 0.15  # that it lasts before it is believed
+MET_S = 1.0  # what is met later than this is found again
+SLOW_MPS = 0.5  # and by a slower vehicle, all that is farther off than it drives in that time
+NONE = int(Cause.NONE)
+
+
+class Turmoil:
+    """A row a cell, the cells of the picture row by row.
+
+    ``across``, ``down``: how many; ``side_px``, ``per_px``. ``found``, ``lost``: edges, the less the longer ago;
+    ``found_now``, ``lost_now``: in this frame. ``unruly``: whether it and those around it are in turmoil; ``lasts_s``:
+    for how long it or one beside it has been; ``place``: number of the place that it belongs to, -1: none.
+
+    A row a place: ``members``, its edges; ``weight``, how many they were lately; ``size``, its cells in turmoil;
+    ``longest_s``, for how long it lasts.
+    """
+
+    def __init__(self, width: int, height: int) -> None:
+        self.across = ACROSS
+        self.side_px, self.per_px = width / ACROSS, ACROSS / width
+        self.down = (height * ACROSS + width - 1) // width
+        cells = self.across * self.down
+        self.found, self.lost, self.found_now, self.lost_now = (doubles(cells) for _ in range(4))
+        self.unruly = octets(cells)
+        self.lasts_s = doubles(cells)
+        self.place = integers(cells)
+        self.members = Members(cells)
+        self.size = integers(cells)
+        self.weight, self.longest_s = doubles(cells), doubles(cells)
+
+
+def cell_at(turmoil: Turmoil, x: float, y: float) -> int:
+    """The cell that holds a point, -1: none."""
+    column, row = x * turmoil.per_px, y * turmoil.per_px
+    if x < 0 or y < 0 or column >= turmoil.across or row >= turmoil.down:
+        return -1
+    return rounding.whole(row) * turmoil.across + rounding.whole(column)
+
+
+def middle_x(turmoil: Turmoil, k: int) -> float:
+    """Of a cell, px."""
+    return (k % turmoil.across + 0.5) * turmoil.side_px
+
+
+def middle_y(turmoil: Turmoil, k: int) -> float:
+    """Of a cell, px."""
+    return (k // turmoil.across + 0.5) * turmoil.side_px
+
+
+def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+    """Which edges of the frame before are found in this one; before the lost ones are forgotten.
+
+    What a quick turn blurs is lost for another reason.
+    """
+    kept = math.exp(-math.log(2.0) * around.dt_s / HALF_LIFE_S)
+    for k in range(turmoil.across * turmoil.down):
+        turmoil.found[k] *= kept
+        turmoil.lost[k] *= kept
+        turmoil.found_now[k] = turmoil.lost_now[k] = 0.0
+    if math.fabs(around.yaw_rate_radps) * around.dt_s * around.pinhole.focal > settings.bl0_px:
+        return
+    for i in range(edges.count):
+        k = cell_at(turmoil, edges.predicted_x[i], edges.predicted_y[i])
+        if k < 0 or edges.held[i]:
+            continue
+        if edges.corner[i] >= 0:
+            turmoil.found_now[k] += 1
+        else:
+            turmoil.lost_now[k] += 1
+    for k in range(turmoil.across * turmoil.down):
+        turmoil.found[k] += turmoil.found_now[k]
+        turmoil.lost[k] += turmoil.lost_now[k]
+
+
+def is_inner(turmoil: Turmoil, k: int) -> bool:
+    """Whether a cell has others on all sides; what leaves the picture is lost at its border."""
+    column, row = k % turmoil.across, k // turmoil.across
+    return 0 < column < turmoil.across - 1 and 0 < row < turmoil.down - 1
+
+
+def with_those_around(values: Doubles, turmoil: Turmoil, k: int) -> float:
+    """Sum over an inner cell and the eight around it."""
+    total = 0.0
+    for row in range(-1, 2):
+        middle = k + row * turmoil.across
+        total += values[middle - 1] + values[middle] + values[middle + 1]
+    return total
+
+
+def stays_px(turmoil: Turmoil, k: int, around: Situation) -> float:
+    """How far what stands still, and is met in a second or later, moves there in a frame at most, px."""
+    x, y = middle_x(turmoil, k), middle_y(turmoil, k)
+    rate = 1 / MET_S
+    if math.fabs(around.speed_mps) < SLOW_MPS:
+        rate *= math.fabs(around.speed_mps) / SLOW_MPS
+    return rate * around.dt_s * flow.length(x - around.focus_x, y - around.focus_y)
+
+
+def is_unruly(turmoil: Turmoil, k: int, around: Situation, settings: Settings) -> bool:
+    """Whether edges that ought to be found again are lost, in a cell and those around it."""
+    if not turmoil.lost_now[k] > 0 or not is_inner(turmoil, k):
+        return False
+    lost_now = with_those_around(turmoil.lost_now, turmoil, k)
+    if lost_now < MIN_LOST or with_those_around(turmoil.found_now, turmoil, k) > FOUND_NOW_SHARE * lost_now:
+        return False
+    found, lost = with_those_around(turmoil.found, turmoil, k), with_those_around(turmoil.lost, turmoil, k)
+    if found + lost < MIN_EDGES or found > FOUND_SHARE * (found + lost):
+        return False
+    return stays_px(turmoil, k, around) <= settings.bl0_px
+
+
+def mark(turmoil: Turmoil, k: int) -> None:
+    """An unruly cell and those around it are of its place."""
+    for row in range(-1, 2):
+        for column in range(-1, 2):
+            turmoil.place[k + row * turmoil.across + column] = k
+
+
+def is_found_elsewhere(turmoil: Turmoil) -> bool:
+    """Whether the picture outside of turmoil is found, in this frame and lately; of the latter, the best of it counts.
+
+    What tumbles near may fill much of the picture, and all around it may be lost now and then.
+    """
+    found = share = found_now = lost_now = 0.0
+    for k in range(turmoil.across * turmoil.down):
+        if turmoil.place[k] < 0 and turmoil.found[k] > 0:
+            found += turmoil.found[k]
+            share += turmoil.found[k] * turmoil.found[k] / (turmoil.found[k] + turmoil.lost[k])
+            found_now += turmoil.found_now[k]
+            lost_now += turmoil.lost_now[k]
+    return share > FOUND_ELSEWHERE * found and found_now > FOUND_NOW_SHARE * lost_now
+
+
+def see(turmoil: Turmoil, around: Situation, settings: Settings) -> bool:
+    """Where turmoil is, and for how long; nowhere if all the picture is lost. False: there is none."""
+    is_any = False
+    for k in range(turmoil.across * turmoil.down):
+        turmoil.place[k] = -1
+    for k in range(turmoil.across * turmoil.down):
+        turmoil.unruly[k] = is_unruly(turmoil, k, around, settings)
+        if turmoil.unruly[k]:
+            mark(turmoil, k)
+            is_any = True
+    is_any = is_any and is_found_elsewhere(turmoil)
+    for k in range(turmoil.across * turmoil.down):
+        turmoil.lasts_s[k] = turmoil.lasts_s[k] + around.dt_s if is_any and turmoil.place[k] >= 0 else 0.0
+    return is_any
+
+
+def join_cells(turmoil: Turmoil) -> None:
+    """Cells that touch are of one place, which has the lowest of their numbers."""
+    for k in range(turmoil.across * turmoil.down):
+        if turmoil.place[k] >= 0:
+            turmoil.place[k] = k
+    changed = True
+    while changed:
+        changed = False
+        for k in range(turmoil.across * turmoil.down):
+            if turmoil.place[k] < 0:
+                continue
+            column, row = k % turmoil.across, k // turmoil.across
+            for y in range(max(row - 1, 0), min(row + 2, turmoil.down)):
+                for x in range(max(column - 1, 0), min(column + 2, turmoil.across)):
+                    other = turmoil.place[y * turmoil.across + x]
+                    if 0 <= other < turmoil.place[k]:
+                        turmoil.place[k] = other
+                        changed = True
+
+
+def gather(turmoil: Turmoil) -> None:
+    """What a circle takes from the cells of each place; edges lie anywhere in their cell."""
+    spread = turmoil.side_px * turmoil.side_px / 12
+    cells = turmoil.across * turmoil.down
+    for g in range(cells):
+        shared.clear(turmoil.members, g)
+        turmoil.weight[g] = turmoil.longest_s[g] = 0.0
+        turmoil.size[g] = 0
+    for k in range(cells):
+        g = turmoil.place[k]
+        if g >= 0:
+            weight = turmoil.found[k] + turmoil.lost[k]
+            turmoil.weight[g] += weight
+            turmoil.size[g] += turmoil.unruly[k]
+            turmoil.longest_s[g] = max(turmoil.longest_s[g], turmoil.lasts_s[k])
+            turmoil.members.size[g] += rounding.whole(turmoil.found_now[k] + turmoil.lost_now[k])
+            turmoil.members.x[g] += weight * middle_x(turmoil, k)
+            turmoil.members.y[g] += weight * middle_y(turmoil, k)
+    for g in range(cells):
+        if turmoil.place[g] == g:
+            turmoil.members.x[g] /= turmoil.weight[g]
+            turmoil.members.y[g] /= turmoil.weight[g]
+            turmoil.members.variance_x[g] = turmoil.members.variance_y[g] = spread
+    for k in range(cells):
+        g = turmoil.place[k]
+        if g >= 0:
+            share = (turmoil.found[k] + turmoil.lost[k]) / turmoil.weight[g]
+            dx, dy = middle_x(turmoil, k) - turmoil.members.x[g], middle_y(turmoil, k) - turmoil.members.y[g]
+            turmoil.members.variance_x[g] += share * dx * dx
+            turmoil.members.variance_y[g] += share * dy * dy
+
+
+def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settings) -> int:
+    """The circle that shows the same as a place, the nearest; -1: none."""
+    nearest, least = -1, 0.0
+    reach = shared.radius_of(turmoil.members, g, settings.bs_px) + settings.member_margin_px
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            away = flow.length(circles.x[c] - turmoil.members.x[g], circles.y[c] - turmoil.members.y[g]) - max(
+                circles.radius[c], reach
+            )
+            if away < least:
+                nearest, least = c, away
+    return nearest
+
+
+def tell(circles: CircleColumns, c: int, around: Situation) -> None:
+    """Nothing is known of how a circle in turmoil moves; it is no nearer than the ground under it is seen."""
+    circles.cause[c] = NONE
+    circles.beta[c] = circles.speed[c] = 0.0
+    circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
+
+
+def update(
+    turmoil: Turmoil,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    updated: Bytes,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """Circles of places in turmoil; return evictions.
+
+    ``updated``: which circles others have updated, to which a place is left; those of turmoil are marked too.
+    """
+    evicted = 0
+    if not see(turmoil, around, settings):
+        return evicted
+    join_cells(turmoil)
+    gather(turmoil)
+    for g in range(turmoil.across * turmoil.down):
+        if turmoil.place[g] != g or turmoil.size[g] < MIN_CELLS or turmoil.longest_s[g] < MIN_S:
+            continue
+        c = circle_of(turmoil, g, circles, settings)
+        if c < 0:
+            c = shared.free_row(circles)
+            if c < 0:
+                evicted += 1
+                c = shared.make_room(edges, circles, True, settings)
+            if c < 0:
+                continue
+            shared.give_birth(circles, c, turmoil.members, g, settings, ids)
+        elif updated[c]:
+            continue
+        elif circles.cause[c] == NONE:
+            shared.blend(circles, c, turmoil.members, g, settings)
+            circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+        updated[c] = 1
+        if circles.cause[c] == NONE:
+            tell(circles, c, around)
+    return evicted

@@ -1,0 +1,185 @@
+"""Turmoil: what tumbles keeps no corner; where none is found again, though it should be, the flow is broken."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Camera, Config, Memory
+from lcf_edge.filter import Corners, LineCircleFilter
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
+from lcf_edge.messages import Cause, ObjectClass, ObjectState
+
+Drive = Callable[..., Any]
+Landmarks = Callable[..., npt.NDArray[np.float64]]
+
+CAMERA_M = 0.5
+CONFIG = Config(camera=Camera(height_m=CAMERA_M))
+AHEAD, ASIDE = (320.0, 260.0), (90.0, 260.0)  # px of a picture of 640 x 480; O is in its middle
+HALF_PX = 60.0
+CORNERS = 60  # of what is in turmoil
+
+
+@dataclass(frozen=True)
+class Storm:
+    """A drive among landmarks, with corners about ``place`` that are other ones in each frame; iterating gives a step.
+
+    ``half_px``: half its side. ``from_seq``, ``until_seq``: only from there on, and no more then.
+    ``all_of_it``: of the landmarks none is found again either, as in a picture that shakes.
+    """
+
+    drive: Any
+    place: tuple[float, float] = AHEAD
+    half_px: float = HALF_PX
+    from_seq: int = 4
+    until_seq: int = 1000
+    all_of_it: bool = False
+
+    def __iter__(self) -> Iterator[tuple[Corners, Any]]:
+        random = np.random.default_rng(0)
+        for seq, (corners, motion) in enumerate(self.drive):
+            there = np.abs(corners.position - self.place).max(axis=1) < self.half_px
+            shown = Corners(corners.pixel[~there], corners.position[~there], corners.appearance[~there])
+            raging = self.from_seq <= seq < self.until_seq
+            if raging:
+                pixel = np.rint(self.place + random.uniform(-self.half_px, self.half_px - 1, (CORNERS, 2))).astype(
+                    np.int32
+                )
+                looks = random.integers(0, 256, (CORNERS, APPEARANCE_SAMPLES), np.uint8)
+                shown = _with(shown, Corners(pixel, pixel.astype(np.float32), looks))
+            if raging and self.all_of_it:
+                looks = random.integers(0, 256, shown.appearance.shape, np.uint8)
+                shown = Corners(shown.pixel, shown.position, looks)
+            yield shown, motion
+
+
+def _with(some: Corners, more: Corners) -> Corners:
+    return Corners(
+        np.concatenate([some.pixel, more.pixel]),
+        np.concatenate([some.position, more.position]),
+        np.concatenate([some.appearance, more.appearance]),
+    )
+
+
+def after(storm: Storm, config: Config = CONFIG) -> tuple[LineCircleFilter, int]:
+    """The filter after it, and the number of frames in which it reported a rebel circle without a cause."""
+    tables, told = LineCircleFilter(config, storm.drive.lens), 0
+    for corners, motion in storm:
+        tables.step(corners, motion)
+        told += len(reported(tables, config))
+    return tables, told
+
+
+def reported(tables: LineCircleFilter, config: Config = CONFIG) -> list[int]:
+    """Rows of rebel circles in turmoil."""
+    rebel = tables.rebel
+    trusted = rebel.active & (rebel.trust >= config.filter.tr_s) & (rebel.cause == Cause.NONE)
+    return np.flatnonzero(trusted).tolist()
+
+
+@pytest.fixture(scope="module")
+def calm(drive: Drive, clutter: Landmarks) -> Any:
+    """A rover at 2 m/s among what stands."""
+    return drive(clutter(400), sigma_rad=1e-4)
+
+
+def test_it_is_a_rebel_circle_of_which_no_motion_is_told(calm: Any) -> None:
+    tables, told = after(Storm(calm))
+    assert told > 10
+    (c,) = reported(tables)
+    rebel = tables.rebel
+    assert np.hypot(rebel.x[c] - AHEAD[0], rebel.y[c] - AHEAD[1]) < HALF_PX / 2
+    assert HALF_PX < rebel.width[c] < 4 * HALF_PX
+    assert (rebel.speed[c], rebel.ttc[c]) == (0.0, np.inf)
+    assert np.isnan(rebel.lateral[c])
+
+
+def test_it_is_told_within_half_a_second_and_forgotten_after_it(calm: Any) -> None:
+    _, told = after(Storm(replace(calm, frames=4 + 10)))
+    assert told
+    tables, _ = after(Storm(replace(calm, frames=40), until_seq=20))
+    assert not reported(tables)
+
+
+def test_its_range_is_that_of_the_ground_under_it(calm: Any) -> None:
+    tables, _ = after(Storm(calm))
+    (c,) = reported(tables)
+    rebel = tables.rebel
+    foot_px = rebel.y[c] + rebel.height[c] / 2 - tables.focus[1]
+    assert rebel.range[c] == pytest.approx(CAMERA_M * calm.lens.fy / foot_px)
+    tables, _ = after(Storm(calm), Config(camera=Camera(height_m=0.0)))
+    (c,) = reported(tables)
+    assert np.isnan(tables.rebel.range[c])
+
+
+def test_it_is_an_object_of_which_hardly_more_than_its_place_is_known(calm: Any) -> None:
+    tables, _ = after(Storm(calm))
+    objects = tables.objects
+    (o,) = np.flatnonzero(objects.active & (objects.trust >= CONFIG.filter.tr_s))
+    assert np.hypot(objects.x[o] - AHEAD[0], objects.y[o] - AHEAD[1]) < HALF_PX / 2
+    assert objects.state[o] == ObjectState.SEEN
+    assert objects.class_id[o] in {ObjectClass.UNKNOWN, ObjectClass.STANDING}
+    assert objects.range_sigma[o] > 0.1 * objects.range[o]
+
+
+def test_corners_inside_it_expect_no_motion_of_it(calm: Any) -> None:
+    """Else the next ones would not be looked for where they are, and it would never end."""
+    tables, _ = after(Storm(replace(calm, frames=20)))
+    edges = tables.edges
+    n = edges.count
+    inside = (np.abs(edges.x[:n] - AHEAD[0]) < HALF_PX) & (np.abs(edges.y[:n] - AHEAD[1]) < HALF_PX)
+    assert inside.any()
+    assert not edges.suspect_keys[:n][inside].any()
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param({"until_seq": 4}, id="without it"),
+        pytest.param({"until_seq": 5}, id="one bad picture"),
+        pytest.param({"all_of_it": True}, id="all the picture is lost"),
+        pytest.param({"place": (620.0, 20.0), "half_px": 20.0}, id="at the picture's border"),
+    ],
+)
+def test_other_reasons_to_lose_corners_are_none(calm: Any, changes: dict[str, Any]) -> None:
+    assert after(replace(Storm(calm), **changes))[1] == 0
+
+
+def test_beside_a_fast_vehicle_what_stands_is_lost_too_and_beside_one_that_rests_it_is_not(calm: Any) -> None:
+    fast = replace(calm, speed_mps=4.0, fps=8.0)
+    assert after(Storm(fast, place=ASIDE))[1] == 0
+    resting = replace(calm, speed_mps=0.0, fps=8.0)
+    assert after(Storm(resting, place=ASIDE))[1] > 0
+
+
+def test_in_a_quick_turn_it_is_not_looked_for(calm: Any) -> None:
+    assert after(Storm(replace(calm, speed_mps=1.0, yaw_rate_radps=1.0)))[1] == 0
+
+
+def test_where_rebels_tell_more_it_is_left_to_them(drive: Drive, clutter: Landmarks, box: Landmarks) -> None:
+    """Somebody crosses, whose clothes flutter."""
+    walker = drive(box((-0.6, 0.0, 4.0), (0.5, 0.8, 0.2), 30, seed=3), np.array([1.0, 0.0, 0.0]))
+    tables = LineCircleFilter(CONFIG, walker.lens)
+    causes = set()
+    random = np.random.default_rng(0)
+    for seq, (corners, motion) in enumerate(drive(clutter(300)) + walker):
+        middle = np.nanmean(walker.in_image(seq), axis=0)
+        pixel = np.rint(middle + random.uniform(-30, 30, (40, 2))).astype(np.int32)
+        looks = random.integers(0, 256, (40, APPEARANCE_SAMPLES), np.uint8)
+        tables.step(_with(corners, Corners(pixel, pixel.astype(np.float32), looks)), motion)
+        rebel = tables.rebel
+        causes |= set(rebel.cause[rebel.active & (rebel.trust >= CONFIG.filter.tr_s)].tolist())
+    assert causes in ({Cause.CROSSING}, {Cause.CROSSING, Cause.INCOMING})
+
+
+def test_a_full_table_counts_it(calm: Any) -> None:
+    config = Config(camera=Camera(height_m=CAMERA_M), memory=Memory(circles_rebel=1))
+    tables = LineCircleFilter(config, calm.lens)
+    evicted = 0
+    both = zip(Storm(calm), Storm(calm, place=(200.0, 200.0)), strict=True)
+    for (corners, motion), (more, _) in both:
+        evicted += tables.step(_with(corners, more), motion).sizes.evicted
+    assert evicted > 0
