@@ -9,7 +9,7 @@ import gc
 import signal
 import socket
 from collections import Counter
-from contextlib import closing, suppress
+from contextlib import suppress
 from typing import Any
 
 from lcf_edge.daemon.log import LOGGER
@@ -111,7 +111,7 @@ class Gate:
             return
         finally:
             self._strangers.pop(task, None)
-        with closing(outer[1]):
+        try:
             name = common_name(outer[1].get_extra_info("ssl_object"))
             refusal = self._refusal(name)
             if refusal:
@@ -119,6 +119,8 @@ class Gate:
                 return
             self._parties[task] = name
             await self._through(outer, name)
+        finally:
+            outer[1].transport.abort()  # closing would wait 30 s for a farewell, and hold a descriptor meanwhile
 
     async def _handshake(self, connection: socket.socket) -> Stream:
         loop = asyncio.get_running_loop()
@@ -153,15 +155,13 @@ class Gate:
             self.counts["daemon away"] += 1
             return
         self.counts[f"let in {name}"] += 1
-        with closing(inner[1]):
-            pumps = [asyncio.create_task(_pump(*way)) for way in ((outer[0], inner[1]), (inner[0], outer[1]))]
-            try:
-                await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
-            finally:
-                for pump in pumps:
-                    pump.cancel()
-                outer[1].transport.abort()
-                inner[1].transport.abort()
+        pumps = [asyncio.create_task(_pump(*way)) for way in ((outer[0], inner[1]), (inner[0], outer[1]))]
+        try:
+            await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for pump in pumps:
+                pump.cancel()
+            inner[1].transport.abort()
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

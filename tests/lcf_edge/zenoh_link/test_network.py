@@ -438,6 +438,22 @@ def test_a_party_may_have_so_many_connections_and_no_more(rover: zenoh.Session, 
         one.close()
 
 
+@pytest.mark.parametrize("who", ["unknown", "planner"])
+def test_who_is_refused_with_a_certificate_takes_no_descriptor(gate: Gate, folder: Path, who: str) -> None:
+    """Of no name that the gate knows, or while the daemon is away; none of them ever ends its connection."""
+    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context.load_cert_chain(folder / f"{who}.pem", folder / f"{who}.key")
+    held = []
+    for _ in range(30):
+        plain = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
+        held.append(context.wrap_socket(plain, server_hostname="localhost"))
+        with suppress(ConnectionError):
+            assert held[-1].recv(1) == b""
+    assert gate.descriptors < 12  # 7 without anybody
+    for one in held:
+        one.close()
+
+
 def test_a_gate_without_certificates_says_which_is_missing(tmp_path: Path) -> None:
     command = (sys.executable, "-m", "lcf_edge", "gate", "--tls", tmp_path)
     done = subprocess.run(command, check=False, capture_output=True, text=True)
