@@ -10,13 +10,13 @@ from typing import Any
 MAX_BYTES = 2**16
 DEEPEST = 4  # nested tables or lists, and parts of a dotted key
 
-# Strings and comments, whose dots and brackets do not count, by TOML 1.0: a string that does not end here is an error
-# for the parser too.
+# Strings and comments, whose dots and brackets do not count, by TOML 1.0. A string that does not end, which the parser
+# refuses too, goes as far as it can: nothing is searched twice, and the time stays proportional to the size.
 _TEXT = re.compile(
-    r'"""(?:\\.|[^\\])*?"""(?:"{0,2})'
-    r"|'''.*?'''(?:'{0,2})"
-    r'|"(?:\\[^\n]|[^"\\\n])*"'
-    r"|'[^'\n]*'"
+    r'"""(?:\\.|[^\\])*?(?:"{3,5}|\\?\Z)'
+    r"|'''.*?(?:'{3,5}|\Z)"
+    r'|"(?:\\[^\n]|[^"\\\n])*"?'
+    r"|'[^'\n]*'?"
     r"|#[^\n]*",
     re.DOTALL,
 )

@@ -1,6 +1,7 @@
 """Configuration: what is accepted, what is refused and how, and that it survives being written down."""
 
 import math
+import time
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
@@ -13,7 +14,21 @@ from hypothesis import strategies as st
 from msgspec import inspect
 
 from lcf_edge.cli.command_line import main
-from lcf_edge.config import PAPER, ROVER, Camera, Config, Filter, Imu, Memory, Table, Vehicle, Zenoh, load, to_toml
+from lcf_edge.config import (
+    PAPER,
+    ROVER,
+    Camera,
+    Config,
+    Filter,
+    Imu,
+    Memory,
+    Table,
+    Vehicle,
+    Zenoh,
+    bounded_toml,
+    load,
+    to_toml,
+)
 from lcf_edge.config import config as module
 from lcf_edge.errors import ConfigError
 
@@ -171,6 +186,15 @@ def test_what_a_file_may_hold_takes_little_memory(file: Callable[[str], Path], c
         assert tracemalloc.get_traced_memory()[1] < 24 * 2**20
     finally:
         tracemalloc.stop()
+
+
+@pytest.mark.parametrize("piece", ['"\\', '"""\\', '"\\\\', '\\"""', "'", "'''a", "a\t.", "0x"])
+def test_what_is_no_toml_is_refused_at_once(file: Callable[[str], Path], piece: str) -> None:
+    """A daemon that is busy with its configuration for 5 s counts as dead."""
+    path = file(piece * (bounded_toml.MAX_BYTES // len(piece)))
+    begin_s = time.process_time()
+    assert "not valid TOML" in refused(path)
+    assert time.process_time() - begin_s < 2
 
 
 def test_dots_and_brackets_in_texts_and_comments_count_for_nothing(file: Callable[[str], Path]) -> None:
