@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import msgspec
 
+from lcf_edge.config.endpoint import bare
 from lcf_edge.errors import LcfError
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.lines import scene_fields
@@ -46,7 +47,7 @@ def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) ->
     console = Console(highlight=False, markup=False, emoji=False)
     if isinstance(shown, DaemonAddress):
         watched: Monitor | Player = Monitor(shown)
-        place = shown.endpoint
+        place = bare(shown.endpoint)
         obey: Callable[[bytes], None] = _ignore
     else:
         from lcf_edge.monitor.terminal.player_keys import PlayerKeys

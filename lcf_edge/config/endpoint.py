@@ -7,9 +7,14 @@ _MAX_PORT = 65535
 _EXAMPLE = "write for example tcp/127.0.0.1:7447"
 
 
+def bare(endpoint: str) -> str:
+    """Return it without what follows ``#``, which may be a secret."""
+    return endpoint.partition("#")[0]
+
+
 def fault(endpoint: str) -> str:
-    """Return what is wrong, with the remedy; empty: nothing. What follows ``#`` may be a secret and is not shown."""
-    shown = endpoint.partition("#")[0]
+    """Return what is wrong, with the remedy, without secrets; empty: nothing."""
+    shown = bare(endpoint)
     protocol, slash, address = shown.partition("?")[0].partition("/")
     if not (protocol and slash and address):
         return f"{shown}: no endpoint, which is protocol/address; {_EXAMPLE}"

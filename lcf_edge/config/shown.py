@@ -1,20 +1,17 @@
-"""The configuration as it is shown to others: without what follows ``#`` in Zenoh endpoints, which may be secrets."""
+"""The configuration as it is shown to others: without the secrets that Zenoh's endpoints may carry."""
 
 import msgspec
 
 from lcf_edge.config import Config, to_toml
+from lcf_edge.config.endpoint import bare
 
 
 def shown(config: Config) -> str:
     """Return it as TOML."""
     zenoh = config.zenoh
-    bare = msgspec.structs.replace(
+    without = msgspec.structs.replace(
         zenoh,
-        connect=[_bare(endpoint) for endpoint in zenoh.connect],
-        listen=[_bare(endpoint) for endpoint in zenoh.listen],
+        connect=[bare(endpoint) for endpoint in zenoh.connect],
+        listen=[bare(endpoint) for endpoint in zenoh.listen],
     )
-    return to_toml(msgspec.structs.replace(config, zenoh=bare))
-
-
-def _bare(endpoint: str) -> str:
-    return endpoint.partition("#")[0]
+    return to_toml(msgspec.structs.replace(config, zenoh=without))

@@ -9,6 +9,7 @@ import zenoh
 from lcf_edge import config
 from lcf_edge.cdr import CdrError, decode_diagnostics
 from lcf_edge.config import Config
+from lcf_edge.config.endpoint import bare
 from lcf_edge.diagnostics import DeviceStatus
 from lcf_edge.doctor.endpoints import is_open, reachable_here
 from lcf_edge.errors import LcfError
@@ -37,7 +38,7 @@ def ask(configured: Config) -> Daemon | None:
         configured.zenoh, mode="peer", connect=endpoints, listen=[_ANY_PORT], gossip=False
     )
     try:
-        return _ask_at(options, configured.publish.prefix, ", ".join(endpoints))
+        return _ask_at(options, configured.publish.prefix, ", ".join(map(bare, endpoints)))
     except (LcfError, zenoh.ZError):  # these certificates or this file do not work
         return None
 

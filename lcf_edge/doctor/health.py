@@ -3,6 +3,7 @@
 from collections.abc import Iterator
 from pathlib import Path
 
+from lcf_edge.config.endpoint import bare
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor.finding import Context, Finding, fail, ok, warn
 from lcf_edge.doctor.processes import Process, daemon_with, processes
@@ -31,9 +32,10 @@ def check(context: Context) -> Iterator[Finding]:
     elif daemon is not None:
         yield ok("daemon", f"answers at {daemon.endpoint}, has scenes")
     elif running is not None:
+        places = ", ".join(map(bare, context.config.zenoh.listen))
         yield warn(
             "daemon",
-            f"{running} does not answer at {', '.join(context.config.zenoh.listen)}: another configuration than this?",
+            f"{running} does not answer at {places}: another configuration than this?",
             f"tr '\\0' ' ' < /proc/{running.pid}/cmdline",
         )
     else:

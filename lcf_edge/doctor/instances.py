@@ -6,6 +6,7 @@ from pathlib import Path
 
 from drivers.imu.registry import DRIVERS
 from lcf_edge.config import Config, load
+from lcf_edge.config.endpoint import bare
 from lcf_edge.doctor.finding import Context, Finding, edit, fail, ok
 from lcf_edge.doctor.service import properties_of, starts_at_boot, unit_of
 from lcf_edge.errors import ConfigError
@@ -40,7 +41,7 @@ def collisions(one: Config, other: Config) -> list[str]:
 
 def _own(config: Config) -> list[tuple[str, str]]:
     """Return keys and values that no other daemon on the computer may have."""
-    own = [("zenoh.listen", endpoint) for endpoint in config.zenoh.listen]
+    own = [("zenoh.listen", bare(endpoint)) for endpoint in config.zenoh.listen]
     own += [("publish.prefix", config.publish.prefix), ("publish.frame_id", config.publish.frame_id)]
     own.append(("publish.robot", config.publish.robot))
     if config.record.when != "never":

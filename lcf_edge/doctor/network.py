@@ -10,6 +10,7 @@ import msgspec
 import zenoh
 
 from lcf_edge.config import Zenoh
+from lcf_edge.config.endpoint import bare
 from lcf_edge.doctor.endpoints import is_open, parsed, reachable_here
 from lcf_edge.doctor.finding import Context, Finding, edit, fail, ok, warn
 from lcf_edge.doctor.processes import listening
@@ -84,11 +85,11 @@ def _wants_certificates(options: Zenoh) -> bool:
 
 
 def _with_the_files(options: Zenoh) -> Zenoh:
-    """Fill in endpoints that the configuration leaves to ``zenoh.config_file``."""
+    """Fill in endpoints that the configuration leaves to ``zenoh.config_file``; all without secrets."""
     settings = _settings(options)
     listen = options.listen or _endpoints(settings, "listen")
     connect = options.connect or _endpoints(settings, "connect")
-    return msgspec.structs.replace(options, listen=listen, connect=connect)
+    return msgspec.structs.replace(options, listen=[*map(bare, listen)], connect=[*map(bare, connect)])
 
 
 def _endpoints(settings: zenoh.Config, name: str) -> list[str]:
@@ -128,7 +129,8 @@ def _held(context: Context, endpoint: str) -> Finding:
 def _opens(options: Zenoh) -> Finding:
     try:
         with opened_session(options):
-            return ok("network", f"Zenoh opens as {options.mode}, listens on {', '.join(options.listen) or 'nothing'}")
+            places = ", ".join(map(bare, options.listen)) or "nothing"
+            return ok("network", f"Zenoh opens as {options.mode}, listens on {places}")
     except PublishError as error:
         file = options.config_file
         return fail("network", str(error), edit(Path(file)) if file and file in str(error) else "")

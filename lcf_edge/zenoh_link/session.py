@@ -13,7 +13,7 @@ from contextlib import contextmanager, suppress
 import zenoh
 
 from lcf_edge import config
-from lcf_edge.config.endpoint import fault
+from lcf_edge.config.endpoint import bare, fault
 from lcf_edge.errors import PublishError
 from lcf_edge.zenoh_link import admission
 
@@ -24,6 +24,9 @@ MAX_MESSAGE_BYTES = 2**20
 
 MAX_SESSIONS = 32
 """Largest number of sessions; each takes some 160 kB. Zenoh does not report whom it refuses."""
+
+_SECRET = re.compile(r"(\b[\w-]+/[^\s#]+)#\S*[^\s:]")
+"""What an endpoint carries, in Zenoh's messages."""
 
 _UNLESS_THE_FILE_SAYS = {
     "scouting/multicast/enabled": "false",
@@ -74,7 +77,11 @@ def opened_session(options: config.Zenoh) -> Iterator[zenoh.Session]:
 
 def reason(error: zenoh.ZError) -> str:
     """Return the innermost reason, without positions in Zenoh's source."""
-    text = re.sub(r"\s+at /\S+", "", str(error)).replace("\n", " ")
+    return _reason(str(error))
+
+
+def _reason(said: str) -> str:
+    text = re.sub(r"\s+at /\S+", "", said).replace("\n", " ")
     inner = re.search(r"\[([^\]]+ \(os error \d+\))", text)
     return (inner[1] if inner else text).strip(" .!]")
 
@@ -100,7 +107,7 @@ def _settings(options: config.Zenoh, admitted: Mapping[str, str]) -> zenoh.Confi
             try:
                 settings.insert_json5(key, json.dumps(endpoints))
             except zenoh.ZError as error:
-                shown = ", ".join(endpoint.partition("#")[0] for endpoint in endpoints)
+                shown = ", ".join(map(bare, endpoints))
                 raise PublishError(
                     f"zenoh.{name}: {shown}: what follows ? or # cannot be read; write key=value"
                 ) from error
@@ -116,11 +123,12 @@ def _insert(settings: zenoh.Config, key: str, value: str) -> None:
 
 
 def _remedy(error: zenoh.ZError, options: config.Zenoh) -> str:
-    """Return Zenoh's message as one line that says what to do."""
-    bound = re.search(r"bound to ([^\s,\]]+):", str(error))
-    endpoint = bound[1] if bound else ", ".join(options.listen + options.connect) or options.config_file
-    if "Address already in use" in str(error):
+    """Return Zenoh's message as one line that says what to do, without the secrets of endpoints."""
+    said = _SECRET.sub(r"\1", str(error))
+    bound = re.search(r"bound to ([^\s,\]]+):", said)
+    endpoint = bound[1] if bound else ", ".join(map(bare, options.listen + options.connect)) or options.config_file
+    if "Address already in use" in said:
         return f"{endpoint}: already in use; stop the other program or set zenoh.listen to another port"
-    if "Unable to connect" in str(error):
+    if "Unable to connect" in said:
         return f"{endpoint}: nobody answers; start the router first, or set zenoh.mode to peer, which waits for it"
-    return f"{endpoint}: {reason(error)}; check zenoh.listen and zenoh.connect"
+    return f"{endpoint}: {_reason(said)}; check zenoh.listen and zenoh.connect"

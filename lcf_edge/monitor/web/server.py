@@ -21,6 +21,7 @@ import msgspec
 from aiohttp import WSMsgType, web
 from aiohttp.http_exceptions import HttpProcessingError
 
+from lcf_edge.config.endpoint import bare
 from lcf_edge.daemon.log import NoFlood
 from lcf_edge.dates import utc
 from lcf_edge.errors import LcfError
@@ -115,7 +116,7 @@ class Server:
         self._wanting = asyncio.Lock()
         self._player: Player | None = None
         if isinstance(shown, DaemonAddress):
-            self._place, self._prefix = shown.endpoint, shown.prefix
+            self._place, self._prefix = bare(shown.endpoint), shown.prefix
             self._monitor: Monitor | Player = Monitor(shown, history=self._history, changed=self._changed)
         else:
             self._place, self._prefix = str(shown.path), ""

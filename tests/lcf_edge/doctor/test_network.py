@@ -198,6 +198,16 @@ def test_keys_that_others_can_read_are_reported(tmp_path: Path) -> None:
     assert of_file.text == f"{file}: mode 666, others can write it"
 
 
+@pytest.mark.parametrize("taken", [True, False])
+def test_what_an_endpoint_carries_is_not_reported(machine: Machine, endpoint: str, taken: bool) -> None:
+    secret = f"{endpoint}#listen_private_key_base64=SECRET"
+    options = Zenoh(listen=[secret], connect=[f"{endpoint}#connect_private_key_base64=SECRET"])
+    with socket.create_server(("127.0.0.1", int(endpoint.rpartition(":")[2]) if taken else 0)):
+        found = list(network.check(machine(Config(zenoh=options))))
+    assert sum(endpoint in one.text for one in found) == 2
+    assert not any("SECRET" in f"{one.text} {one.remedy}" for one in found)
+
+
 def test_the_ports_of_the_file_are_looked_at_too(machine: Machine, endpoint: str, tmp_path: Path) -> None:
     file = tmp_path / "zenoh.json5"
     file.write_text(f'{{listen: {{endpoints: ["{endpoint.replace("127.0.0.1", "0.0.0.0")}"]}}}}')

@@ -35,6 +35,21 @@ def test_a_session_that_cannot_be_opened_is_one_line(options: Zenoh, text: str) 
     assert "cargo" not in str(caught.value)
 
 
+@pytest.mark.parametrize(
+    "options",
+    [
+        Zenoh(listen=["tls/127.0.0.1:0#listen_private_key_base64=SECRET;listen_certificate_base64=SECRET"]),
+        Zenoh(listen=["tcp/127.0.0.1:0#iface=SECRET"]),
+        Zenoh(mode="client", connect=["tls/127.0.0.1:9#connect_private_key_base64=SECRET"], listen=[]),
+    ],
+)
+def test_what_an_endpoint_carries_is_not_reported(options: Zenoh) -> None:
+    with pytest.raises(PublishError) as caught:
+        open_session(options)
+    assert "SECRET" not in str(caught.value)
+    assert str(caught.value).startswith(tuple(one.partition("#")[0] for one in options.listen + options.connect))
+
+
 def listening_addresses(options: Zenoh) -> tuple[set[str], set[str]]:
     """Local addresses of the TCP listeners and of the UDP sockets of a process that opens such a session."""
     code = (
