@@ -71,7 +71,7 @@ def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
         yield running
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def subscriber(machine: Machine) -> Iterator[Subscriber]:
     """On the host, over the virtual network."""
     connected = Subscriber(machine.endpoint)
@@ -79,7 +79,7 @@ def subscriber(machine: Machine) -> Iterator[Subscriber]:
     connected.close()
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def daemon(machine: Machine, subscriber: Subscriber) -> Daemon:
     """The installed service."""
     return Daemon(machine, subscriber)

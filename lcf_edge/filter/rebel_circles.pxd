@@ -49,7 +49,6 @@ cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE
 cdef double MAX_TURN_RAD
-cdef int NONE
 cdef int CROSSING
 cdef int INCOMING
 cdef int LEADING

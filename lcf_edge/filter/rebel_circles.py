@@ -54,7 +54,7 @@ COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by cor
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
 MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
-NONE, CROSSING, INCOMING, LEADING = int(Cause.NONE), int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
+CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -164,7 +164,7 @@ def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) ->
     nearest = -1
     least = 0.0
     for c in range(circles.capacity):
-        if circles.active[c] and circles.trust[c] >= settings.tr_s and circles.cause[c] != NONE:
+        if circles.active[c] and circles.trust[c] >= settings.tr_s and not turmoil.is_shown_by(circles, c):
             away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - settings.member_margin_px
             if away < least:
                 nearest, least = c, away
@@ -509,7 +509,7 @@ def is_aligned(
 
     Of turmoil it is not known how it goes on.
     """
-    if circles.cause[c] == NONE:
+    if turmoil.is_shown_by(circles, c):
         return True
     beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), flow.length(groups.mean_vx[g], groups.mean_vy[g])
     still = STILL_PX / groups.mean_s[g]

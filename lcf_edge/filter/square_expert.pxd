@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, path, range_belief
+from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, path, range_belief, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
@@ -75,7 +75,6 @@ cdef int CROSSING
 cdef int ONCOMING
 cdef int LEADING
 cdef int CUTTING_IN
-cdef int UNKNOWN_CAUSE
 cdef int CROSSES
 cdef int COMES
 cdef int LEADS
@@ -107,7 +106,6 @@ cdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, Situation around) noexcept nogil
 cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cdef bint is_turmoil(CircleColumns circles, Py_ssize_t c) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int object_in_turmoil(ObjectColumns objects, CircleColumns circles, Py_ssize_t c) noexcept nogil
 @cython.locals(least=double)

@@ -7,7 +7,7 @@ what is left founds new ones. Objects keep their identity while they are hidden 
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, path, range_belief
+from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, path, range_belief, turmoil
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
@@ -80,12 +80,7 @@ MAX_RANGE_M = 1000.0  # farther off nothing is known
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
-UNKNOWN_CAUSE, CROSSES, COMES, LEADS = (
-    int(Cause.NONE),
-    int(Cause.CROSSING),
-    int(Cause.INCOMING),
-    int(Cause.LEADING),
-)
+CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -283,11 +278,6 @@ def keep_members(
             circles.square[c] = -1
 
 
-def is_turmoil(circles: CircleColumns, c: int) -> bool:
-    """Whether a circle shows where something is, and not how it moves."""
-    return circles.active[c] != 0 and circles.cause[c] == UNKNOWN_CAUSE
-
-
 def object_in_turmoil(objects: ObjectColumns, circles: CircleColumns, c: int) -> int:
     """The object that is where a circle in turmoil is, the nearest; -1: none."""
     nearest = -1
@@ -399,7 +389,7 @@ def gather(
     """Circles without an object join one, or found a new one; return how many found no place."""
     evicted = 0
     for c in range(circles.capacity):
-        in_turmoil = is_turmoil(circles, c)
+        in_turmoil = turmoil.is_shown_by(circles, c)
         if not circles.active[c] or circles.square[c] >= 0:
             continue
         if squares.parts.count[c] < MIN_EDGES and not in_turmoil:
@@ -757,7 +747,7 @@ def go_on_in_turmoil(
 ) -> bool:
     """An object of which a circle in turmoil tells that it is still there, and no edge more; False: none does."""
     for c in range(circles.capacity):
-        if is_turmoil(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
+        if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
             objects.unseen_s[o], objects.state[o], objects.support[o] = 0.0, SEEN, circles.support[c]
             objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
             half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
@@ -943,7 +933,7 @@ def tell_circles(objects: ObjectColumns, circles: CircleColumns, settings: Setti
     """
     for c in range(circles.capacity):
         o = circles.square[c]
-        if o < 0 or not circles.active[c] or is_turmoil(circles, c):
+        if o < 0 or not circles.active[c] or turmoil.is_shown_by(circles, c):
             continue
         if objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
             continue

@@ -51,6 +51,7 @@ cdef void join_cells(Turmoil turmoil) noexcept nogil
 cdef void gather(Turmoil turmoil) noexcept nogil
 @cython.locals(nearest=int, least=double)
 cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(evicted=int, c=int)
 cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

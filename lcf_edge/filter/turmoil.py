@@ -240,8 +240,13 @@ def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settin
     return nearest
 
 
+def is_shown_by(circles: CircleColumns, c: int) -> bool:
+    """Whether a circle shows where turmoil is, and not how it moves."""
+    return circles.active[c] != 0 and circles.cause[c] == NONE
+
+
 def tell(circles: CircleColumns, c: int, around: Situation) -> None:
-    """Nothing is known of how a circle in turmoil moves; it is no nearer than the ground under it is seen."""
+    """Nothing is known of how a circle in turmoil moves; it is no farther than the ground that is seen under it."""
     circles.cause[c] = NONE
     circles.beta[c] = circles.speed[c] = 0.0
     circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
@@ -279,10 +284,10 @@ def update(
             shared.give_birth(circles, c, turmoil.members, g, settings, ids)
         elif updated[c]:
             continue
-        elif circles.cause[c] == NONE:
+        elif is_shown_by(circles, c):
             shared.blend(circles, c, turmoil.members, g, settings)
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
         updated[c] = 1
-        if circles.cause[c] == NONE:
+        if is_shown_by(circles, c):
             tell(circles, c, around)
     return evicted

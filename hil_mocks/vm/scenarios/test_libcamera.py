@@ -40,20 +40,6 @@ def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
         yield running
 
 
-@pytest.fixture(scope="module")
-def subscriber(machine: Machine) -> Iterator[Subscriber]:
-    """On the host, over the virtual network."""
-    connected = Subscriber(machine.endpoint)
-    yield connected
-    connected.close()
-
-
-@pytest.fixture(scope="module")
-def daemon(machine: Machine, subscriber: Subscriber) -> Daemon:
-    """The installed service."""
-    return Daemon(machine, subscriber)
-
-
 def helper(machine: Machine) -> int:
     """The process of the service that runs libcamera."""
     found = machine.run(

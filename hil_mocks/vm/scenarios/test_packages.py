@@ -13,7 +13,7 @@ import pytest
 
 from hil_mocks.small_wheel import wheel_of
 from hil_mocks.vm.conftest import PROCESSORS, RESULTS, booted
-from hil_mocks.vm.daemon import CONFIGURATION, DEFAULT_SETTINGS, PATIENCE_S, STATE, UNIT, Daemon, Subscriber
+from hil_mocks.vm.daemon import CONFIGURATION, DEFAULT_SETTINGS, PATIENCE_S, STATE, UNIT, Daemon
 from hil_mocks.vm.image import DEBIAN_12, DEBIAN_13_WITH_LIBCAMERA, PROJECT, System
 from hil_mocks.vm.machine import Machine
 from release import bundle, deb, wheels
@@ -24,9 +24,6 @@ INSTALLS_S = 1200.0  # emulated
 LEFT = "find /etc /opt /usr/lib /usr/local /var/lib ! -path '/var/lib/dpkg/*' -name '*lcf-edge*'"
 APT = "DEBIAN_FRONTEND=noninteractive apt-get --yes --quiet"
 IS_COMPILED = "import sys; from lcf_edge.compilation import uncompiled; sys.exit(uncompiled() or 0)"
-ENDS_AT_ONCE = """def main():
-    print("lcf-edge {version}")
-"""
 
 pytestmark = pytest.mark.timeout(3600)
 
@@ -39,12 +36,12 @@ def releases(pytestconfig: pytest.Config, tmp_path_factory: pytest.TempPathFacto
     of_others.mkdir()
     bundle.fetch(machine, of_others)
     wheel = wheels.build(machine, wheels.source_package(folder), folder)
-    deb.pack(machine, wheel, of_others, folder, deb.PACKED).rename(folder / "lcf-edge.deb")
+    deb.pack(machine, wheel, of_others, folder).rename(folder / "lcf-edge.deb")
     lock = (PROJECT / bundle.LOCK).read_text(encoding="utf-8")
     for name, of_project, more in (
         ("first", wheel, ""),
         ("second", wheel, "# a later version\n"),
-        ("broken", wheel_of(folder, "9.9", ENDS_AT_ONCE), ""),
+        ("broken", wheel_of(folder, "9.9"), ""),
     ):
         with tempfile.TemporaryDirectory(dir=folder) as place:
             archive = bundle.pack(machine.name, of_project, of_others, lock + more, Path(place))
@@ -74,20 +71,6 @@ def _linked(one: str, other: str) -> None:
         Path(other).hardlink_to(one)
     except OSError:
         shutil.copy2(one, other)
-
-
-@pytest.fixture(scope="module")
-def subscriber(machine: Machine) -> Iterator[Subscriber]:
-    """On the host, over the virtual network."""
-    connected = Subscriber(machine.endpoint)
-    yield connected
-    connected.close()
-
-
-@pytest.fixture(scope="module")
-def daemon(machine: Machine, subscriber: Subscriber) -> Daemon:
-    """What a package brings."""
-    return Daemon(machine, subscriber)
 
 
 def enabled(daemon: Daemon) -> None:

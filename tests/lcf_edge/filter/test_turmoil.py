@@ -21,6 +21,7 @@ CONFIG = Config(camera=Camera(height_m=CAMERA_M))
 AHEAD, ASIDE = (320.0, 260.0), (90.0, 260.0)  # px of a picture of 640 x 480; O is in its middle
 HALF_PX = 60.0
 CORNERS = 60  # of what is in turmoil
+FLUTTERING = 250  # about somebody with few corners: hardly one of all is found again
 
 
 @dataclass(frozen=True)
@@ -161,18 +162,21 @@ def test_in_a_quick_turn_it_is_not_looked_for(calm: Any) -> None:
 
 def test_where_rebels_tell_more_it_is_left_to_them(drive: Drive, clutter: Landmarks, box: Landmarks) -> None:
     """Somebody crosses, whose clothes flutter."""
-    walker = drive(box((-0.6, 0.0, 4.0), (0.5, 0.8, 0.2), 30, seed=3), np.array([1.0, 0.0, 0.0]))
+    walker = drive(box((-0.6, 0.0, 4.0), (0.5, 0.8, 0.2), 10, seed=3), np.array([1.0, 0.0, 0.0]))
     tables = LineCircleFilter(CONFIG, walker.lens)
-    causes = set()
+    causes, raging = set(), 0
     random = np.random.default_rng(0)
     for seq, (corners, motion) in enumerate(drive(clutter(300)) + walker):
         middle = np.nanmean(walker.in_image(seq), axis=0)
-        pixel = np.rint(middle + random.uniform(-30, 30, (40, 2))).astype(np.int32)
-        looks = random.integers(0, 256, (40, APPEARANCE_SAMPLES), np.uint8)
+        pixel = np.rint(middle + random.uniform(-HALF_PX, HALF_PX, (FLUTTERING, 2))).astype(np.int32)
+        looks = random.integers(0, 256, (FLUTTERING, APPEARANCE_SAMPLES), np.uint8)
         tables.step(_with(corners, Corners(pixel, pixel.astype(np.float32), looks)), motion)
         rebel = tables.rebel
-        causes |= set(rebel.cause[rebel.active & (rebel.trust >= CONFIG.filter.tr_s)].tolist())
-    assert causes in ({Cause.CROSSING}, {Cause.CROSSING, Cause.INCOMING})
+        causes |= set(rebel.cause[rebel.active].tolist())
+        raging += int((np.asarray(tables._turmoil.place) >= 0).any())
+    assert raging > 5
+    assert Cause.CROSSING in causes
+    assert Cause.NONE not in causes
 
 
 def test_a_full_table_counts_it(calm: Any) -> None:
