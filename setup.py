@@ -56,8 +56,18 @@ FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a t
 SMALL = ["-Os"]
 LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
 LITTLE |= {"feedback", "ground_speed", "group_motion", "heading", "key_frames", "least_squares"}
-LITTLE |= {"line_expert", "normal_circles", "patch_circles", "patches", "path", "range_belief", "rebel_circles"}
-LITTLE |= {"rest", "sample_ring", "scene_records", "settings", "situation", "square_expert"}
+LITTLE |= {
+    "leaps",
+    "line_expert",
+    "normal_circles",
+    "patch_circles",
+    "patches",
+    "path",
+    "range_belief",
+    "rebel_circles",
+}
+LITTLE |= {"coarse_circles", "coarse_motion", "rest", "sample_ring", "scene_records", "settings", "situation"}
+LITTLE |= {"square_expert", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))

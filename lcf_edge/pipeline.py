@@ -30,11 +30,13 @@ from lcf_edge.filter.tables import Floats
 from lcf_edge.lens import Lens
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, Timing, View
 from lcf_edge.scene_records import Records
+from lcf_edge.small_image import SmallImage
 
 if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
     from lcf_edge.recording.read import Recording
 
 MIN_RANGE_M = 0.1
+NO_IMAGE = np.zeros((0, 0), np.uint8)
 
 Rows = np.ndarray[Any, np.dtype[np.void]]
 
@@ -47,6 +49,7 @@ class Look:
     """
 
     frame: Frame
+    small: npt.NDArray[np.uint8]  # its image in small
     corners: Corners
     cut: int  # corners that were left out because the budget was full
     notes: tuple[str, ...]
@@ -81,6 +84,7 @@ class Pipeline:
         self._scene: PipelineScene | None = None  # of the last new image
         self._speed_mps = math.nan  # of the last frame
         self._motion = EgoMotionEstimator(config.imu, config.vehicle)
+        self._small_image = SmallImage(lens.width, lens.height)
         self._image_rotation = ImageRotation(lens)
         self._stillness = Stillness(lens.width, lens.height)
         self._lost = False  # the last step had too few edges for its rotation
@@ -138,12 +142,13 @@ class Pipeline:
         started = time.perf_counter_ns()
         if self._repeats.is_repeat(frame.stamp_ns, frame.image):
             took_ns = time.perf_counter_ns() - started
-            return Look(frame, NO_CORNERS, 0, (), None, 0, took_ns, self._scene)
+            return Look(frame, NO_IMAGE, NO_CORNERS, 0, (), None, 0, took_ns, self._scene)
         corners, cut = self._detector.detect(frame.image, self._highest_row())
         detect_ns = time.perf_counter_ns() - started
         notes = self._quality.notes(frame.image, len(corners))
         still = self._stillness.look(frame.stamp_ns, corners.pixel)
-        return Look(frame, corners, cut, notes, still, detect_ns, time.perf_counter_ns() - started)
+        small = self._small_image.of(frame.image)
+        return Look(frame, small, corners, cut, notes, still, detect_ns, time.perf_counter_ns() - started)
 
     def follow(self, look: Look) -> PipelineScene:
         """The scene of the frame that was looked at, with the samples that have been added."""
@@ -151,9 +156,9 @@ class Pipeline:
             return _repeated(look.repeats, look)
         started = time.perf_counter_ns()
         frame, corners = look.frame, look.corners
-        ego = self._see_rotation(frame, self._motion.advance(frame.stamp_ns, look.still))
+        ego = self._see_rotation(look.small, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
-        step = self.filter.step(corners, ego.to_motion(), frame.image)
+        step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
         if step.residual is not None:
@@ -193,12 +198,12 @@ class Pipeline:
         farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, MIN_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
-    def _see_rotation(self, frame: Frame, ego: EgoMotion) -> EgoMotion:
+    def _see_rotation(self, small: npt.NDArray[np.uint8], ego: EgoMotion) -> EgoMotion:
         """Return the motion, with the image's rotation where the gyro does not know it well."""
         if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego
-        turn = self._image_rotation.turn(frame.image)
+        turn = self._image_rotation.turn(small)
         return ego if turn is None else self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
 
     def _expansion_hz(self) -> float:

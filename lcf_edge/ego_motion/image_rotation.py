@@ -6,19 +6,18 @@ match corners; no clock, no I/O.
 """
 
 from dataclasses import dataclass
-from math import hypot, log2, pi
-from typing import Any
+from math import hypot, pi
 
 import cv2
 import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.lens import Lens
+from lcf_edge.small_image import SmallImage
 
 Grey = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
 
-_AREA_PX = 4800  # of a small image, about
 _LEVEL_PX = 9  # over which brightness is levelled
 _MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a small image: a plain one shows no shift
 _MIN_RESPONSE = 0.3  # share of the correlation in its peak
@@ -43,22 +42,18 @@ class ImageRotation:
 
     def __init__(self, lens: Lens) -> None:
         self._before: npt.NDArray[np.float32] | None = None
-        self._halvings = max(0, round(log2(lens.width * lens.height / _AREA_PX) / 2))
-        side = 2**self._halvings
-        self._width, self._height = lens.width // side, lens.height // side
-        if min(self._width, self._height) < 2:
-            self._halvings, self._width, self._height = 0, lens.width, lens.height
-        self._window = np.outer(np.hanning(self._height), np.hanning(self._width)).astype(np.float32)
-        self._px_per_rad = _gain(lens) / 2**self._halvings
+        small = SmallImage(lens.width, lens.height)
+        self._window = np.outer(np.hanning(small.height), np.hanning(small.width)).astype(np.float32)
+        self._px_per_rad = _gain(lens) / small.side
         self.sigma_rad = _SIGMA_PX / float(self._px_per_rad.min())
 
     def forget(self) -> None:
         """The next image does not follow the last one."""
         self._before = None
 
-    def turn(self, image: Grey) -> Turn | None:
-        """Return the turn from the last image to this one, (height, width); None: they do not show it."""
-        before, self._before = self._before, self._small(image)
+    def turn(self, small: Grey) -> Turn | None:
+        """Return the turn from the last image to this one, in small; None: they do not show it."""
+        before, self._before = self._before, _levelled(small)
         if before is None or self._before is None:
             return None
         (right_px, down_px), response = cv2.phaseCorrelate(before, self._before, self._window)
@@ -71,15 +66,12 @@ class ImageRotation:
             np.array([sigma_px / pitch_gain, sigma_px / yaw_gain, _ROLL_SIGMA_RAD]),
         )
 
-    def _small(self, image: Grey) -> npt.NDArray[np.float32] | None:
-        """Return the image in small, without slow changes of brightness; None: it is plain."""
-        side = 2**self._halvings
-        small: npt.NDArray[Any] = image[: self._height * side, : self._width * side]
-        for _ in range(self._halvings):
-            small = cv2.resize(small, (small.shape[1] // 2, small.shape[0] // 2), interpolation=cv2.INTER_AREA)
-        level = small.astype(np.float32)
-        level -= cv2.blur(level, (_LEVEL_PX, _LEVEL_PX))
-        return level if cv2.norm(level) > _MIN_CONTRAST * level.size**0.5 else None
+
+def _levelled(small: Grey) -> npt.NDArray[np.float32] | None:
+    """Return a small image without slow changes of brightness; None: it is plain."""
+    level = small.astype(np.float32)
+    level -= cv2.blur(level, (_LEVEL_PX, _LEVEL_PX))
+    return level if cv2.norm(level) > _MIN_CONTRAST * level.size**0.5 else None
 
 
 def _gain(lens: Lens) -> Floats:

@@ -33,6 +33,8 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``group_motion``     how edges that go together move: mean velocity and rate of expansion
 ``patches``          pieces of the image near the path, followed for seconds
 ``patch_circles``    C_r from patches that grow
+``coarse_motion``    pieces of the picture in small that move by themselves
+``coarse_circles``   C_r from those that go together
 ``turmoil``          C_r where corners come and go and none can be followed
 ``range_belief``     what an object's motion says about its range and its motion over ground
 ``square_expert``    S: circles that belong to one thing are an object

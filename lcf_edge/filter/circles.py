@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import edge_equations
+from lcf_edge.filter import edge_equations, flow
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
@@ -83,6 +83,19 @@ def give_birth(circles: CircleColumns, c: int, members: Members, g: int, setting
     circles.ttc[c], circles.range[c], circles.lateral[c] = INFINITY, NAN, NAN
     circles.unseen_s[c] = 0.0
     circles.square[c] = -1
+
+
+def nearest_circle(members: Members, g: int, circles: CircleColumns, settings: Settings) -> int:
+    """The circle that shows the same as a group: it holds the group's middle, or the group its own; -1: none."""
+    nearest, least = -1, 0.0
+    reach = radius_of(members, g, settings.bs_px) + settings.member_margin_px
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            away = flow.length(circles.x[c] - members.x[g], circles.y[c] - members.y[g])
+            away -= max(circles.radius[c], reach)
+            if away < least:
+                nearest, least = c, away
+    return nearest
 
 
 def free_row(circles: CircleColumns) -> int:

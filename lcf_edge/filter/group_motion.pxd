@@ -1,12 +1,15 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter.baselines cimport Baselines
+from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.patches cimport Patches
 from lcf_edge.filter.rebel_detection cimport Verdicts
 from lcf_edge.filter.situation cimport Situation
 
 cdef double FAR_PX
+cdef double PIECE_NOISE
+cdef double PIECE_HALF
 cdef double MIN_SPREAD
 cdef double PARTS_SIGMAS
 cdef double PARTS_SHARE
@@ -28,6 +31,7 @@ cdef void add_motion(MotionSums sums, Py_ssize_t k, double weight, double x, dou
 cdef void add_edge(MotionSums sums, Py_ssize_t k, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(across=double, down=double, corner=int)
 cdef void add_patch(MotionSums sums, Py_ssize_t k, Patches patches, Py_ssize_t p, Situation around) noexcept nogil
+cdef void add_piece(MotionSums sums, Py_ssize_t k, CoarseMotion coarse, Py_ssize_t p, Situation around) noexcept nogil
 cdef void add(MotionSums sums, Py_ssize_t k, MotionSums part, Py_ssize_t c) noexcept nogil
 @cython.locals(weight=double, x=double, y=double, wide=double, tall=double, parting=double, growing=double, parting_hz=double, noise=double, share=double)
 cdef void fit_expansion(MotionSums sums, Py_ssize_t k) noexcept nogil

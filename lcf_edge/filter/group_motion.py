@@ -9,6 +9,7 @@ that part to the side, taken for one, expand in width alone: then their height t
 import math
 
 from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.patches import Patches
@@ -16,6 +17,8 @@ from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.situation import Situation
 
 FAR_PX = 1e9
+PIECE_NOISE = 0.35  # 1 sigma of the place of a piece, small px
+PIECE_HALF = 2.0  # and what it shows reaches so far from its middle, small px
 MIN_SPREAD = 1e-9
 PARTS_SIGMAS = 5.0  # of both, by which the expansions in width and in height differ where there is more than one thing,
 PARTS_SHARE = 0.3  # and by this share of the larger
@@ -117,6 +120,22 @@ def add_patch(sums: MotionSums, k: int, patches: Patches, p: int, around: Situat
     sums.elapsed[k] += 4 * weight * elapsed_s
     sums.left[k], sums.right[k] = min(sums.left[k], patches.x[p] - now), max(sums.right[k], patches.x[p] + now)
     sums.top[k], sums.bottom[k] = min(sums.top[k], patches.y[p] - now), max(sums.bottom[k], patches.y[p] + now)
+
+
+def add_piece(sums: MotionSums, k: int, coarse: CoarseMotion, p: int, around: Situation) -> None:
+    """Take a piece of the picture in small, as two edges in its middle."""
+    elapsed_s, noise_px, half = coarse.elapsed_s[p], PIECE_NOISE * coarse.side, PIECE_HALF * coarse.side
+    weight = elapsed_s * elapsed_s / (2 * noise_px * noise_px)
+    vx, vy = coarse.vx[p], coarse.vy[p]
+    x, y = coarse.x[p] - 0.5 * elapsed_s * vx, coarse.y[p] - 0.5 * elapsed_s * vy
+    sums.count[k] += 2
+    add_motion(sums, k, weight, x, y, vx, vy)
+    sums.focus_x[k] += weight * around.focus_x
+    sums.focus_y[k] += weight * around.focus_y
+    sums.forward[k] += weight * (around.speed_mps if math.isfinite(around.speed_mps) else 0.0)
+    sums.elapsed[k] += weight * elapsed_s
+    sums.left[k], sums.right[k] = min(sums.left[k], coarse.x[p] - half), max(sums.right[k], coarse.x[p] + half)
+    sums.top[k], sums.bottom[k] = min(sums.top[k], coarse.y[p] - half), max(sums.bottom[k], coarse.y[p] + half)
 
 
 def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:

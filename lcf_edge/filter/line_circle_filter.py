@@ -9,6 +9,7 @@ import numpy.typing as npt
 from lcf_edge.config import Config
 from lcf_edge.filter import (
     alpha,
+    coarse_motion,
     derotation,
     edge_expert,
     feedback,
@@ -30,6 +31,8 @@ from lcf_edge.filter import baselines as lines
 from lcf_edge.filter import heading as headings
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.coarse_circles import CoarseGroups
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
@@ -37,7 +40,7 @@ from lcf_edge.filter.flow_fit import FlowFit
 from lcf_edge.filter.ground_speed import GroundSpeed
 from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.image_plane import ImagePlane
-from lcf_edge.filter.inputs import Corners, Motion
+from lcf_edge.filter.inputs import KEYS, Corners, Motion
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.leaps import Leaps
 from lcf_edge.filter.matching import CornerIndex
@@ -55,6 +58,7 @@ from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTab
 from lcf_edge.filter.turmoil import Turmoil
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Sizes
+from lcf_edge.small_image import SmallImage
 
 Matrix = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
@@ -135,6 +139,8 @@ class LineCircleFilter:
         self.ground = GroundSpeed()
         self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
         self._homography = Homography()
+        self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
+        self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
         self._off_line = OffLine()
         self._speed_mps = math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
@@ -165,6 +171,7 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
+            "coarse motion": (KEYS + 3) * self._coarse.width * self._coarse.height,  # its pictures
         }
 
     @property
@@ -183,13 +190,16 @@ class LineCircleFilter:
         """Whether the image says that the vehicle stands, although a speed is measured."""
         return bool(self._rest.stands)
 
-    def step(self, corners: Corners, motion: Motion, image: Grey | None = None) -> Step:
+    def step(self, corners: Corners, motion: Motion, image: Grey | None = None, small: Grey | None = None) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive.
 
         ``image``: uint8 (height, width), which the corners are of; without one no patches are followed.
+        ``small``: the same as ``small_image`` makes it; without one no coarse motion is seen.
         """
         motion = self._rested(motion)
         self._take(corners)
+        if small is not None:
+            coarse_motion.take(self._coarse, memory_of(small.reshape(-1)))
         self._derotate(motion)
         self._predict()
         omitted = self._omit()
@@ -267,6 +277,7 @@ class LineCircleFilter:
     def _warp(self, rotation: Doubles) -> None:
         """H = K·R·K⁻¹ on every stored image position."""
         flow.set_homography(self._homography, self._pinhole, rotation, 0)
+        coarse_motion.turn(self._coarse, rotation)
         roll = math.atan2(rotation[0, 1, 0], rotation[0, 0, 0])
         derotation.derotate_edges(self.edges.columns, self._homography, roll)
         derotation.derotate_circles(self.normal.columns, self._homography, roll)
@@ -373,8 +384,10 @@ class LineCircleFilter:
         key = bool(alpha.key_is_due(edges, keys, around.dt_s, settings))
         if key:
             alpha.mark_key(edges, keys)
+            coarse_motion.keep(self._coarse, (keys.number - 1) % KEYS)
         lines.measure(baselines, keys, self._homography, self._pinhole, around)
         self._fit_flow()
+        coarse_motion.measure(self._coarse, keys, baselines, self._plane, around)
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
         around.ground_mps = self.ground.speed_mps
@@ -432,6 +445,8 @@ class LineCircleFilter:
             self.patches,
             self._patch_groups,
             self._turmoil,
+            self._coarse,
+            self._coarse_groups,
             self._baselines,
             around,
             settings,
@@ -444,6 +459,8 @@ class LineCircleFilter:
             self._verdicts,
             edges,
             self.patches,
+            self._coarse,
+            self._coarse_groups,
             self._baselines,
             self._plane,
             around,

@@ -1,9 +1,11 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
+from lcf_edge.filter cimport coarse_circles, edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
+from lcf_edge.filter.coarse_circles cimport CoarseGroups
+from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.patch_circles cimport PatchGroups
@@ -66,7 +68,7 @@ cdef class RebelGroups:
     cdef readonly double[::1] then_x, then_y, spread
     cdef double[::1] rate_below, r2_below2, spreading
     cdef readonly double[::1] expansion
-    cdef double[::1] weight, weighed_rate
+    cdef double[::1] weight, weighed_rate, left, right, top, bottom
     cdef readonly int[::1] standing, inwards, flowing, circle
     cdef int[::1] best_circle, best_group
     cdef int[:, ::1] votes
@@ -93,7 +95,7 @@ cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
 cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint ground_would_flow(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
-@cython.locals(few=bint, stands=bint)
+@cython.locals(few=bint, stands=bint, inside=bint)
 cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 @cython.locals(inside=bint)
 cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil
@@ -115,4 +117,4 @@ cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint 
 cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
 @cython.locals(near=bint, waits=bint)
 cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Turmoil disorder, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Turmoil disorder, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

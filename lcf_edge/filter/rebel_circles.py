@@ -3,9 +3,11 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
+from lcf_edge.filter import coarse_circles, edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.coarse_circles import CoarseGroups
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Integers, doubles, integers, octets
@@ -86,6 +88,7 @@ class RebelGroups:
         self.rate_below, self.r2_below2 = (doubles(rebels) for _ in range(2))
         self.then_x, self.then_y, self.spread, self.spreading = (doubles(rebels) for _ in range(4))
         self.expansion, self.weight, self.weighed_rate = (doubles(rebels) for _ in range(3))
+        self.left, self.right, self.top, self.bottom = (doubles(rebels) for _ in range(4))
         self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
         self.odd = octets(rebels)
         self.votes = integers(rebels, circles)
@@ -284,6 +287,8 @@ def clear_group(groups: RebelGroups, g: int) -> None:
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
     groups.rate_below[g] = groups.r2_below2[g] = 0.0
     groups.then_x[g] = groups.then_y[g] = groups.spread[g] = groups.spreading[g] = 0.0
+    groups.left[g] = groups.top[g] = INFINITY
+    groups.right[g] = groups.bottom[g] = -INFINITY
     groups.flowing[g] = groups.standing[g] = groups.inwards[g] = 0
 
 
@@ -324,6 +329,8 @@ def average(
         groups.r2_below2[g] += share * r2 * below * below
         groups.below2[g] += share * below * below
         groups.below_vy[g] += share * below * groups.vy[k]
+        groups.left[g], groups.right[g] = min(groups.left[g], edges.x[i]), max(groups.right[g], edges.x[i])
+        groups.top[g], groups.bottom[g] = min(groups.top[g], edges.y[i]), max(groups.bottom[g], edges.y[i])
         if verdicts.incoming[j]:
             groups.standing[g] += 1
         if verdicts.mover[j] and verdicts.short[j] > math.fabs(verdicts.drift[j]):
@@ -423,11 +430,13 @@ def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
     """A few odd ones among edges that follow the flow are no object; nor is what is flat, shifted, or an own part."""
     for g in range(groups.groups):
-        radius = shared.radius_of(members, g, settings.bs_px)
+        margin = settings.member_margin_px
+        left, right = groups.left[g] - margin, groups.right[g] + margin
+        top, bottom = groups.top[g] - margin, groups.bottom[g] + margin
         own_parts = 0
         for i in range(edges.count):
-            dx, dy = edges.x[i] - members.x[g], edges.y[i] - members.y[g]
-            if not edges.matched[i] or dx * dx + dy * dy >= radius * radius:
+            inside = left < edges.x[i] < right and top < edges.y[i] < bottom
+            if not edges.matched[i] or not inside:
                 continue
             if edges.fixed_s[i] >= LIKELY_OWN_S and ground_would_flow(edges, i, around):
                 own_parts += 1
@@ -689,14 +698,16 @@ def update(
     patches: Patches,
     patch_groups: PatchGroups,
     disorder: Turmoil,
+    coarse: CoarseMotion,
+    coarse_groups: CoarseGroups,
     baselines: Baselines,
     around: Situation,
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), patches, and turmoil.
+    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), and from what is no edge.
 
-    Return evictions.
+    That is patches, coarse motion and turmoil. Return evictions.
 
     The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
     """
@@ -723,6 +734,7 @@ def update(
         if groups.group[k] >= 0:
             edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
     evicted += patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
+    evicted += coarse_circles.update(coarse_groups, coarse, edges, circles, groups.updated, around, settings, ids)
     evicted += turmoil.update(disorder, edges, circles, groups.updated, around, settings, ids)
     lose_trust(groups, circles, around, settings)
     shared.release(edges, circles, True)

@@ -4,6 +4,8 @@ from lcf_edge.filter cimport circles as shared
 from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, path, range_belief, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
+from lcf_edge.filter.coarse_circles cimport CoarseGroups
+from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.flow cimport Homography
 from lcf_edge.filter.group_motion cimport MotionSums
@@ -104,7 +106,7 @@ cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
-cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, Situation around) noexcept nogil
+cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
 cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int object_in_turmoil(ObjectColumns objects, CircleColumns circles, Py_ssize_t c) noexcept nogil
@@ -161,4 +163,4 @@ cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Si
 cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(o=Py_ssize_t)
 cdef void tell_circles(ObjectColumns objects, CircleColumns circles, Settings settings) noexcept nogil
-cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -10,6 +10,8 @@ from lcf_edge.filter import circles as shared
 from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, path, range_belief, turmoil
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.coarse_circles import CoarseGroups
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.flow import Homography
 from lcf_edge.filter.group_motion import MotionSums
@@ -244,10 +246,12 @@ def measure_circles(
     verdicts: Verdicts,
     edges: EdgeColumns,
     patches: Patches,
+    coarse: CoarseMotion,
+    coarse_groups: CoarseGroups,
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """How the edges of each rebel circle move, and its patches."""
+    """How the edges of each rebel circle move, its patches, and the pieces that show it."""
     for c in range(circles.capacity):
         group_motion.clear(parts, c)
     for j in range(verdicts.count):
@@ -257,6 +261,9 @@ def measure_circles(
     for p in range(patches.capacity):
         if patches.active[p] and patches.circle[p] >= 0:
             group_motion.add_patch(parts, patches.circle[p], patches, p, around)
+    for p in range(coarse.columns * coarse.rows):
+        if coarse_groups.circle[p] >= 0:
+            group_motion.add_piece(parts, coarse_groups.circle[p], coarse, p, around)
 
 
 def keep_members(
@@ -905,7 +912,7 @@ def take_members(
     for c in range(circles.capacity):
         o = circles.square[c]
         if o >= 0 and circles.active[c] and squares.wholes.count[o] < MIN_EDGES:
-            group_motion.add(squares.wholes, o, squares.parts, c)  # patches tell where edges do not
+            group_motion.add(squares.wholes, o, squares.parts, c)  # patches and pieces tell where edges do not
 
 
 def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation, settings: Settings) -> float:
@@ -951,6 +958,8 @@ def update(
     verdicts: Verdicts,
     edges: EdgeColumns,
     patches: Patches,
+    coarse: CoarseMotion,
+    coarse_groups: CoarseGroups,
     baselines: Baselines,
     plane: ImagePlane,
     around: Situation,
@@ -961,7 +970,7 @@ def update(
     for i in range(edges.count):
         if edges.square[i] >= 0 and not objects.active[edges.square[i]]:
             edges.square[i] = -1  # before its row is used again
-    measure_circles(squares.parts, circles, verdicts, edges, patches, baselines, around)
+    measure_circles(squares.parts, circles, verdicts, edges, patches, coarse, coarse_groups, baselines, around)
     keep_members(objects, squares, circles, around, settings)
     evicted = gather(objects, squares, circles, edges, around, settings, ids)
     unite(objects, squares, circles, edges, around, settings)

@@ -117,7 +117,7 @@ EDGE_COLUMNS = (
 )
 """E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
-CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "square_expert")
+CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "coarse_circles", "square_expert")
 PLACE_WRITERS = (*CONTACT_WRITERS, "turmoil")
 CIRCLE_COLUMNS = (
     Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles"), np.bool_),
@@ -129,17 +129,29 @@ CIRCLE_COLUMNS = (
         "beta",
         "β of its motion in the picture",
         "rad",
-        ("derotation", "normal_circles", "rebel_circles", "patch_circles", "turmoil"),
+        ("derotation", "normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil"),
     ),
-    Column("speed", "V along β", "px/s", ("normal_circles", "rebel_circles", "patch_circles", "turmoil")),
+    Column(
+        "speed",
+        "V along β",
+        "px/s",
+        ("normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil"),
+    ),
     Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
-    Column("trust", "Tr", "1", ("circles", "normal_circles", "rebel_circles", "patch_circles", "turmoil", "feedback")),
+    Column(
+        "trust",
+        "Tr",
+        "1",
+        ("circles", "normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil", "feedback"),
+    ),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles",), np.int32),
     Column("width", "extent of its edges", "px", ("circles", "rebel_circles")),
     Column("height", "extent of its edges", "px", ("circles", "rebel_circles")),
     Column("cause", "`messages.Cause` of C_r", "", PLACE_WRITERS, np.uint8),
-    Column("ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles", "patch_circles")),
+    Column(
+        "ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles", "patch_circles", "coarse_circles")
+    ),
     Column("range", "of C_r, NaN: unknown", "m", PLACE_WRITERS),
     Column(
         "lateral",

@@ -49,8 +49,6 @@ cdef bint see(Turmoil turmoil, Situation around, Settings settings) noexcept nog
 cdef void join_cells(Turmoil turmoil) noexcept nogil
 @cython.locals(k=int, g=int)
 cdef void gather(Turmoil turmoil) noexcept nogil
-@cython.locals(nearest=int, least=double)
-cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(evicted=int, c=int)

@@ -226,20 +226,6 @@ def gather(turmoil: Turmoil) -> None:
             turmoil.members.variance_y[g] += share * dy * dy
 
 
-def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settings) -> int:
-    """The circle that shows the same as a place, the nearest; -1: none."""
-    nearest, least = -1, 0.0
-    reach = shared.radius_of(turmoil.members, g, settings.bs_px) + settings.member_margin_px
-    for c in range(circles.capacity):
-        if circles.active[c]:
-            away = flow.length(circles.x[c] - turmoil.members.x[g], circles.y[c] - turmoil.members.y[g]) - max(
-                circles.radius[c], reach
-            )
-            if away < least:
-                nearest, least = c, away
-    return nearest
-
-
 def is_shown_by(circles: CircleColumns, c: int) -> bool:
     """Whether a circle shows where turmoil is, and not how it moves."""
     return circles.active[c] != 0 and circles.cause[c] == NONE
@@ -273,7 +259,7 @@ def update(
     for g in range(turmoil.across * turmoil.down):
         if turmoil.place[g] != g or turmoil.size[g] < MIN_CELLS or turmoil.longest_s[g] < MIN_S:
             continue
-        c = circle_of(turmoil, g, circles, settings)
+        c = shared.nearest_circle(turmoil.members, g, circles, settings)
         if c < 0:
             c = shared.free_row(circles)
             if c < 0:

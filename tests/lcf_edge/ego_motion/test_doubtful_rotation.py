@@ -63,8 +63,8 @@ def driven(truth: list[np.ndarray], spoil: Spoil, bias: tuple[float, float, floa
     residuals: list[np.ndarray] = []
     step = pipeline.filter.step
 
-    def watched(corners: object, motion: Motion, image: object) -> object:
-        taken = step(corners, motion, image)  # type: ignore[arg-type]
+    def watched(corners: object, motion: Motion, *images: object) -> object:
+        taken = step(corners, motion, *images)  # type: ignore[arg-type]
         motions.append(motion)
         residuals.append(taken.residual.turn_rad if taken.residual else np.zeros(3))
         return taken

@@ -13,6 +13,8 @@ from lcf_edge.config import Config, Filter, Vehicle
 from lcf_edge.filter import LineCircleFilter, rebel_circles, rebel_detection
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.coarse_circles import CoarseGroups
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.patch_circles import PatchGroups
@@ -36,6 +38,11 @@ Drive = Callable[..., Any]
 Landmarks = Callable[..., npt.NDArray[np.float64]]
 Situation = Callable[..., Any]
 Floats = npt.NDArray[np.float32]
+
+
+def coarse() -> tuple[CoarseMotion, CoarseGroups]:
+    """Nothing is seen in small."""
+    return CoarseMotion(Lens(640, 480, 500.0, 500.0, 319.5, 239.5), 640), CoarseGroups(0)
 
 
 class Seen:
@@ -101,6 +108,7 @@ class Scene:
             Patches(0),
             PatchGroups(0),
             Turmoil(640, 480),
+            *coarse(),
             seen.baselines,
             self.around,
             self.settings,
@@ -124,7 +132,7 @@ def standing(around: Any, x: Floats, y: Floats, vx: Floats, vy: Floats) -> Circl
     seen = Seen(scene.edges, x, y, vx, vy, around)
     np.asarray(seen.verdicts.mover)[:], np.asarray(seen.verdicts.incoming)[:] = 0, 1
     columns, circles = scene.edges.columns, scene.circles.columns
-    none = Patches(0), PatchGroups(0), Turmoil(640, 480)
+    none = Patches(0), PatchGroups(0), Turmoil(640, 480), *coarse()
     rebel_circles.update(
         scene.groups, columns, circles, seen.verdicts, seen.breaking, seen.count, *none, seen.baselines, around,
         scene.settings, scene.ids,

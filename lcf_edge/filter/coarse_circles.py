@@ -1,0 +1,146 @@
+"""Circle expert, C_r from coarse motion: pieces of the picture in small that touch and move alike."""
+
+import math
+
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import coarse_motion, edge_equations, flow, situation
+from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.coarse_motion import CoarseMotion
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns
+from lcf_edge.filter.memory import Bytes, doubles, integers
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause
+
+LINKS = 3  # pictures, through which the motion of a piece has led,
+MIN_S = 0.19  # and for so long
+MIN_PIECES = 2
+TOUCHING = 2  # pieces apart: they overlap by half
+HALF_PIECE = 4  # small px
+SPREAD_PX2 = 2.7  # small px², of what a piece shows about its middle
+CROSSING = int(Cause.CROSSING)
+INFINITY = float("inf")
+NAN = float("nan")
+
+
+class CoarseGroups:
+    """A row a piece: ``group``, the lowest number of those that go with it, -1: none; ``circle``, row of C_r, -1: none.
+
+    A row a group: ``members``; means of the velocity, ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest row, px.
+    """
+
+    def __init__(self, pieces: int) -> None:
+        self.group, self.circle = integers(pieces), integers(pieces)
+        self.members = Members(pieces)
+        self.mean_vx, self.mean_vy, self.foot = (doubles(pieces) for _ in range(3))
+
+
+def begin(groups: CoarseGroups, coarse: CoarseMotion, dt_s: float) -> bool:
+    """Each piece whose motion has lasted is a group; False: there is none."""
+    is_any = False
+    for k in range(coarse.columns * coarse.rows):
+        lasts = coarse.links[k] >= LINKS and (coarse.links[k] - 1) * dt_s >= MIN_S
+        groups.group[k] = k if lasts else -1
+        groups.circle[k] = -1
+        is_any = is_any or lasts
+    return is_any
+
+
+def join(groups: CoarseGroups, coarse: CoarseMotion) -> None:
+    """Pieces that touch and move alike are of one group."""
+    changed = True
+    while changed:
+        changed = False
+        for k in range(coarse.columns * coarse.rows):
+            if groups.group[k] < 0:
+                continue
+            column, row = k % coarse.columns, k // coarse.columns
+            for r in range(max(row - TOUCHING, 0), min(row + TOUCHING + 1, coarse.rows)):
+                for c in range(max(column - TOUCHING, 0), min(column + TOUCHING + 1, coarse.columns)):
+                    other = r * coarse.columns + c
+                    if not 0 <= groups.group[other] < groups.group[k]:
+                        continue
+                    if coarse_motion.are_alike(coarse, coarse.vx[k], coarse.vy[k], coarse.vx[other], coarse.vy[other]):
+                        groups.group[k] = groups.group[other]
+                        changed = True
+
+
+def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion) -> None:
+    """What a circle takes from the pieces of each group."""
+    pieces = coarse.columns * coarse.rows
+    for g in range(pieces):
+        shared.clear(members, g)
+        groups.mean_vx[g] = groups.mean_vy[g] = 0.0
+        groups.foot[g] = -INFINITY
+    for k in range(pieces):
+        if groups.group[k] >= 0:
+            members.size[groups.group[k]] += 1
+    for k in range(pieces):
+        g = groups.group[k]
+        if g >= 0:
+            share = 1.0 / members.size[g]
+            members.x[g] += share * coarse.x[k]
+            members.y[g] += share * coarse.y[k]
+            groups.mean_vx[g] += share * coarse.vx[k]
+            groups.mean_vy[g] += share * coarse.vy[k]
+            groups.foot[g] = max(groups.foot[g], coarse.y[k] + HALF_PIECE * coarse.side)
+    for k in range(pieces):
+        g = groups.group[k]
+        if g >= 0:
+            share, spread = 1.0 / members.size[g], SPREAD_PX2 * coarse.side * coarse.side
+            dx, dy = coarse.x[k] - members.x[g], coarse.y[k] - members.y[g]
+            members.variance_x[g] += share * (dx * dx + spread)
+            members.variance_y[g] += share * (dy * dy + spread)
+
+
+def tell(groups: CoarseGroups, coarse: CoarseMotion, g: int, circles: CircleColumns, c: int, around: Situation) -> None:
+    """The motion of a group's circle; what it moves on is no nearer than the ground that is seen under it."""
+    circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
+    circles.speed[c] = flow.length(groups.mean_vx[g], groups.mean_vy[g])
+    circles.cause[c], circles.ttc[c], circles.lateral[c] = CROSSING, INFINITY, NAN
+    circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
+    for k in range(coarse.columns * coarse.rows):
+        if groups.group[k] == g:
+            groups.circle[k] = c
+
+
+def update(
+    groups: CoarseGroups,
+    coarse: CoarseMotion,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    updated: Bytes,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """Circles of groups that stand on the ground, as all does that moves by itself; return evictions.
+
+    ``updated``: which circles others have updated, to which a group is left; those of groups are marked too.
+    """
+    evicted = 0
+    if not begin(groups, coarse, around.dt_s):
+        return evicted
+    join(groups, coarse)
+    gather(groups, groups.members, coarse)
+    for g in range(coarse.columns * coarse.rows):
+        in_the_air = groups.foot[g] < around.horizon_y
+        if groups.group[g] != g or groups.members.size[g] < MIN_PIECES or in_the_air:
+            continue
+        c = shared.nearest_circle(groups.members, g, circles, settings)
+        if c < 0:
+            c = shared.free_row(circles)
+            if c < 0:
+                evicted += 1
+                c = shared.make_room(edges, circles, True, settings)
+            if c < 0:
+                continue
+            shared.give_birth(circles, c, groups.members, g, settings, ids)
+        elif updated[c] or circles.cause[c] != CROSSING:
+            continue  # of one that may be met, others know more
+        else:
+            shared.blend(circles, c, groups.members, g, settings)
+            circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+        updated[c] = 1
+        tell(groups, coarse, g, circles, c, around)
+    return evicted

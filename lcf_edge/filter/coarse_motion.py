@@ -1,0 +1,385 @@
+"""Coarse motion: pieces of the picture that move by themselves, found in the picture in small.
+
+What crosses fast is elsewhere in the next picture, and what is dark or plain has few corners that are found again. In
+small, noise averages out and outlines remain. A piece that is not where it would have been if it stood still, however
+near or far off, is sought all around, in the frame before and in an older key frame, which shows slower motion. Its
+motion counts if it leads from picture to picture, as in α.
+"""
+
+import math
+
+import numpy as np
+
+from lcf_edge.filter import flow, image_plane, rounding
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.inputs import KEYS
+from lcf_edge.filter.key_frames import KeyFrames
+from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, memory_of, octets
+from lcf_edge.filter.situation import Situation
+from lcf_edge.lens import Lens
+
+WINDOW = 8  # small px along a side of a piece
+PIXELS = 64
+STEP = 4  # small px from piece to piece
+REACH_SHARE = 0.16  # of the picture's width, by which a piece may have moved across,
+DOWN_SHARE = 0.5  # and down, as a share of that
+NEAREST_M = 0.25  # depth below which nothing is expected to stand
+OFF_FLOW = 1.5  # small px beside the flow line, within which a piece may stand, and more
+ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
+TURN_SIGMAS = 2.0  # or the lens, in a turn
+MAX_OFF_FLOW = 3.0  # beyond, nothing is told
+PLAIN_GREY = 2.0  # a pixel, by which neighbours differ at least, across and down together
+CALM_GREY = 3.0  # a pixel, by which a piece may differ from itself,
+BESIDE_PX = 0.6  # and by what lying so many small px beside whole ones changes
+LIKENESS = 0.5  # of the difference that is left if it stands, that is left at most if it moves
+RING = 3  # small px from its place, where a distinct piece fits worse by
+RING_LIKENESS = 1.25  # this factor,
+RING_GREY = 0.5  # and so much a pixel
+MAX_SEARCHES = 16  # in a frame
+SLOW_S = 0.3  # the older picture is no older than this,
+MIN_SLOW_S = 0.1  # nor younger
+SAME_SMALL_PX = 1.0  # by which alike motions may differ,
+SAME_SHARE = 0.25  # and by this share
+LAST, OLDER = 0, 1
+WORST = 256 * 64
+
+
+class CoarseMotion:
+    """The picture in small, ``width`` by ``height``, each px of which is ``side`` px of the input frame.
+
+    Pixels, row after row: ``now``, ``last``; ``kept`` (KEYS, pixels), of the key frames, ``keys`` of them so far.
+    ``turned``: (1, 3, 3), the rotation since the last one.
+
+    The picture in which pieces are sought: ``then``, ``then_s`` ago; ``back``, from where what is far off is seen now
+    to where it was seen then; ``ahead_m``, ``focus_x``, ``focus_y``: how far and where the vehicle drove since;
+    ``off_flow``, small px. Of the piece that is sought: ``here``, its first pixel; ``base_x``, ``base_y``, where it was
+    if it is far off, small px of its upper left; ``across``, ``down``, from there, where it was if it moves;
+    ``least_still``, ``least_moving``, the difference that is left; ``share``: of the way to where the nearest would
+    have been, if it stands.
+
+    A row a piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its middle, px of the ideal pinhole; ``rough``: how
+    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last
+    picture; ``shares`` (2, pieces), where it lately stood, in the last picture and in the older one; ``links``:
+    pictures through which its motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated;
+    ``elapsed_s``, over which it was seen; ``links_before``,
+    ``vx_before``, ``vy_before`` of the last picture. ``block``: roughness of each ``STEP`` by ``STEP`` px.
+    """
+
+    def __init__(self, lens: Lens, side: int) -> None:
+        self.side = side
+        self.width, self.height = lens.width // side, lens.height // side
+        self.columns = max((self.width - WINDOW) // STEP + 1, 0)
+        self.rows = max((self.height - WINDOW) // STEP + 1, 0)
+        pieces, pixels = self.columns * self.rows, self.width * self.height
+        self.now, self.last, self.then = octets(pixels), octets(pixels), octets(pixels)
+        self.kept = octets(KEYS, pixels)
+        self.turned = memory_of(np.eye(3).reshape(1, 3, 3))
+        self.back = Homography()
+        self.then_s = self.ahead_m = self.focus_x = self.focus_y = self.off_flow = 0.0
+        self.base_x = self.base_y = self.share = 0.0
+        self.pictures = self.keys = self.searches = self.here = self.across = self.down = 0
+        self.least_still = self.least_moving = 0
+        half = 0.5 * (WINDOW * side - 1)
+        u, v = np.meshgrid(np.arange(self.columns) * STEP * side + half, np.arange(self.rows) * STEP * side + half)
+        middles = lens.undistort(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float32)).astype(np.float64)
+        self.x, self.y = memory_of(middles[:, 0]), memory_of(middles[:, 1])
+        self.rough, self.links, self.links_before = (integers(pieces) for _ in range(3))
+        self.block = integers((self.columns + 1) * (self.rows + 1))
+        self.came_x, self.came_y, self.shares = doubles(pieces), doubles(pieces), doubles(2, pieces)
+        self.vx, self.vy, self.vx_before, self.vy_before = (doubles(pieces) for _ in range(4))
+        self.elapsed_s = doubles(pieces)
+
+
+# Pictures
+
+
+def take(coarse: CoarseMotion, small: Bytes) -> None:
+    """Take the next picture in small, row after row."""
+    for k in range(coarse.width * coarse.height):
+        coarse.last[k] = coarse.now[k]
+        coarse.now[k] = small[k]
+    for i in range(3):
+        for j in range(3):
+            coarse.turned[0, i, j] = 1.0 if i == j else 0.0
+    coarse.pictures = min(coarse.pictures + 1, 2)
+
+
+def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
+    """A rotation (1, 3, 3) comes on top of that since the last picture."""
+    for j in range(3):
+        x, y, z = coarse.turned[0, 0, j], coarse.turned[0, 1, j], coarse.turned[0, 2, j]
+        for i in range(3):
+            coarse.turned[0, i, j] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
+
+
+def keep(coarse: CoarseMotion, slot: int) -> None:
+    """This picture is that of the key frame in ``slot``."""
+    coarse.keys = min(coarse.keys + 1, KEYS)
+    for k in range(coarse.width * coarse.height):
+        coarse.kept[slot, k] = coarse.now[k]
+
+
+def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int, keys: KeyFrames) -> None:
+    """``back``, from the ``k``-th of rotations (n, 3, 3) since then. ``keys`` have room for one."""
+    for i in range(3):
+        for j in range(3):
+            keys.step[0, i, j] = rotation[k, j, i]
+    flow.set_homography(coarse.back, pinhole, keys.step, 0)
+
+
+def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
+    """Pieces are sought in the last picture."""
+    for k in range(coarse.width * coarse.height):
+        coarse.then[k] = coarse.last[k]
+    turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
+    coarse.then_s = around.dt_s
+    coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else 0.0
+    coarse.focus_x, coarse.focus_y = around.focus_x, around.focus_y
+    sigma_px = keys.rate_sigma_radps * around.dt_s * around.pinhole.focal
+    coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * sigma_px / coarse.side
+
+
+def look_farther_back(
+    coarse: CoarseMotion, slot: int, keys: KeyFrames, baselines: Baselines, around: Situation
+) -> None:
+    """Pieces are sought in the picture of the key frame in ``slot``."""
+    for k in range(coarse.width * coarse.height):
+        coarse.then[k] = coarse.kept[slot, k]
+    turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
+    coarse.then_s, coarse.ahead_m = baselines.elapsed_s[slot], baselines.depth_m[slot]
+    coarse.focus_x, coarse.focus_y = baselines.focus_x[slot], baselines.focus_y[slot]
+    coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * baselines.sigma_px[slot] / coarse.side
+
+
+def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
+    """Slot of the key frame whose picture shows slow motion, -1: there is none."""
+    oldest, most = -1, MIN_SLOW_S
+    for k in range(KEYS):
+        if k < coarse.keys and most <= baselines.elapsed_s[k] <= SLOW_S:
+            oldest, most = k, baselines.elapsed_s[k]
+    return oldest
+
+
+# Pieces
+
+
+def roughen(coarse: CoarseMotion) -> None:
+    """How much neighbouring pixels of each piece differ, in sum."""
+    across = coarse.columns + 1
+    for b in range(across * (coarse.rows + 1)):
+        total = 0
+        for row in range(STEP):
+            here = (STEP * (b // across) + row) * coarse.width + STEP * (b % across)
+            below = here + coarse.width if here + coarse.width + STEP <= coarse.width * coarse.height else here
+            for k in range(STEP - 1):
+                total += abs(coarse.now[here + k] - coarse.now[here + k + 1])
+            for k in range(STEP):
+                total += abs(coarse.now[here + k] - coarse.now[below + k])
+        coarse.block[b] = total
+    for k in range(coarse.columns * coarse.rows):
+        b = k // coarse.columns * across + k % coarse.columns
+        coarse.rough[k] = coarse.block[b] + coarse.block[b + 1]
+        coarse.rough[k] += coarse.block[b + across] + coarse.block[b + across + 1]
+
+
+def calm(coarse: CoarseMotion, k: int) -> int:
+    """The difference that a piece may have from itself: noise, and it does not lie on whole px."""
+    return rounding.whole(CALM_GREY * PIXELS + BESIDE_PX * coarse.rough[k])
+
+
+def nearest_px(x: float) -> int:
+    """The nearest whole number."""
+    return rounding.whole(math.floor(x + 0.5))
+
+
+def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
+    """Sum of absolute grey differences of the piece sought from that then at (x, y); beyond ``most`` it may end."""
+    if x < 0 or x > coarse.width - WINDOW or y < 0 or y > coarse.height - WINDOW:
+        return most + 1
+    total, here, there = 0, coarse.here, y * coarse.width + x
+    for _ in range(WINDOW):
+        for k in range(WINDOW):
+            total += abs(coarse.now[here + k] - coarse.then[there + k])
+        if total > most:
+            return total
+        here += coarse.width
+        there += coarse.width
+    return total
+
+
+def stands_as_lately(coarse: CoarseMotion, k: int, end_x: float, end_y: float) -> bool:
+    """Whether a piece is where it would have been if it stood as far off as what was lately seen there, or beside."""
+    x = nearest_px(coarse.base_x + coarse.share * end_x)
+    y = nearest_px(coarse.base_y + coarse.share * end_y)
+    most = calm(coarse, k)
+    return (
+        difference(coarse, x, y, most) <= most
+        or difference(coarse, x - 1, y, most) <= most
+        or difference(coarse, x + 1, y, most) <= most
+        or difference(coarse, x, y - 1, most) <= most
+        or difference(coarse, x, y + 1, most) <= most
+    )
+
+
+def seek_standing(coarse: CoarseMotion, k: int, end_x: float, end_y: float, off_flow: float) -> None:
+    """The best place of a piece that stands: along its flow line, from ``base`` by no more than (end_x, end_y)."""
+    x, y = nearest_px(coarse.base_x), nearest_px(coarse.base_y)
+    beside = rounding.whole(off_flow + 0.5)
+    level = math.fabs(end_x) > math.fabs(end_y)
+    steps = rounding.whole(max(math.fabs(end_x), math.fabs(end_y))) + 1
+    coarse.least_still = WORST
+    for step in range(-1, steps + 2):
+        share = 1.0 * step / steps
+        along_x, along_y = x + nearest_px(end_x * share), y + nearest_px(end_y * share)
+        for off in range(-beside, beside + 1):
+            at_x, at_y = along_x + (0 if level else off), along_y + (off if level else 0)
+            coarse.least_still = min(coarse.least_still, difference(coarse, at_x, at_y, coarse.least_still))
+        if coarse.least_still <= calm(coarse, k):
+            coarse.share = share
+            return
+
+
+def off_segment(x: float, y: float, end_x: float, end_y: float) -> float:
+    """Distance of a point from the segment between the origin and its end."""
+    along = min(max((x * end_x + y * end_y) / max(end_x * end_x + end_y * end_y, 1.0), 0.0), 1.0)
+    return flow.length(x - along * end_x, y - along * end_y)
+
+
+def try_moving(coarse: CoarseMotion, across: int, down: int, end_x: float, end_y: float, off_flow: float) -> None:
+    """A place for a piece that moves: where none that stands could have been."""
+    if off_segment(across, down, end_x, end_y) > off_flow:
+        x, y = nearest_px(coarse.base_x) + across, nearest_px(coarse.base_y) + down
+        total = difference(coarse, x, y, coarse.least_moving)
+        if total < coarse.least_moving:
+            coarse.least_moving, coarse.across, coarse.down = total, across, down
+
+
+def seek_moving(coarse: CoarseMotion, end_x: float, end_y: float, off_flow: float) -> None:
+    """The best place of a piece that moves: among every other one all around, then among those beside it."""
+    reach = rounding.whole(0.5 * REACH_SHARE * coarse.width)
+    reach_down = rounding.whole(DOWN_SHARE * reach)
+    coarse.searches += 1
+    coarse.least_moving = WORST
+    coarse.across = coarse.down = 0
+    for down in range(-reach_down, reach_down + 1):
+        for across in range(-reach, reach + 1):
+            try_moving(coarse, 2 * across, 2 * down, end_x, end_y, off_flow)
+    middle_x, middle_y = coarse.across, coarse.down
+    for down in range(-1, 2):
+        for across in range(-1, 2):
+            try_moving(coarse, middle_x + across, middle_y + down, end_x, end_y, off_flow)
+
+
+def is_distinct(coarse: CoarseMotion) -> bool:
+    """Whether a piece that moves fits nowhere around as well: one with a straight edge fits all along it."""
+    x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
+    most = rounding.whole(RING_LIKENESS * coarse.least_moving + RING_GREY * PIXELS)
+    for down in range(-1, 2):
+        for across in range(-1, 2):
+            beside = across != 0 or down != 0
+            if beside and difference(coarse, x + RING * across, y + RING * down, most) <= most:
+                return False
+    return True
+
+
+def finer(before: int, middle: int, after: int) -> float:
+    """By how much the least lies beside the middle of three differences, in steps; they fall and rise straight."""
+    highest = max(before, after) - middle
+    return 0.5 * (before - after) / highest if highest > 0 else 0.0
+
+
+def set_motion(coarse: CoarseMotion, k: int) -> None:
+    """Velocity of a piece that moves."""
+    x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
+    middle = coarse.least_moving
+    across = x + finer(difference(coarse, x - 1, y, WORST), middle, difference(coarse, x + 1, y, WORST))
+    down = y + finer(difference(coarse, x, y - 1, WORST), middle, difference(coarse, x, y + 1, WORST))
+    coarse.vx[k] = (coarse.base_x - across) * coarse.side / coarse.then_s
+    coarse.vy[k] = (coarse.base_y - down) * coarse.side / coarse.then_s
+    coarse.elapsed_s[k] = coarse.then_s
+
+
+def are_alike(coarse: CoarseMotion, vx: float, vy: float, other_vx: float, other_vy: float) -> bool:
+    """Whether two motions may be one."""
+    speed = max(flow.length(vx, vy), flow.length(other_vx, other_vy))
+    return flow.length(vx - other_vx, vy - other_vy) <= SAME_SMALL_PX * coarse.side / coarse.then_s + SAME_SHARE * speed
+
+
+def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
+    """The links of a piece that moves: one more than of those that it comes from and that moved alike."""
+    from_x = coarse.came_x[k] - coarse.vx[k] * dt_s / coarse.side
+    from_y = coarse.came_y[k] - coarse.vy[k] * dt_s / coarse.side
+    column, row = rounding.whole(max(from_x, 0.0) / STEP), rounding.whole(max(from_y, 0.0) / STEP)
+    coarse.links[k] = 1
+    for r in range(max(row - 1, 0), min(row + 3, coarse.rows)):
+        for c in range(max(column - 1, 0), min(column + 3, coarse.columns)):
+            b = r * coarse.columns + c
+            if coarse.links_before[b] < coarse.links[k]:
+                continue
+            if are_alike(coarse, coarse.vx[k], coarse.vy[k], coarse.vx_before[b], coarse.vy_before[b]):
+                coarse.links[k] = coarse.links_before[b] + 1
+
+
+def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
+    """Set ``here`` and ``base`` of a piece; False: if it is far off, it was not all in the picture."""
+    left, top = STEP * (k % coarse.columns), STEP * (k // coarse.columns)
+    coarse.here = top * coarse.width + left
+    if not image_plane.project(plane, coarse.x[k], coarse.y[k]):
+        return False
+    u, v = plane.u, plane.v
+    flow.warp(coarse.back, coarse.x[k], coarse.y[k])
+    if not image_plane.project(plane, coarse.back.x, coarse.back.y):
+        return False
+    coarse.base_x, coarse.base_y = left + (plane.u - u) / coarse.side, top + (plane.v - v) / coarse.side
+    return 0 <= coarse.base_x <= coarse.width - WINDOW and 0 <= coarse.base_y <= coarse.height - WINDOW
+
+
+def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
+    """Whether the piece that was put moves by itself; ``age``: LAST or OLDER, of the picture then."""
+    nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
+    end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
+    coarse.share = coarse.shares[age, k]
+    if stands_as_lately(coarse, k, end_x, end_y):
+        return False
+    turned = flow.length(
+        coarse.base_x - STEP * (k % coarse.columns), coarse.base_y - STEP * (k // coarse.columns)
+    )  # where the lens is guessed, so is by how much a turn moved the piece
+    off_flow = coarse.off_flow + TURN_SIGMAS * around.turn_share * turned
+    seek_standing(coarse, k, end_x, end_y, off_flow)
+    coarse.shares[age, k] = coarse.share
+    if coarse.least_still <= calm(coarse, k) or coarse.searches >= MAX_SEARCHES:
+        return False
+    seek_moving(coarse, end_x, end_y, off_flow)
+    moves = coarse.least_moving < LIKENESS * coarse.least_still and coarse.least_moving <= calm(coarse, k)
+    return moves and is_distinct(coarse)
+
+
+def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
+    """Which pieces that are not known to move do so, since the picture then."""
+    for k in range(coarse.columns * coarse.rows):
+        if coarse.links[k] or coarse.rough[k] < PLAIN_GREY * PIXELS or not put(coarse, k, plane):
+            continue
+        if age == LAST:
+            coarse.came_x[k], coarse.came_y[k] = coarse.base_x, coarse.base_y
+        if coarse.off_flow < MAX_OFF_FLOW and see(coarse, k, age, around):
+            set_motion(coarse, k)
+            chain(coarse, k, around.dt_s)
+
+
+def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: ImagePlane, around: Situation) -> None:
+    """Which pieces move by themselves: fast, since the last picture, or more slowly, since an older one."""
+    for k in range(coarse.columns * coarse.rows):
+        coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
+        coarse.links[k] = 0
+    coarse.searches = 0
+    if coarse.pictures < 2 or not coarse.columns or not coarse.rows:
+        return
+    roughen(coarse)
+    look_back(coarse, keys, around)
+    see_all(coarse, LAST, plane, around)
+    slot = older_slot(coarse, baselines)
+    if slot >= 0:
+        look_farther_back(coarse, slot, keys, baselines, around)
+        see_all(coarse, OLDER, plane, around)

@@ -1,0 +1,172 @@
+"""What crosses fast, and has no corner that is found again, is found in the picture in small."""
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import cv2
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Camera, Config, Vehicle
+from lcf_edge.filter import LineCircleFilter, Motion
+from lcf_edge.filter.inputs import NO_CORNERS
+from lcf_edge.lens import Lens
+from lcf_edge.messages import Cause
+from lcf_edge.small_image import SmallImage
+
+Grey = npt.NDArray[np.uint8]
+
+LENS = Lens(640, 480, 1500.0, 1500.0, 319.5, 239.5)  # so narrow that a turn shifts all of the picture alike
+SMALL = SmallImage(LENS.width, LENS.height)
+CONFIG = Config(camera=Camera(height_m=0.5), vehicle=Vehicle(half_width_m=0.4, height_m=1.2))
+HORIZON = 240
+DT_S = 0.1
+
+
+def far_background(seed: int = 0) -> Grey:
+    """Soft blobs, three pictures wide."""
+    noise = np.random.default_rng(seed).normal(size=(LENS.height, 3 * LENS.width)).astype(np.float32)
+    soft = cv2.GaussianBlur(noise, (0, 0), 12)
+    return np.asarray(np.clip(150 + 25 * soft / soft.std(), 0, 255), np.uint8)
+
+
+BACKGROUND = far_background()
+
+
+@dataclass(frozen=True)
+class Passing:
+    """A plain dark thing before a far background; iterating gives the motion and the picture of each step.
+
+    ``left``, ``top``, ``width``, ``height``: px, in the first picture. ``pxps``: its motion. ``turn_rad``: by which the
+    camera turns in each frame. ``grows``: by which it stands nearer in each. ``until_seq``: then it is gone.
+    ``contrast``: of the background.
+    """
+
+    left: float = 120.0
+    top: float = 200.0
+    width: float = 150.0
+    height: float = 90.0
+    pxps: tuple[float, float] = (320.0, 0.0)
+    turn_rad: float = 0.0
+    grows: float = 1.0
+    until_seq: int = 100
+    speed_mps: float = 0.0
+    frames: int = 8
+    contrast: float = 1.0
+    dt_s: float = DT_S
+
+    def __iter__(self) -> Iterator[tuple[Motion, Grey]]:
+        random = np.random.default_rng(1)
+        for seq in range(self.frames):
+            shift_px = LENS.fx * math.tan(seq * self.turn_rad)
+            start = LENS.width - round(shift_px)
+            image = 150 + self.contrast * (BACKGROUND[:, start : start + LENS.width] - 150.0)
+            if seq < self.until_seq:
+                self.draw(image, seq, round(shift_px))
+            noisy = image + random.normal(0, 2, image.shape)
+            cosine, sine = math.cos(self.turn_rad), math.sin(self.turn_rad)
+            rotation = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
+            yield Motion(self.dt_s, rotation, 0.0, self.speed_mps, 0.0), np.asarray(np.clip(noisy, 0, 255), np.uint8)
+
+    def draw(self, image: npt.NDArray[np.float64], seq: int, shift_px: int) -> None:
+        scale, time_s = self.grows**seq, seq * self.dt_s
+        x = (self.left - LENS.cx) * scale + LENS.cx + self.pxps[0] * time_s + shift_px
+        y = (self.top - LENS.cy) * scale + LENS.cy + self.pxps[1] * time_s
+        foot = round(x + self.width * scale), round(y + self.height * scale)
+        cv2.rectangle(image, (round(x), round(y)), foot, 30, -1)
+
+
+def driven(scene: Passing, config: Config = CONFIG) -> Iterator[tuple[int, LineCircleFilter]]:
+    """The filter after each frame, without a single corner."""
+    tables = LineCircleFilter(config, LENS)
+    for seq, (motion, image) in enumerate(scene):
+        tables.step(NO_CORNERS, motion, image, SMALL.of(image))
+        yield seq, tables
+
+
+def rebels(scene: Passing) -> list[int]:
+    """How many circles are reported in each frame."""
+    return [int((tables.rebel.active & (tables.rebel.trust >= 3)).sum()) for _, tables in driven(scene)]
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 0.015, -0.015], ids=["straight", "turning left", "turning right"])
+def test_what_crosses_without_a_corner_is_found_with_its_motion(turn_rad: float) -> None:
+    found = []
+    for seq, tables in driven(Passing(turn_rad=turn_rad)):
+        rebel = tables.rebel
+        for c in np.flatnonzero(rebel.active & (rebel.trust >= 3)):
+            found.append(seq)
+            assert rebel.cause[c] == Cause.CROSSING
+            assert rebel.speed[c] * math.cos(rebel.beta[c]) == pytest.approx(320, rel=0.15)
+            assert abs(rebel.speed[c] * math.sin(rebel.beta[c])) < 80
+            assert not math.isfinite(rebel.ttc[c])
+    assert found
+    assert min(found) <= 5
+    assert max(found) == 7
+
+
+def test_it_becomes_an_object() -> None:
+    objects = [bool((tables.objects.active & (tables.objects.trust >= 3)).any()) for _, tables in driven(Passing())]
+    assert objects[-1]
+
+
+def test_slow_motion_is_seen_since_an_older_picture() -> None:
+    slow = Passing(pxps=(100.0, 0.0), dt_s=0.05, frames=20)  # 5 px a frame, less than one of the small ones
+    assert rebels(slow)[-1] == 1
+
+
+def test_what_is_seen_to_move_for_two_pictures_only_is_nothing() -> None:
+    assert not any(rebels(Passing(until_seq=3)))
+
+
+def test_what_stands_still_in_the_world_is_nothing_however_the_camera_turns() -> None:
+    assert not any(rebels(Passing(pxps=(0.0, 0.0), turn_rad=0.015)))
+
+
+@pytest.mark.parametrize("left", [340.0, 430.0])
+def test_what_stands_beside_the_way_and_grows_as_it_is_passed_is_nothing(left: float) -> None:
+    # from 3 m, 0.3 m nearer in each frame
+    near = Passing(left=left, top=230.0, width=60.0, height=60.0, pxps=(0.0, 0.0), grows=1.1, speed_mps=3.0)
+    assert not any(rebels(near))
+
+
+def test_what_hangs_in_the_air_moves_for_another_reason_than_that_it_drives() -> None:
+    assert not any(rebels(Passing(top=40.0, height=100.0)))
+    assert Passing(top=40.0).top + 100.0 < HORIZON
+
+
+def test_a_straight_edge_does_not_tell_how_it_moves() -> None:
+    """A kerb from one side of the picture to the other."""
+    kerb = Passing(left=-2000.0, width=6000.0, top=300.0, height=300.0, pxps=(0.0, 80.0), contrast=0.0)
+    assert not any(rebels(kerb))
+
+
+def test_where_the_rotation_is_uncertain_nothing_is_told() -> None:
+    tables = LineCircleFilter(CONFIG, LENS)
+    for motion, image in Passing():
+        unsure = replace(motion, rotation_sigma_rad=0.02)
+        tables.step(NO_CORNERS, unsure, image, SMALL.of(image))
+        assert not tables.rebel.active.any()
+
+
+def test_a_picture_too_small_for_a_piece_is_no_fault() -> None:
+    lens = Lens(16, 12, 12.0, 12.0, 7.5, 5.5)
+    tables = LineCircleFilter(CONFIG, lens)
+    small = SmallImage(16, 12)
+    image = np.zeros((12, 16), np.uint8)
+    for _ in range(3):
+        tables.step(NO_CORNERS, Motion(DT_S, np.eye(3), 0.0, 1.0, 0.0), image, small.of(image))
+
+
+@pytest.mark.parametrize("size", [(640, 480), (160, 120), (1242, 375), (1920, 1080), (3, 2), (1, 1)])
+def test_in_small_every_picture_has_about_as_many_pixels(size: tuple[int, int]) -> None:
+    width, height = size
+    small = SmallImage(width, height)
+    image = np.full((height, width), 77, np.uint8)
+    made = small.of(image)
+    assert made.shape == (small.height, small.width) == (height // small.side, width // small.side)
+    assert made.flags.c_contiguous
+    assert (made == 77).all()
+    assert made.size <= max(10_000, 1)
