@@ -7,7 +7,7 @@ cdef class Scores:
     cdef int width, dark
     cdef unsigned char[::1] plane
     cdef unsigned long long[::1] words
-    cdef int[::1] above
+    cdef int[::1] above, some
     cdef Py_ssize_t[::1] ring
     cdef unsigned char[:, ::1] around, least, best
 
@@ -21,7 +21,7 @@ cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int
 @cython.locals(y=cython.int, at=cython.int, darkest=cython.uchar)
 cdef bint is_dark(Scores scores, const unsigned char[::1] image, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(y=cython.int, first=cython.int, last=cython.int, w=cython.int, at=cython.int, count=cython.int,
-               word=cython.ulonglong, add=cython.ulonglong)
+               word=cython.ulonglong, add=cython.ulonglong, hits=cython.int, k=cython.int, start=cython.int)
 cdef int list_above(Scores scores, int threshold, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, at=cython.Py_ssize_t, on=cython.Py_ssize_t,
                count=cython.Py_ssize_t, grey=cython.int, score=cython.int)
