@@ -58,7 +58,7 @@ LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of 
 SMALL = ["-Os"]
 LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
 LITTLE |= {"feedback", "ground_speed", "group_motion", "heading", "key_frames", "least_squares"}
-LITTLE |= {"line_expert", "normal_circles", "patch_circles", "path", "range_belief", "rebel_circles"}
+LITTLE |= {"line_expert", "normal_circles", "patch_circles", "patches", "path", "range_belief", "rebel_circles"}
 LITTLE |= {"rest", "sample_ring", "scene_records", "settings", "situation", "square_expert"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.

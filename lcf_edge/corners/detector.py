@@ -47,7 +47,7 @@ class CornerDetector:
         self._capacity = capacity
         size = lens.width, lens.height
         self._room = BORDER_PX, np.array((*size, *size), np.int32) - BORDER_PX
-        self._whole = np.array([(0, 0, *size)], np.int32)
+        self._whole = self._inside(np.array([(0, 0, *size)], np.int32))
         self._fast = Fast(*size)
         self._budget_squares = Squares(*size, SPREAD_PX)
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
@@ -86,8 +86,7 @@ class CornerDetector:
 
     def _look(self, image: Grey, threshold: int, parts: Parts, on_dark: int | None = None) -> Found:
         """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
-        within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
-        pixel, strength = self._fast.corners(threshold, within, on_dark)
+        pixel, strength = self._fast.corners(threshold, parts, on_dark)
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
@@ -111,7 +110,8 @@ class CornerDetector:
             square = np.empty(len(pixel), np.int32)
             poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
             threshold = self._weak.value
-            faint = self._look(image, threshold, self._rectangles[:poor], round(DARK_SHARE * threshold))
+            parts = self._inside(self._rectangles[:poor])
+            faint = self._look(image, threshold, parts, round(DARK_SHARE * threshold))
             found = len(faint[0])
             if found:  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, samples.data, square.data)
@@ -122,6 +122,10 @@ class CornerDetector:
         self._weak.follow(max(found, 1) / (WEAK_SHARE * self._settings.corners_target))
         self._strong.follow(max(len(pixel), 1) / self._settings.corners_target)
         return pixel, strength, samples
+
+    def _inside(self, parts: Parts) -> Parts:
+        """Return parts of the image without its border."""
+        return np.minimum(np.maximum(parts, self._room[0]), self._room[1])
 
     def _touched(self, visible: Grey | None) -> npt.NDArray[np.uint8]:
         """Return which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
