@@ -6,9 +6,9 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.config import Filter
-from lcf_edge.corners.along_edge import keep_round
+from lcf_edge.corners.along_edge import WITHIN, keep_round
 from lcf_edge.corners.appearance import BORDER_PX, appearance
-from lcf_edge.corners.fast import Fast, Found, Grey, Parts, Pixels, Strengths
+from lcf_edge.corners.fast import Fast, Grey, Parts, Pixels, Strengths
 from lcf_edge.corners.fast_threshold import FollowingThreshold
 from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, keep_spread, keep_strongest, leave_poor
 from lcf_edge.filter.inputs import Corners
@@ -25,6 +25,10 @@ WEAKEST = THRESHOLDS[0]  # half of what is fainter is noise
 DARK_SHARE = 0.6  # of the faint threshold, which is enough for what is dark
 ROWS_ABOVE = 2  # of squares: margin for how high things that can be met may reach
 WEAK_SHARE = 0.5  # of the wanted corners, at most, come from there
+
+Samples = npt.NDArray[np.uint8]
+Found = tuple[Pixels, Strengths, Samples]
+"""Pixels, how strong their corners are, and their appearance."""
 
 
 class CornerDetector:
@@ -43,7 +47,7 @@ class CornerDetector:
         self._capacity = capacity
         size = lens.width, lens.height
         self._room = BORDER_PX, np.array((*size, *size), np.int32) - BORDER_PX
-        self._whole = np.array([(0, 0, *size)], np.int32)
+        self._whole = self._inside(np.array([(0, 0, *size)], np.int32))
         self._fast = Fast(*size)
         self._budget_squares = Squares(*size, SPREAD_PX)
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
@@ -65,54 +69,63 @@ class CornerDetector:
         """
         image = np.ascontiguousarray(image)
         self._fast.look(image)
-        pixel, strength = self._look(image, self._strong.value, self._whole)
+        found = self._look(image, self._strong.value, self._whole)
         if self._settings.fast_adaptive:
-            pixel, strength = self._shared_out(image, pixel, strength, highest_row)
+            found = self._shared_out(image, found, highest_row)
+        pixel, strength, samples = found
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
         if self._lens.is_distorted:
             placed = np.isfinite(position[:, 0]).nonzero()[0]
             pixel, position, strength = pixel.take(placed, axis=0), position.take(placed, axis=0), strength.take(placed)
+            samples = samples.take(placed, axis=0)
         evicted = max(0, len(pixel) - self._capacity)
         if evicted:
             kept = strongest_spread(self._budget_squares, pixel, strength, self._capacity)
-            pixel, position = pixel.take(kept, axis=0), position.take(kept, axis=0)
-        return Corners(pixel, position, appearance(image, pixel)), evicted
+            pixel, position, samples = pixel.take(kept, axis=0), position.take(kept, axis=0), samples.take(kept, axis=0)
+        return Corners(pixel, position, samples), evicted
 
     def _look(self, image: Grey, threshold: int, parts: Parts, on_dark: int | None = None) -> Found:
         """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
-        within = np.minimum(np.maximum(parts, self._room[0]), self._room[1])
-        pixel, strength = self._fast.corners(threshold, within, on_dark)
+        pixel, strength = self._fast.corners(threshold, parts, on_dark)
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
         if least := self._settings.least_roundness:
-            count = keep_round(image.reshape(-1).data, image.shape[1], pixel.data, strength.data, least)
+            count = keep_round(image.reshape(-1).data, image.shape[1], WITHIN, pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]
+        samples = appearance(image, pixel)
         if self._settings.fast_adaptive:
-            samples, beaten = appearance(image, pixel), np.empty(len(pixel), np.uint8)
+            beaten = np.empty(len(pixel), np.uint8)
             count = keep_distinct(pixel.data, strength.data, samples.data, beaten.data, CLOSE_PX)
-            pixel, strength = pixel[:count], strength[:count]
-        return pixel, strength
+            pixel, strength, samples = pixel[:count], strength[:count], samples[:count]
+        return pixel, strength, samples
 
-    def _shared_out(self, image: Grey, pixel: Pixels, strength: Strengths, highest_row: float) -> Found:
+    def _shared_out(self, image: Grey, looked: Found, highest_row: float) -> Found:
         """Limit every square to its share, and search poor ones again."""
         squares = self._squares
-        pixel, strength = strongest(squares, pixel, strength, self._most)
+        pixel, strength, samples = strongest(squares, looked, self._most)
         found = 0
         if self._weak.value < self._strong.value:  # else it would find the same again
             first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
             square = np.empty(len(pixel), np.int32)
             poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
             threshold = self._weak.value
-            faint, how_faint = self._look(image, threshold, self._rectangles[:poor], round(DARK_SHARE * threshold))
-            found = len(faint)
+            parts = self._inside(self._rectangles[:poor])
+            faint = self._look(image, threshold, parts, round(DARK_SHARE * threshold))
+            found = len(faint[0])
             if found:  # includes the corners already found there
-                rich = leave_poor(squares, pixel.data, strength.data, square.data)
-                faint, how_faint = strongest(squares, faint, how_faint, FEW)
-                pixel, strength = np.concatenate([pixel[:rich], faint]), np.concatenate([strength[:rich], how_faint])
+                rich = leave_poor(squares, pixel.data, strength.data, samples.data, square.data)
+                faint = strongest(squares, faint, FEW)
+                pixel = np.concatenate([pixel[:rich], faint[0]])
+                strength = np.concatenate([strength[:rich], faint[1]])
+                samples = np.concatenate([samples[:rich], faint[2]])
         self._weak.follow(max(found, 1) / (WEAK_SHARE * self._settings.corners_target))
         self._strong.follow(max(len(pixel), 1) / self._settings.corners_target)
-        return pixel, strength
+        return pixel, strength, samples
+
+    def _inside(self, parts: Parts) -> Parts:
+        """Return parts of the image without its border."""
+        return np.minimum(np.maximum(parts, self._room[0]), self._room[1])
 
     def _touched(self, visible: Grey | None) -> npt.NDArray[np.uint8]:
         """Return which squares have a pixel where corners are wanted; uint8 (rows, columns)."""
@@ -123,11 +136,12 @@ class CornerDetector:
         return np.maximum.reduceat(across, np.arange(rows) * side, axis=0)
 
 
-def strongest(squares: Squares, pixel: Pixels, strength: Strengths, share: int) -> Found:
+def strongest(squares: Squares, found: Found, share: int) -> Found:
     """The ``share`` strongest corners of each square, in the same order; the arrays are written."""
+    pixel, strength, samples = found
     listed, square = np.empty((2, len(pixel)), np.int32)
-    count = keep_strongest(squares, pixel.data, strength.data, listed.data, square.data, share)
-    return pixel[:count], strength[:count]
+    count = keep_strongest(squares, pixel.data, strength.data, samples.data, listed.data, square.data, share)
+    return pixel[:count], strength[:count], samples[:count]
 
 
 def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capacity: int) -> npt.NDArray[np.int32]:

@@ -7,7 +7,7 @@ cdef class Scores:
     cdef int width, dark
     cdef unsigned char[::1] plane
     cdef unsigned long long[::1] words
-    cdef int[::1] above
+    cdef int[::1] above, some
     cdef Py_ssize_t[::1] ring
     cdef unsigned char[:, ::1] around, least, best
 
@@ -21,10 +21,11 @@ cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int
 @cython.locals(y=cython.int, at=cython.int, darkest=cython.uchar)
 cdef bint is_dark(Scores scores, const unsigned char[::1] image, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(y=cython.int, first=cython.int, last=cython.int, w=cython.int, at=cython.int, count=cython.int,
-               word=cython.ulonglong, add=cython.ulonglong)
+               word=cython.ulonglong, add=cython.ulonglong, hits=cython.int, k=cython.int, start=cython.int)
 cdef int list_above(Scores scores, int threshold, int left, int top, int right, int bottom) noexcept nogil
-@cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, at=cython.Py_ssize_t, on=cython.Py_ssize_t,
-               count=cython.Py_ssize_t, grey=cython.int, score=cython.int)
+@cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, at=cython.Py_ssize_t, first=cython.Py_ssize_t,
+               second=cython.Py_ssize_t, third=cython.Py_ssize_t, fourth=cython.Py_ssize_t, count=cython.Py_ssize_t,
+               grey=cython.int, score=cython.int)
 cdef int score_block(Scores scores, const unsigned char[::1] image, int threshold, int start, int end,
                      int corners) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, eight=cython.uchar, ends=cython.uchar)

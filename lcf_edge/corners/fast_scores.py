@@ -31,8 +31,9 @@ class Scores:
     """Scores of the pixels of an image, row after row, and work space. ``dark``: grey level below which a pixel is.
 
     ``plane``: uint8, of each pixel, or a bound of it; ``words``: the same memory, 8 pixels each; ``above``: int32,
-    the pixels above a threshold; ``ring``: how much farther on each of the 16 lies. ``around``, ``least``,
-    ``best``: of the pixels that are scored together those of the ring, uint8 (16, ``BLOCK``), and work space.
+    the pixels above a threshold, and ``some``: int32, the words of a row that have any; ``ring``: how much farther on
+    each of the 16 lies. ``around``, ``least``, ``best``: of the pixels that are scored together those of the ring,
+    uint8 (16, ``BLOCK``), and work space.
     """
 
     def __init__(self, width: int, height: int, dark: int) -> None:
@@ -40,6 +41,7 @@ class Scores:
         words = np.zeros(width * height // 8 + 1, np.uint64)
         self.words, self.plane = memory_of(words), memory_of(words.view(np.uint8))
         self.above = integers(width * height)
+        self.some = integers(width // 8 + 2)
         self.ring = memory_of(np.array(RING_PX) @ (1, width))
         self.around, self.least, self.best = octets(16, BLOCK), octets(16, BLOCK), octets(2, BLOCK)
 
@@ -110,17 +112,24 @@ def is_dark(scores: Scores, image: Column, left: int, top: int, right: int, bott
 
 
 def list_above(scores: Scores, threshold: int, left: int, top: int, right: int, bottom: int) -> int:
-    """List the pixels of a part that are above the threshold in ``above``. Return how many there are."""
-    count, words, plane, found = 0, scores.words, scores.plane, scores.above
+    """List the pixels of a part that are above the threshold in ``above``. Return how many there are.
+
+    Entries are written before it is known whether they stay: a branch that cannot be guessed would take longer.
+    """
+    count, words, plane, found, some = 0, scores.words, scores.plane, scores.above, scores.some
     add = ONES * (127 - min(threshold, 127))
     for y in range(top, bottom):
         first, last = y * scores.width + left, y * scores.width + right
+        hits = 0
         for w in range(first // 8, (last + 7) // 8):
             word = words[w]
-            if (((word & LOW_BITS) + add) | word) & HIGH_BITS:  # one of the 8 is above min(threshold, 127)
-                for at in range(max(8 * w, first), min(8 * w + 8, last)):
-                    found[count] = at
-                    count += plane[at] > threshold
+            some[hits] = w
+            hits += (((word & LOW_BITS) + add) | word) & HIGH_BITS != 0  # one of the 8 is above min(threshold, 127)
+        for k in range(hits):
+            start = 8 * some[k]
+            for at in range(max(start, first), min(start + 8, last)):
+                found[count] = at
+                count += plane[at] > threshold
     return count
 
 
@@ -129,11 +138,13 @@ def score_block(scores: Scores, image: Column, threshold: int, start: int, end: 
 
     Those above the threshold move forward to ``corners``; return where the next ones go.
     """
-    around, best, above, count = scores.around, scores.best, scores.above, end - start
-    for k in range(16):
-        on = scores.ring[k]
-        for i in range(count):
-            around[k, i] = image[above[start + i] + on]
+    around, best, above, ring, count = scores.around, scores.best, scores.above, scores.ring, end - start
+    for k in range(0, 16, 4):
+        first, second, third, fourth = ring[k], ring[k + 1], ring[k + 2], ring[k + 3]
+        for i in range(count):  # four at once: where they lie is read only once
+            at = above[start + i]
+            around[k, i], around[k + 1, i] = image[at + first], image[at + second]
+            around[k + 2, i], around[k + 3, i] = image[at + third], image[at + fourth]
     brightest_arc(scores, count, 0)
     for k in range(16):
         for i in range(count):

@@ -23,13 +23,13 @@ class ImageQuality:
 
     def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
         """Return what degrades this (height, width) image, in which that many corners were found; usually nothing."""
-        grey = image[::GREY_STEP_PX, ::GREY_STEP_PX]
+        grey = np.ascontiguousarray(image[::GREY_STEP_PX, ::GREY_STEP_PX])
         notes: list[str] = []
         if not corners:
             notes.append("no corners")
         elif corners < FEW_CORNERS:
             notes.append("few corners")
-        if grey.sum() < DARK * grey.size:
+        if cv2.norm(grey, cv2.NORM_L1) < DARK * grey.size:
             notes.append("dark")
         if np.count_nonzero(grey >= BURNT_OUT) > GLARE_SHARE * grey.size:
             notes.append("glare")

@@ -33,6 +33,13 @@ class Squares:
         self.rectangles = integers(self.rows * self.columns, 4)
 
 
+def move(pixel: Grid, strength: Column, samples: Grid, i: int, to: int) -> None:
+    """Move a corner to another row: ``pixel``, int32 (n, 2), ``strength``, float32 (n,), and its appearance."""
+    pixel[to, 0], pixel[to, 1], strength[to] = pixel[i, 0], pixel[i, 1], strength[i]
+    for s in range(16):
+        samples[to, s] = samples[i, s]
+
+
 def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, reach: int) -> int:
     """Move the corners without a stronger one that lies close and looks alike to the front, in the same order.
 
@@ -53,7 +60,7 @@ def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, 
     kept = 0
     for i in range(corners):
         if not beaten[i]:
-            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            move(pixel, strength, samples, i, kept)
             kept += 1
     return kept
 
@@ -137,7 +144,9 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, listed: Column,
             kept += 1
 
 
-def keep_strongest(squares: Squares, pixel: Grid, strength: Column, listed: Column, square: Column, share: int) -> int:
+def keep_strongest(
+    squares: Squares, pixel: Grid, strength: Column, samples: Grid, listed: Column, square: Column, share: int
+) -> int:
     """Move the ``share`` strongest corners of each square to the front, in the same order. Return how many.
 
     ``listed``, ``square``: int32 (n,), written.
@@ -152,7 +161,7 @@ def keep_strongest(squares: Squares, pixel: Grid, strength: Column, listed: Colu
     kept = 0
     for i in range(pixel.shape[0]):
         if square[i] != LEAVES:
-            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            move(pixel, strength, samples, i, kept)
             kept += 1
     return kept
 
@@ -198,7 +207,7 @@ def add_rectangle(squares: Squares, found: int, left: int, right: int, row: int)
     return found + 1
 
 
-def leave_poor(squares: Squares, pixel: Grid, strength: Column, square: Column) -> int:
+def leave_poor(squares: Squares, pixel: Grid, strength: Column, samples: Grid, square: Column) -> int:
     """Move the corners outside the poor squares to the front, in the same order. Return how many.
 
     ``square``: as ``find_poor`` has written it.
@@ -206,6 +215,6 @@ def leave_poor(squares: Squares, pixel: Grid, strength: Column, square: Column) 
     kept = 0
     for i in range(pixel.shape[0]):
         if not squares.poor[square[i]]:
-            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            move(pixel, strength, samples, i, kept)
             kept += 1
     return kept

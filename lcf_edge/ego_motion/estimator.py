@@ -126,17 +126,16 @@ class EgoMotionEstimator:
 
     def add_imu(self, sample: ImuSample) -> None:
         """Take a sample, in time order; one that is not finite, absurd or late is refused and counted."""
-        values: tuple[float, ...] = (*sample.gyro, *sample.accel)
-        if not all(map(isfinite, values)):
-            self._imu.refuse("not finite")
-        elif hypot(*sample.gyro) > _MAX_GYRO_RADPS or hypot(*sample.accel) > _MAX_ACCEL_MPS2:
-            self._imu.refuse("out of range")
-        else:
+        gyro: Sequence[float] = sample.gyro
+        accel: Sequence[float] = sample.accel
+        if hypot(*gyro) <= _MAX_GYRO_RADPS and hypot(*accel) <= _MAX_ACCEL_MPS2:  # NaN is not
             if sample.saturated:
                 self._imu.refuse("saturated")
             if self._axes:
-                values = (*_in_camera_axes(self._axes, sample.gyro), *_in_camera_axes(self._axes, sample.accel))
-            self._imu.add(sample.stamp_ns + self._offset_ns, (*values, sample.saturated))
+                gyro, accel = _in_camera_axes(self._axes, gyro), _in_camera_axes(self._axes, accel)
+            self._imu.add(sample.stamp_ns + self._offset_ns, (*gyro, *accel, sample.saturated))
+        else:
+            self._imu.refuse("out of range" if all(map(isfinite, (*gyro, *accel))) else "not finite")
 
     def add_speed(self, sample: SpeedSample) -> None:
         """Take a sample, in time order; one that is not finite, absurd or late is refused and counted."""

@@ -24,7 +24,7 @@ class Stillness:
         if len(pixel) < _MIN_CORNERS or (self._marks and stamp_ns < self._marks[-1][0]):
             self._marks.clear()
             return None
-        x, y = (pixel + _NEAR_PX).T
+        x, y = np.ascontiguousarray(pixel.T) + _NEAR_PX
         if not self._marks or stamp_ns - self._marks[-1][0] >= _APART_S * 1e9:
             near = np.zeros(self._shape, np.bool_)
             for down in (-_NEAR_PX, 0, _NEAR_PX):

@@ -174,18 +174,20 @@ def look(patches: Patches, image: Bytes, width: int) -> None:
 
 def compare(patches: Patches, p: int) -> None:
     """Sums over the samples that matching takes."""
-    patches.mean = patches.square = patches.shared = 0.0
-    patches.on_across = patches.on_down = patches.on_growing = patches.on_stretching = 0.0
+    mean = square = shared = on_across = on_down = on_growing = on_stretching = 0.0
     for k in range(SAMPLES):
         grey = patches.sampled[k]
         weighed = patches.weight[k] * grey
-        patches.mean += weighed
-        patches.square += weighed * grey
-        patches.shared += weighed * patches.grey[p, k]
-        patches.on_across += patches.across[p, k] * grey
-        patches.on_down += patches.down[p, k] * grey
-        patches.on_growing += patches.growing[p, k] * grey
-        patches.on_stretching += patches.stretching[p, k] * grey
+        mean += weighed
+        square += weighed * grey
+        shared += weighed * patches.grey[p, k]
+        on_across += patches.across[p, k] * grey
+        on_down += patches.down[p, k] * grey
+        on_growing += patches.growing[p, k] * grey
+        on_stretching += patches.stretching[p, k] * grey
+    patches.mean, patches.square, patches.shared = mean, square, shared
+    patches.on_across, patches.on_down = on_across, on_down
+    patches.on_growing, patches.on_stretching = on_growing, on_stretching
 
 
 def bounded(value: float, most: float) -> float:

@@ -223,11 +223,14 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
     one, other = flow.length(ax, ay), flow.length(bx, by)
     slower, faster = min(one, other), max(one, other)
+    near = max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster)
+    far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
+    if distance >= max(near, far):  # most are
+        return False
     difference = flow.length(ax - bx, ay - by)
     noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
-    if distance >= max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster):
-        far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
-        return distance < far and max(difference, noise) < FAR_LIKE_SPEED * faster
+    if distance >= near:
+        return max(difference, noise) < FAR_LIKE_SPEED * faster
     if difference < noise + FASTEST_EXPANSION / around.horizon_s * distance:
         return True
     return (

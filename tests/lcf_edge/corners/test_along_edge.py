@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.corners.along_edge import BORDER_PX, keep_round
+from lcf_edge.corners.along_edge import BORDER_PX, WITHIN, keep_round
 from lcf_edge.corners.along_edge import roundness as roundness_at
 
 Grey = npt.NDArray[np.uint8]
@@ -17,7 +17,7 @@ MIDDLE = 20, 20
 
 
 def roundness(image: Grey, x: int, y: int) -> float:
-    return roundness_at(image.ravel().data, image.shape[1], x, y)
+    return roundness_at(image.ravel().data, image.shape[1], WITHIN, x, y)
 
 
 def half_plane(degrees: float) -> Grey:
@@ -31,7 +31,7 @@ def half_plane(degrees: float) -> Grey:
 def test_it_is_the_ratio_of_opencvs_eigenvalues(noise: Callable[..., Grey], seed: int) -> None:
     image = noise(seed, 40, 30)
     y, x = np.mgrid[BORDER_PX : 30 - BORDER_PX, BORDER_PX : 40 - BORDER_PX]
-    both = cv2.cornerEigenValsAndVecs(image, 2 * BORDER_PX - 1, 3)[y, x, :2]
+    both = cv2.cornerEigenValsAndVecs(image, 7, 3)[y, x, :2]
     expected = both.min(axis=2) / both.max(axis=2)
     found = [roundness(image, *at) for at in zip(x.ravel().tolist(), y.ravel().tolist(), strict=True)]
     np.testing.assert_allclose(found, expected.ravel(), atol=2e-4)
@@ -58,7 +58,9 @@ def test_a_plain_picture_has_none() -> None:
 
 
 @given(
-    places=st.lists(st.tuples(st.integers(BORDER_PX, 35), st.integers(BORDER_PX, 25)), max_size=30),
+    places=st.lists(
+        st.tuples(st.integers(BORDER_PX, 39 - BORDER_PX), st.integers(BORDER_PX, 29 - BORDER_PX)), max_size=30
+    ),
     least=st.floats(0, 0.5),
 )
 def test_what_is_round_is_kept_in_its_order_with_its_strength(
@@ -67,6 +69,6 @@ def test_what_is_round_is_kept_in_its_order_with_its_strength(
     image = noise(3, 40, 30)
     pixel = np.array(places, np.int32).reshape(-1, 2)
     strength = np.arange(len(pixel), dtype=np.float32)
-    count = keep_round(image.ravel().data, 40, pixel.data, strength.data, least)
+    count = keep_round(image.ravel().data, 40, WITHIN, pixel.data, strength.data, least)
     kept = [(at, k) for k, at in enumerate(places) if roundness(image, *at) >= least]
     assert [(tuple(at), k) for at, k in zip(pixel[:count].tolist(), strength[:count].tolist(), strict=True)] == kept

@@ -28,8 +28,8 @@ def distinct(
     """Those of corners that are kept; without ``samples`` all look alike."""
     if samples is None:
         samples = np.tile(EDGE, (len(pixel), 1))
-    pixel = pixel.copy()
-    count = keep_distinct(pixel.data, strength.copy().data, samples.data, np.empty(len(pixel), np.uint8).data, reach)
+    pixel, looks = pixel.copy(), samples.copy()
+    count = keep_distinct(pixel.data, strength.copy().data, looks.data, np.empty(len(pixel), np.uint8).data, reach)
     return pixel[:count].tolist()
 
 
@@ -127,13 +127,14 @@ def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, 
     pixel = in_image(places)
     strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
     square = squares(pixel, image().side_px)
+    looks = np.random.default_rng(seed).integers(0, 256, (len(pixel), 16), np.uint8)
     expected = []
     for row, name in enumerate(square):
         stronger = sum(strength[other] > strength[row] for other, each in enumerate(square) if each == name)
         if stronger < most:
-            expected.append((pixel[row].tolist(), float(strength[row])))
-    kept, how_strong = strongest(image(), pixel.copy(), strength.copy(), most)
-    assert list(zip(kept.tolist(), how_strong.tolist(), strict=True)) == expected
+            expected.append((pixel[row].tolist(), float(strength[row]), looks[row].tolist()))
+    found = strongest(image(), (pixel.copy(), strength.copy(), looks.copy()), most)
+    assert list(zip(*(each.tolist() for each in found), strict=True)) == expected
 
 
 @given(places=PLACES, first_row=st.integers(0, 5), without=st.sets(st.integers(0, 191)))
@@ -161,7 +162,8 @@ def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
 
     rich = [at for at in pixel.tolist() if not poor[at[1] // looked_at.side_px][at[0] // looked_at.side_px]]
     strength = np.zeros(len(pixel), np.float32)
-    left_over = leave_poor(looked_at, pixel.data, strength.data, square.data)
+    looks = np.zeros((len(pixel), 16), np.uint8)
+    left_over = leave_poor(looked_at, pixel.data, strength.data, looks.data, square.data)
     assert pixel[:left_over].tolist() == rich
 
 
