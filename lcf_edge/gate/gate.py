@@ -1,19 +1,22 @@
 """Lets parties through to the daemon. Whatever strangers do takes no more than ``MAX_STRANGERS`` descriptors.
 
 A connection is a stranger's until its TLS handshake has shown a certificate. The oldest stranger gives way to the
-newest: an honest handshake is over in a few round trips, long before so many others have come.
+newest: an honest handshake is over in a few round trips, long before so many others have come. What a party says is
+read on its way: one whose keys are beyond the limits of ``key_limits`` is cut before the daemon hears of them.
 """
 
 import asyncio
 import gc
 import signal
 import socket
-from collections import Counter
+from collections import Counter, defaultdict
 from contextlib import suppress
 from typing import Any
 
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.gate.certificates import ROVER_NAME, Certificates, common_name
+from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.zenoh_batches import GREETINGS, LENGTH_BYTES, NotUnderstoodError
 
 MAX_STRANGERS = 64
 HANDSHAKE_S = 5.0
@@ -55,6 +58,7 @@ class Gate:
         self._certificates = certificates
         self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
         self._parties: dict[asyncio.Task[None], str] = {}
+        self._wild: defaultdict[str, set[bytes]] = defaultdict(set)  # keys with wildcards, by name
         self._gone = 0
 
     async def accept(self, listening: socket.socket) -> None:
@@ -155,13 +159,39 @@ class Gate:
             self.counts["daemon away"] += 1
             return
         self.counts[f"let in {name}"] += 1
-        pumps = [asyncio.create_task(_pump(*way)) for way in ((outer[0], inner[1]), (inner[0], outer[1]))]
+        limits = KeyLimits(self._wild[name])
+        pumps = [
+            asyncio.create_task(_pump_in(outer[0], inner[1], limits)),
+            asyncio.create_task(_pump(inner[0], outer[1])),
+        ]
         try:
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            if pumps[0].done():
+                pumps[0].result()
+        except RefusedKeyError as refused:
+            self.counts[f"{refused} of {name}"] += 1
+        except NotUnderstoodError:
+            self.counts[f"not understood {name}"] += 1
         finally:
             for pump in pumps:
                 pump.cancel()
             inner[1].transport.abort()
+
+
+async def _pump_in(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limits: KeyLimits) -> None:
+    """Like ``_pump``, batch by batch. Raises ``RefusedKeyError``, ``NotUnderstoodError``."""
+    greetings = GREETINGS
+    with suppress(OSError, asyncio.IncompleteReadError):
+        while True:
+            async with asyncio.timeout(SILENCE_S):
+                length = await reader.readexactly(LENGTH_BYTES)
+                batch = await reader.readexactly(int.from_bytes(length, "little"))
+                if greetings:
+                    greetings -= 1
+                else:
+                    limits.check(batch)
+                writer.write(length + batch)
+                await writer.drain()
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

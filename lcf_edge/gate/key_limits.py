@@ -1,0 +1,56 @@
+"""Which keys a party may use. Zenoh has no limits for them.
+
+Zenoh compares a key with wildcards with all others that it keeps: a few thousand take half a minute and hundreds of
+MiB, which come back neither when the party leaves nor when the session ends. A single one with ten ``**`` beside one of
+forty levels takes GiB.
+"""
+
+from lcf_edge.gate.zenoh_batches import Key, keys
+
+MOST_LEVELS = 20
+MOST_BRANCHES = 2  # ``**`` and ``$*`` in one key
+MOST_WILD = 16  # different keys with wildcards that Zenoh keeps of one name, ever
+MOST_KEY_BYTES = 512
+MOST_DECLARED_BYTES = 2**17  # of one connection
+_DECLARATION_BYTES = 64
+
+
+class RefusedKeyError(Exception):
+    """``str``: why, in a few words."""
+
+
+class KeyLimits:
+    """Of one connection. ``wild``: the keys with wildcards of all connections of that name so far."""
+
+    def __init__(self, wild: set[bytes]) -> None:
+        self._wild = wild
+        self._declared: dict[int, bytes] = {}
+        self._declared_bytes = 0
+
+    def check(self, batch: bytes) -> None:
+        """Raises ``RefusedKeyError`` for a key beyond the limits, ``NotUnderstoodError`` for no batch of Zenoh's."""
+        for key in keys(batch):
+            self._check(key)
+
+    def _check(self, key: Key) -> None:
+        whole = self._declared.get(key.scope, b"") + key.suffix
+        if len(whole) > MOST_KEY_BYTES or whole.count(b"/") >= MOST_LEVELS:
+            raise RefusedKeyError("a key too long")
+        if whole.count(b"**") + whole.count(b"$*") > MOST_BRANCHES:
+            raise RefusedKeyError("a key with too many wildcards")
+        if key.declared_as:
+            self._declare(key.declared_as, whole)
+        if key.is_kept and b"*" in whole and whole not in self._wild:
+            if len(self._wild) >= MOST_WILD:
+                raise RefusedKeyError("too many keys with wildcards")
+            self._wild.add(whole)
+
+    def _declare(self, number: int, whole: bytes) -> None:
+        """Zenoh may still know another key by that number, whatever was said of it since: so each is for one key."""
+        if self._declared.setdefault(number, whole) is not whole:
+            if self._declared[number] != whole:
+                raise RefusedKeyError("a number of two keys")
+            return
+        self._declared_bytes += len(whole) + _DECLARATION_BYTES
+        if self._declared_bytes > MOST_DECLARED_BYTES:
+            raise RefusedKeyError("too many keys")
