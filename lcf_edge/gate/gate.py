@@ -16,6 +16,7 @@ from typing import Any
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.gate.certificates import ROVER_NAME, Certificates, common_name
 from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.pace import Pace
 from lcf_edge.gate.zenoh_batches import GREETINGS, LENGTH_BYTES, NotUnderstoodError
 
 MAX_STRANGERS = 64
@@ -181,17 +182,22 @@ class Gate:
 async def _pump_in(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limits: KeyLimits) -> None:
     """Like ``_pump``, batch by batch. Raises ``RefusedKeyError``, ``NotUnderstoodError``."""
     greetings = GREETINGS
+    pace = Pace(asyncio.get_running_loop().time)
     with suppress(OSError, asyncio.IncompleteReadError):
         while True:
             async with asyncio.timeout(SILENCE_S):
                 length = await reader.readexactly(LENGTH_BYTES)
                 batch = await reader.readexactly(int.from_bytes(length, "little"))
+                messages = 0
                 if greetings:
                     greetings -= 1
                 else:
-                    limits.check(batch)
+                    messages = limits.check(batch)
                 writer.write(length + batch)
                 await writer.drain()
+            wait_s = pace.wait_s(1 + messages)
+            if wait_s:
+                await asyncio.sleep(wait_s)
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

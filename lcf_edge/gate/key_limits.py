@@ -27,10 +27,15 @@ class KeyLimits:
         self._declared: dict[int, bytes] = {}
         self._declared_bytes = 0
 
-    def check(self, batch: bytes) -> None:
-        """Raises ``RefusedKeyError`` for a key beyond the limits, ``NotUnderstoodError`` for no batch of Zenoh's."""
-        for key in keys(batch):
+    def check(self, batch: bytes) -> int:
+        """Return the number of messages in a batch.
+
+        Raises ``RefusedKeyError`` for a key beyond the limits, ``NotUnderstoodError`` for no batch of Zenoh's.
+        """
+        found, messages = keys(batch)
+        for key in found:
             self._check(key)
+        return messages
 
     def _check(self, key: Key) -> None:
         whole = self._declared.get(key.scope, b"") + key.suffix

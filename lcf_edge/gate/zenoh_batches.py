@@ -42,15 +42,17 @@ class Key:
     is_kept: bool = True  # Zenoh keeps it, and compares it with all others
 
 
-def keys(batch: bytes) -> list[Key]:
-    """Return the keys in a batch, in their order. Raises ``NotUnderstoodError``."""
+def keys(batch: bytes) -> tuple[list[Key], int]:
+    """Return the keys in a batch, in their order, and the number of its messages. Raises ``NotUnderstoodError``."""
     reading = _Reading(batch)
+    messages = 0
     try:
         while reading.left:
             reading.transport_message()
+            messages += 1
     except IndexError as error:
         raise NotUnderstoodError from error
-    return reading.keys
+    return reading.keys, messages
 
 
 class _Reading:

@@ -38,7 +38,6 @@ from lcf_edge.config import Config, Publish, load, to_toml
 from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
-from lcf_edge.gate import zenoh_batches
 from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
 from lcf_edge.gate.zenoh_batches import NotUnderstoodError
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
@@ -211,10 +210,10 @@ def parties(_: Path) -> Iterator[Take]:
     def take(data: bytes) -> str:
         limits = KeyLimits(set())
         try:
-            limits.check(data)
+            messages = limits.check(data)
         except (RefusedKeyError, NotUnderstoodError) as error:
             return f"{type(error).__name__} {error}"
-        return f"{len(zenoh_batches.keys(data))} keys"
+        return f"{messages} messages"
 
     yield take
 

@@ -67,6 +67,12 @@ class Peer:
         """Whether or not somebody subscribed."""
         self.session.put(key, bytes.fromhex(payload), congestion_control=zenoh.CongestionControl.BLOCK)
 
+    def put_forever(self, keys: list[str]) -> None:
+        """As fast as it can."""
+        while True:
+            for key in keys:
+                self.session.put(key, b"")
+
     def delete(self, key: str) -> None:
         self.session.delete(key, congestion_control=zenoh.CongestionControl.BLOCK)
 

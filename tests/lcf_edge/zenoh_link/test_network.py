@@ -322,6 +322,20 @@ def test_a_party_whose_keys_are_too_much_is_cut_before_the_daemon_hears_of_them(
     assert resident_mib() < before_mib + MOST_GROWN_MIB
 
 
+def test_a_party_that_says_much_keeps_no_other_out(link: Link, rover: zenoh.Session, party: Any) -> None:
+    assert link
+    assert rover
+    talkers = [party("wheels", mode="client") for _ in range(6)]
+    for talker in talkers:
+        assert talker.ask("connected")
+    for talker in talkers:
+        talker.tell("put_forever", keys=["lcf/none"])
+    for _ in range(3):
+        planner = party("planner")
+        assert planner.ask("connected", timeout_s=2.0)
+        assert len(planner.get("lcf/query/config")) == 1
+
+
 def test_a_party_of_many_words_is_understood(link: Link, rover: zenoh.Session, party: Any, velocity: Velocity) -> None:
     """Everything that a session can say, in each mode."""
     assert rover
