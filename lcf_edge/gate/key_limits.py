@@ -11,7 +11,7 @@ MOST_LEVELS = 20
 MOST_BRANCHES = 2  # ``**`` and ``$*`` in one key
 MOST_WILD = 16  # different keys with wildcards that Zenoh keeps of one name, ever
 MOST_KEY_BYTES = 512
-MOST_DECLARED_BYTES = 2**17  # of one connection
+MOST_DECLARED_BYTES = 2**17  # of all keys and numbers of one connection
 _DECLARATION_BYTES = 64
 
 
@@ -25,6 +25,7 @@ class KeyLimits:
     def __init__(self, wild: set[bytes]) -> None:
         self._wild = wild
         self._declared: dict[int, bytes] = {}
+        self._kept: set[bytes] = set()
         self._declared_bytes = 0
 
     def check(self, batch: bytes) -> int:
@@ -43,19 +44,20 @@ class KeyLimits:
             raise RefusedKeyError("a key too long")
         if whole.count(b"**") + whole.count(b"$*") > MOST_BRANCHES:
             raise RefusedKeyError("a key with too many wildcards")
-        if key.declared_as:
-            self._declare(key.declared_as, whole)
+        if key.declared_as and key.declared_as not in self._declared:
+            self._declared[key.declared_as] = whole
+            self._count(whole)
+        elif key.declared_as and self._declared[key.declared_as] != whole:
+            raise RefusedKeyError("a number of two keys")  # Zenoh may know it as either, whatever was taken back since
+        if key.is_kept and whole not in self._kept:
+            self._kept.add(whole)
+            self._count(whole)
         if key.is_kept and b"*" in whole and whole not in self._wild:
             if len(self._wild) >= MOST_WILD:
                 raise RefusedKeyError("too many keys with wildcards")
             self._wild.add(whole)
 
-    def _declare(self, number: int, whole: bytes) -> None:
-        """Zenoh may still know another key by that number, whatever was said of it since: so each is for one key."""
-        if self._declared.setdefault(number, whole) is not whole:
-            if self._declared[number] != whole:
-                raise RefusedKeyError("a number of two keys")
-            return
+    def _count(self, whole: bytes) -> None:
         self._declared_bytes += len(whole) + _DECLARATION_BYTES
         if self._declared_bytes > MOST_DECLARED_BYTES:
             raise RefusedKeyError("too many keys")

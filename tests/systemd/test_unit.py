@@ -12,7 +12,8 @@ from lcf_edge.config import Config
 from lcf_edge.daemon.descriptors import RESERVED
 from lcf_edge.daemon.loop import FRAME_WAIT_S
 from lcf_edge.daemon.service import ENDS_WITHIN_S, TICK_S
-from lcf_edge.gate.gate import MAX_PARTIES, MAX_STRANGERS
+from lcf_edge.gate.entrances import MAX_PARTIES
+from lcf_edge.gate.gate import MAX_STRANGERS
 from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, CLOSING_S
 
 SHIPPED = Path(__file__).parents[2] / "systemd"

@@ -96,11 +96,17 @@ def test_a_number_stands_for_one_key_even_if_it_was_taken_back(limits: KeyLimits
 
 def test_what_one_connection_declares_is_bounded(limits: KeyLimits) -> None:
     most = MOST_DECLARED_BYTES // MOST_KEY_BYTES
-    many = [declared(number, f"{number:0{MOST_KEY_BYTES}}") for number in range(1, 128)]
-    assert len(many) < most
-    limits.check(FRAME + b"".join(many) * 9)  # the same again: no more than once
-    more = [FRAME + b"\x1e\x20" + written(n) + b"\x00\x80\x04" + b"a" * MOST_KEY_BYTES for n in range(128, most)]
-    assert sum(_passes(limits, one) for one in more) < len(more)
+    few = [subscribed(f"{number:0{MOST_KEY_BYTES}}") for number in range(most // 2)]
+    for _ in range(9):
+        limits.check(FRAME + b"".join(few))  # the same again: no more than once
+    more = [subscribed(f"{number:0{MOST_KEY_BYTES}}") for number in range(most // 2, most)]
+    assert sum(_passes(limits, FRAME + one) for one in more) < len(more)
+
+
+def test_so_many_numbers_of_one_key_are_bounded_too(limits: KeyLimits) -> None:
+    numbers = range(1, 2**16)
+    said = [b"\x1e\x20" + written(number) + b"\x00\x09lcf/scene" for number in numbers]
+    assert sum(_passes(limits, FRAME + one) for one in said) < 2000
 
 
 def _passes(limits: KeyLimits, batch: bytes) -> bool:

@@ -22,7 +22,8 @@ import pytest
 import zenoh
 
 from lcf_edge.config import Config, Zenoh
-from lcf_edge.gate.gate import HANDSHAKE_S, MAX_OF_ONE_NAME, MAX_STRANGERS
+from lcf_edge.gate.entrances import HANDSHAKE_S, MAX_OF_ONE_NAME
+from lcf_edge.gate.gate import MAX_STRANGERS
 from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import opened_session
 from lcf_edge.zenoh_link.link import Link
