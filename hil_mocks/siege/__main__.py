@@ -27,6 +27,7 @@ from hil_mocks.siege.attacks import (
     page_is_served,
     pause,
     reloads,
+    wild,
 )
 from hil_mocks.siege.place import Process, certificates, planner_settings, rover_settings
 from lcf_edge.cdr import decode_diagnostics, decode_scene
@@ -142,6 +143,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
         Attack("wrong frames", 0.1, frames(page_port)),
         Attack("liar", 0.5, liar(f"tcp/127.0.0.1:{local}")),
         Attack("declarer", 1.0, declarer(f"tcp/127.0.0.1:{local}")),
+        Attack("wild keys", 0.5, wild(f"tls/localhost:{outer}", str(planner_settings(folder / "tls")))),
         Attack("flood", 0.5, flood(f"tcp/127.0.0.1:{local}")),
         Attack("reload", 1.0, reloads(file, to_toml(config))),
         wild_imu,

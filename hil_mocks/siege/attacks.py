@@ -24,6 +24,8 @@ from lcf_edge.zenoh_link import opened_session
 HELD = 150  # sockets of one attack
 CONNECT_S = 1.0
 DECLARED = 1000  # keys of a kind at a time
+LEVELS = 40  # of a key
+WILD, WILD_S = 100, 0.5  # keys with wildcards at a time; how long
 LINES, LINES_AT_ONCE = 1000, 50  # of a serial IMU
 FLOOD = 500  # messages and questions at a time
 HTTP = b"GET / HTTP/1.0\r\n\r\n"
@@ -131,6 +133,23 @@ def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
             tokens = [session.liveliness().declare_token(f"{key}/{n}") for n in range(DECLARED)]
             publishers = [session.declare_publisher(f"{key}/offered/{n}") for n in range(DECLARED)]
             del tokens, publishers
+
+    return wave
+
+
+def wild(endpoint: str, settings: str, prefix: str = "lcf") -> Callable[[], None]:
+    """A party with a certificate whose keys take Zenoh long to compare: one with many wildcards, and many with two."""
+    turn = iter(range(2**30))
+    options = Zenoh(mode="client", connect=[endpoint], listen=[], config_file=settings)
+
+    def wave() -> None:
+        number = next(turn)
+        with opened_session(options) as first, opened_session(options) as second:
+            deep = first.declare_publisher("/".join("a" * LEVELS))
+            many = [second.declare_publisher(f"{prefix}/**/{number}/**/{n}") for n in range(WILD)]
+            one = second.declare_publisher("**/a/" * (LEVELS // 4) + str(number))
+            time.sleep(WILD_S)  # the sessions come again when they are cut
+            del deep, many, one
 
     return wave
 

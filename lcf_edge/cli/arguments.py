@@ -124,13 +124,15 @@ def parser() -> argparse.ArgumentParser:
     )
 
     gate = commands.add_parser(
-        "gate", allow_abbrev=False, help="before the daemon's TLS port: keeps strangers away from it"
+        "gate", allow_abbrev=False, help="before the daemon: keeps strangers away from it, and what is too much"
     )
-    gate.add_argument("--tls", type=Path, required=True, metavar="DIR", help="certificates, as docs/network.md says")
-    gate.add_argument("--listen", default="0.0.0.0", metavar="HOST", help="where parties connect (%(default)s)")
+    gate.add_argument(
+        "--tls", type=Path, metavar="DIR", help="certificates, as docs/network.md says; without: for this machine"
+    )
+    gate.add_argument("--listen", metavar="HOST", help="where parties connect (0.0.0.0; without --tls 127.0.0.1)")
     gate.add_argument("--port", type=_whole(0, 65535), default=7447, metavar="N", help="(%(default)s)")
     gate.add_argument(
-        "--to", type=_whole(1, 65535), default=7448, metavar="N", help="the daemon's port on 127.0.0.1 (%(default)s)"
+        "--to", metavar="PLACE", help="the daemon's port on 127.0.0.1 (7448); without --tls its Unix socket"
     )
 
     view = commands.add_parser(

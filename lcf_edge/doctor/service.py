@@ -22,7 +22,6 @@ _PROPERTIES = (
 _ENDS = {
     "watchdog": "the pipeline hung and the watchdog killed it",
     "oom-kill": "it took more memory than MemoryMax",
-    "start-limit-hit": "it failed ten times in two minutes",
     "timeout": "it did not start or stop in time",
     "signal": "a signal killed it",
 }

@@ -1,42 +1,40 @@
 """Lets parties through to the daemon. Whatever strangers do takes no more than ``MAX_STRANGERS`` descriptors.
 
 A connection is a stranger's until its TLS handshake has shown a certificate. The oldest stranger gives way to the
-newest: an honest handshake is over in a few round trips, long before so many others have come.
+newest: an honest handshake is over in a few round trips, long before so many others have come. What a party says is
+read on its way: one whose keys are beyond the limits of ``key_limits`` is cut before the daemon hears of them.
 """
 
 import asyncio
 import gc
 import signal
 import socket
-from collections import Counter
+from collections import Counter, defaultdict
 from contextlib import suppress
 from typing import Any
 
 from lcf_edge.daemon.log import LOGGER
-from lcf_edge.gate.certificates import ROVER_NAME, Certificates, common_name
+from lcf_edge.gate.entrances import MAX_PARTIES, PIECE_BYTES, Entrance, Party
+from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.pace import Pace
+from lcf_edge.gate.zenoh_batches import GREETINGS, LENGTH_BYTES, NotUnderstoodError
 
 MAX_STRANGERS = 64
-HANDSHAKE_S = 5.0
-MAX_OF_ONE_NAME = 8  # connections of one common name
-MAX_PARTIES = 32  # connections in all
 DIAL_S = 2.0
 SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
-PIECE_BYTES = 2**16
 PAUSE_S = 0.1  # when the system refuses a connection
 TELL_EACH_S = 10.0
 COLLECT_EACH = 32  # connections: asyncio leaves each in a reference cycle with 256 KiB of buffer
 BACKLOG = 128
 
-Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
-
-async def serve(listening: socket.socket, daemon: tuple[str, int], certificates: Certificates) -> None:
+async def serve(listening: socket.socket, entrance: Entrance) -> None:
     """Until SIGINT or SIGTERM."""
     loop = asyncio.get_running_loop()
     loop.set_exception_handler(lambda *_: None)  # of connections: counted where they end
     gc.collect()
     gc.freeze()  # objects that exist now stay: collections are short
-    gate = Gate(daemon, certificates)
+    gate = Gate(entrance)
     tasks = [loop.create_task(gate.accept(listening)), loop.create_task(gate.tell())]
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, lambda: [task.cancel() for task in tasks])
@@ -48,13 +46,13 @@ async def serve(listening: socket.socket, daemon: tuple[str, int], certificates:
 class Gate:
     """``counts``: ``let in``, and of those who were not: ``no certificate``, ``gave way``, ``unknown NAME``, …"""
 
-    def __init__(self, daemon: tuple[str, int], certificates: Certificates) -> None:
+    def __init__(self, entrance: Entrance) -> None:
         self.counts: Counter[str] = Counter()
         self._reported: Counter[str] = Counter()
-        self._daemon = daemon
-        self._certificates = certificates
+        self._entrance = entrance
         self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
         self._parties: dict[asyncio.Task[None], str] = {}
+        self._wild: defaultdict[str, set[bytes]] = defaultdict(set)  # keys with wildcards, by name
         self._gone = 0
 
     async def accept(self, listening: socket.socket) -> None:
@@ -105,63 +103,86 @@ class Gate:
         task = asyncio.current_task()
         assert task is not None
         try:
-            outer = await self._handshake(connection)
+            party = await self._met(connection)
         except (OSError, asyncio.IncompleteReadError):
-            self.counts["no certificate"] += 1
+            self.counts[self._entrance.stranger] += 1
             return
         finally:
             self._strangers.pop(task, None)
         try:
-            name = common_name(outer[1].get_extra_info("ssl_object"))
-            refusal = self._refusal(name)
+            refusal = self._refusal(party.name)
             if refusal:
                 self.counts[refusal] += 1
                 return
-            self._parties[task] = name
-            await self._through(outer, name)
+            self._parties[task] = party.name
+            await self._through(party)
         finally:
-            outer[1].transport.abort()  # closing would wait 30 s for a farewell, and hold a descriptor meanwhile
+            party.stream[1].transport.abort()  # closing would wait 30 s for a farewell, and hold a descriptor meanwhile
 
-    async def _handshake(self, connection: socket.socket) -> Stream:
-        loop = asyncio.get_running_loop()
-        reader = asyncio.StreamReader(PIECE_BYTES)
-        protocol = asyncio.StreamReaderProtocol(reader)
+    async def _met(self, connection: socket.socket) -> Party:
         try:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            transport, _ = await loop.connect_accepted_socket(
-                lambda: protocol, connection, ssl=self._certificates.server, ssl_handshake_timeout=HANDSHAKE_S
-            )
+            return await self._entrance.meet(connection)
         except BaseException:
             connection.close()
             raise
-        return reader, asyncio.StreamWriter(transport, protocol, reader, loop)
 
     def _refusal(self, name: str) -> str:
         """Return why a party is not let in; empty: it is."""
-        if name not in self._certificates.parties:
+        if not self._entrance.knows(name):
             return "of no known name"
         names = list(self._parties.values())
-        if len(names) >= MAX_PARTIES or names.count(name) >= MAX_OF_ONE_NAME:
+        if len(names) >= MAX_PARTIES or names.count(name) >= self._entrance.most_of_one_name:
             return f"too many of {name}"
         return ""
 
-    async def _through(self, outer: Stream, name: str) -> None:
+    async def _through(self, party: Party) -> None:
+        name, outer = party.name, party.stream
         try:
             async with asyncio.timeout(DIAL_S):
-                inner = await asyncio.open_connection(
-                    *self._daemon, ssl=self._certificates.parties[name], server_hostname=ROVER_NAME, limit=PIECE_BYTES
-                )
+                inner = await self._entrance.dial(name)
         except OSError:  # also a timeout
             self.counts["daemon away"] += 1
             return
         self.counts[f"let in {name}"] += 1
-        pumps = [asyncio.create_task(_pump(*way)) for way in ((outer[0], inner[1]), (inner[0], outer[1]))]
+        inner[1].write(party.said)
+        pumps = [
+            asyncio.create_task(_pump_in(outer[0], inner[1], KeyLimits(self._wild[name]), bool(party.said))),
+            asyncio.create_task(_pump(inner[0], outer[1])),
+        ]
         try:
             await asyncio.wait(pumps, return_when=asyncio.FIRST_COMPLETED)
+            if pumps[0].done():
+                pumps[0].result()
+        except RefusedKeyError as refused:
+            self.counts[f"{refused} of {name}"] += 1
+        except NotUnderstoodError:
+            self.counts[f"not understood {name}"] += 1
         finally:
             for pump in pumps:
                 pump.cancel()
             inner[1].transport.abort()
+
+
+async def _pump_in(reader: asyncio.StreamReader, writer: asyncio.StreamWriter, limits: KeyLimits, greeted: int) -> None:
+    """Like ``_pump``, batch by batch. Raises ``RefusedKeyError``, ``NotUnderstoodError``."""
+    greetings = GREETINGS - greeted
+    pace = Pace(asyncio.get_running_loop().time)
+    with suppress(OSError, asyncio.IncompleteReadError):
+        while True:
+            async with asyncio.timeout(SILENCE_S):
+                length = await reader.readexactly(LENGTH_BYTES)
+                batch = await reader.readexactly(int.from_bytes(length, "little"))
+                messages = 0
+                if greetings:
+                    greetings -= 1
+                else:
+                    messages = limits.check(batch)
+                writer.write(length + batch)
+                await writer.drain()
+            wait_s = pace.wait_s(1 + messages)
+            if wait_s:
+                await asyncio.sleep(wait_s)
 
 
 async def _pump(reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from drivers.imu import serial_imu
 from lcf_edge.daemon import memory, peers
-from lcf_edge.gate import gate
+from lcf_edge.gate import entrances, gate, key_limits, pace
 from lcf_edge.monitor.web import doorkeeper, server
 from lcf_edge.recording.read.images import _BYTES_A_PIXEL, _DECODER_BYTES
 from lcf_edge.zenoh_link.admission import MAX_MESSAGE_BYTES, access_control
@@ -18,10 +18,19 @@ GATE_UNIT = (ROOT / "systemd/lcf-edge-gate.service").read_text(encoding="utf-8")
 
 
 def test_the_bounds_of_the_gate() -> None:
-    assert f"{gate.MAX_STRANGERS} places, the oldest gives way; {gate.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
-    assert f"{gate.MAX_OF_ONE_NAME} connections of one name, {gate.MAX_PARTIES} of all" in DOCUMENT
+    assert f"{gate.MAX_STRANGERS} places, the oldest gives way; {entrances.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
+    assert f"{entrances.MAX_OF_ONE_NAME} connections of one name, {entrances.MAX_PARTIES} of all" in DOCUMENT
     assert "MemoryMax=96M" in GATE_UNIT
     assert "CPUQuota=50%" in GATE_UNIT
+
+
+def test_what_a_party_may_say() -> None:
+    levels, most_bytes = key_limits.MOST_LEVELS, key_limits.MOST_KEY_BYTES
+    assert key_limits.MOST_BRANCHES == 2
+    assert f"a key of more than {levels} levels, {most_bytes} bytes or two of `**` and `$*`" in DOCUMENT
+    assert f"more than {key_limits.MOST_WILD} different keys with wildcards of one name" in DOCUMENT
+    assert f"more than {key_limits.MOST_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
+    assert f"the gate reads {pace.MOST_PER_S} messages a second" in DOCUMENT
 
 
 def test_the_bounds_of_the_daemon() -> None:

@@ -38,6 +38,8 @@ from lcf_edge.config import Config, Publish, load, to_toml
 from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
+from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.zenoh_batches import NotUnderstoodError
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
@@ -189,6 +191,31 @@ def what_viewers_receive(_: Path) -> Iterator[Take]:
         yield take
     finally:
         monitor.close()
+
+
+def batches() -> Sequence[bytes]:
+    """What a session says: it declares, subscribes, asks, sends, and takes back."""
+    declared = b"\x1e\x20\x01\x00\x09lcf/scene\x1e\x62\x01\x00\x02**\x1e\x82\x02\x01\x21\x05\x1e\x01\x01"
+    interest = b"\x79\x01\x33\x00\x0clcf/@alive/*\x19\x01"
+    asked = b"\xbc\x01\x00\x0blcf/query/*\x26\xe8\x07\xe3\x01\x03a=1\x43\x02\x00b\x1a\x01"
+    stamped = b"\x80\x80\x80\x80\x08\x02ab\xc1\x05\x10ab\x01\x07\x43\x01c"
+    sent = b"\xbd\x00\x09lcf/speed\x21\x05\xa1" + stamped + b"\x03abc"
+    return [b"\x25\x01" + body + b"\x04" for body in (declared, interest, asked, sent)]
+
+
+@target(batches, (b"**", b"$*", b"/", b"\x1e\x20", b"\x1e\x62", b"\x3d\x00", b"\x80", b"\xff"))
+def parties(_: Path) -> Iterator[Take]:
+    """What a party says at the gate."""
+
+    def take(data: bytes) -> str:
+        limits = KeyLimits(set())
+        try:
+            messages = limits.check(data)
+        except (RefusedKeyError, NotUnderstoodError) as error:
+            return f"{type(error).__name__} {error}"
+        return f"{messages} messages"
+
+    yield take
 
 
 @target(lambda: messages()[4:5])

@@ -48,11 +48,15 @@ class Peer:
         self.process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
 
     def ask(self, do: str, **request: Any) -> Any:
-        assert self.process.stdin
+        self.tell(do, **request)
         assert self.process.stdout
+        return json.loads(self.process.stdout.readline())
+
+    def tell(self, do: str, **request: Any) -> None:
+        """And wait for nothing."""
+        assert self.process.stdin
         self.process.stdin.write(json.dumps({"do": do, **request}) + "\n")
         self.process.stdin.flush()
-        return json.loads(self.process.stdout.readline())
 
     def subscribe(self, key: str) -> None:
         self.ask("subscribe", key=key)

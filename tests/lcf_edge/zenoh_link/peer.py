@@ -67,6 +67,12 @@ class Peer:
         """Whether or not somebody subscribed."""
         self.session.put(key, bytes.fromhex(payload), congestion_control=zenoh.CongestionControl.BLOCK)
 
+    def put_forever(self, keys: list[str]) -> None:
+        """As fast as it can."""
+        while True:
+            for key in keys:
+                self.session.put(key, b"")
+
     def delete(self, key: str) -> None:
         self.session.delete(key, congestion_control=zenoh.CongestionControl.BLOCK)
 
@@ -85,6 +91,10 @@ class Peer:
     def offer_many(self, key: str, count: int) -> None:
         """Declare so many publishers."""
         self.kept += [self.session.declare_publisher(f"{key}/{n}") for n in range(count)]
+
+    def offer(self, keys: list[str]) -> None:
+        """Declare publishers."""
+        self.kept += [self.session.declare_publisher(key) for key in keys]
 
     def matched(self, key: str) -> bool:
         """Whether somebody seems to subscribe; what was declared before an answer is known by then."""
@@ -110,8 +120,39 @@ class Peer:
         for replies in asked:
             list(replies)
 
+    def say_everything(self, key: str, payload: str) -> None:
+        """Whatever a session can, and take it back."""
+        session, content = self.session, bytes.fromhex(payload)
+        publisher = session.declare_publisher(key, encoding="application/cdr")
+        querier = session.declare_querier(key)
+        declared = [
+            publisher,
+            querier,
+            *(session.declare_subscriber(each, _ignore) for each in (key, "lcf/**", "lcf/*/a", "**")),
+            session.declare_queryable(f"{key}/answer", _ignore),
+            session.liveliness().declare_token(f"{key}/token"),
+            session.liveliness().declare_subscriber("lcf/@alive/**", _ignore, history=True),
+        ]
+        publisher.put(content, attachment=b"attached", timestamp=session.new_timestamp())
+        publisher.delete(timestamp=session.new_timestamp())
+        session.put(session.declare_keyexpr(f"{key}/other"), content, encoding="text/plain;utf-8", express=True)
+        session.put(key, content, source_info=zenoh.SourceInfo(publisher.id, 7))
+        for number, priority in enumerate(PRIORITIES):
+            reliability = (zenoh.Reliability.RELIABLE, zenoh.Reliability.BEST_EFFORT)[number % 2]
+            session.declare_publisher(key, priority=priority, reliability=reliability).put(bytes(10_000))
+        list(querier.get(payload=content, parameters="a=1", attachment=b"attached"))
+        consolidation = zenoh.ConsolidationMode.NONE
+        list(session.get(key, payload=content, encoding="text/plain", consolidation=consolidation, timeout=1.0))
+        list(session.liveliness().get("lcf/@alive/*", timeout=1.0))
+        for one in declared:
+            one.undeclare()
+
     def tokens(self, key: str) -> list[str]:
         return sorted(str(reply.ok.key_expr) for reply in self.session.liveliness().get(key, timeout=PATIENCE_S))
+
+
+def _ignore(_: object) -> None:
+    pass
 
 
 def described(sample: zenoh.Sample) -> dict[str, Any]:

@@ -22,7 +22,8 @@ import pytest
 import zenoh
 
 from lcf_edge.config import Config, Zenoh
-from lcf_edge.gate.gate import HANDSHAKE_S, MAX_OF_ONE_NAME, MAX_STRANGERS
+from lcf_edge.gate.entrances import HANDSHAKE_S, MAX_OF_ONE_NAME
+from lcf_edge.gate.gate import MAX_STRANGERS
 from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import opened_session
 from lcf_edge.zenoh_link.link import Link
@@ -99,8 +100,18 @@ class Gate:
     def resident_mib(self) -> float:
         return int(Path(f"/proc/{self.process.pid}/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
+    def until_told(self, what: str) -> bool:
+        """Whether it says so in time; else it is ended."""
+        assert self.process.stderr
+        ending = threading.Timer(PATIENCE_S, self.process.terminate)
+        ending.start()
+        try:
+            return any(what in line for line in self.process.stderr)
+        finally:
+            ending.cancel()
+
     def end(self) -> tuple[int, str]:
-        """Exit status, and what it said."""
+        """Exit status, and what it said since."""
         self.process.terminate()
         _, said = self.process.communicate(timeout=PATIENCE_S)
         return self.process.returncode, said
@@ -281,6 +292,64 @@ def test_each_does_what_the_table_says_and_nothing_else(
     assert witness.tokens("lcf/@alive/**") == ["lcf/@alive/rover"]
     assert payloads(one for key in KEYS for one in witness.get(key, SILENCE_S)) == {ROVER}
     assert payloads(one for key in KEYS for one in witness.receive(key, 9, SILENCE_S)) == {ROVER}
+
+
+# Parties whose keys are too much for Zenoh.
+
+WILD = [[f"**/{n}/**" for n in range(3000)]]
+DEEP = [["/".join("a" * 40)], ["**/a/" * 10 + "b"]]
+MOST_GROWN_MIB = 20.0
+
+
+def resident_mib() -> float:
+    return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
+
+
+@pytest.mark.parametrize("offers", [WILD, DEEP], ids=["many-keys", "one-key"])
+def test_a_party_whose_keys_are_too_much_is_cut_before_the_daemon_hears_of_them(
+    link: Link, rover: zenoh.Session, gate: Gate, party: Any, offers: list[list[str]]
+) -> None:
+    assert link
+    assert rover
+    before_mib = resident_mib()
+    for keys in offers:
+        attacker = party("wheels", mode="client")
+        assert attacker.ask("connected")
+        attacker.ask("offer", keys=keys)
+    assert gate.until_told("of wheels")
+    planner = party("planner")
+    assert planner.ask("connected", timeout_s=PATIENCE_S)
+    assert len(planner.get("lcf/query/config")) == 1
+    assert resident_mib() < before_mib + MOST_GROWN_MIB
+
+
+def test_a_party_that_says_much_keeps_no_other_out(link: Link, rover: zenoh.Session, party: Any) -> None:
+    assert link
+    assert rover
+    talkers = [party("wheels", mode="client") for _ in range(6)]
+    for talker in talkers:
+        assert talker.ask("connected")
+    for talker in talkers:
+        talker.tell("put_forever", keys=["lcf/none"])
+    for _ in range(3):
+        planner = party("planner")
+        assert planner.ask("connected", timeout_s=2.0)
+        assert len(planner.get("lcf/query/config")) == 1
+
+
+def test_a_party_of_many_words_is_understood(link: Link, rover: zenoh.Session, party: Any, velocity: Velocity) -> None:
+    """Everything that a session can say, in each mode."""
+    assert rover
+    for mode in ("client", "peer", "router"):
+        talker = party("wheels", mode=mode)
+        talker.ask("say_everything", key="lcf/speed", payload=velocity().hex())
+        taken = link.counts["speed taken"]
+        for _ in range(PATIENCE):
+            talker.put("lcf/speed", velocity())
+            talker.get("lcf/query/config", SILENCE_S)
+            if link.counts["speed taken"] > taken:
+                break
+        assert link.counts["speed taken"] > taken
 
 
 # Strangers at the gate.
