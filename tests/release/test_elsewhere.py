@@ -59,8 +59,28 @@ def test_what_is_tested_is_the_project_with_its_packages(
 
 def test_what_the_tests_need_is_what_the_project_says() -> None:
     needed = {requirement.split(">")[0] for requirement in elsewhere._requirements()}
-    assert {"numpy", "aiohttp", "foxglove-sdk", "pytest", "hypothesis"} <= needed
+    assert {"numpy", "aiohttp", "foxglove-sdk", "av", "distributed", "pytest", "hypothesis"} <= needed
     assert not any(name.startswith("lcf-edge") for name in needed)
+
+
+def test_a_package_that_is_published_as_source_alone_becomes_a_wheel_first(
+    other: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = []
+
+    def do(*command: str) -> str:
+        steps.append(command)
+        if "install" in command:
+            Path(command[command.index("--target") + 1]).mkdir()
+        return ""
+
+    monkeypatch.setattr(elsewhere, "run", do)
+    monkeypatch.setenv("LCF_EDGE_RELEASE_CACHE", str(tmp_path))
+    elsewhere.packages(other, "3.13")
+    wheel, install = steps
+    assert [need.split(">")[0] for need in wheel if ">" in need] == list(elsewhere.WITHOUT_A_WHEEL)
+    assert "--only-binary=:all:" in install
+    assert install[install.index("--find-links") + 1] == wheel[wheel.index("--wheel-dir") + 1]
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may do it")
