@@ -148,7 +148,7 @@ def packages(machine: Machine, version: str) -> Path:
         with tempfile.TemporaryDirectory() as made:
             sources = [need for need in needed if Requirement(need).name in WITHOUT_A_WHEEL]
             run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", made, *sources)
-            install = (*pip, "install", "--quiet", "--target", str(unfinished), "--find-links", made)
+            install = (*pip, "install", "--quiet", "--no-compile", "--target", str(unfinished), "--find-links", made)
             run(*install, *options_for(machine.name, version), *needed)
         unfinished.rename(folder)
     return folder

@@ -21,6 +21,9 @@ CAMERAS = (
 
 PROCESSORS = {"amd64": HERE, "arm64": DEBIAN_13_ON_ARM.processor}
 
+PATIENT = "[Service]\\nWatchdogSec=60\\nTimeoutStartSec=300\\n"
+"""What the units get where the processor is emulated: a busy host may give it no time for longer than they wait."""
+
 _IMAGES = pytest.StashKey[dict[System, Image]]()
 _MACHINE = pytest.StashKey[Machine]()
 
@@ -60,6 +63,11 @@ def booted(config: pytest.Config, system: System, folder: Path) -> Iterator[Mach
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with Machine(config.stash[_IMAGES][_for_arch(config, system)], folder.resolve()) as machine:
+        if machine.emulated:
+            for unit in ("lcf-edge", "lcf-edge@"):
+                drop_in = f"/run/systemd/system/{unit}.service.d"
+                machine.run(f"mkdir -p {drop_in} && printf '{PATIENT}' > {drop_in}/patient.conf")
+            machine.run("systemctl daemon-reload")
         yield machine
 
 
