@@ -86,7 +86,8 @@ class Machine:
             *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
             *("-append", f"console={board.console} {KERNEL}"),
             *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
-            *("-nic", f"user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
+            *("-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
+            *("-device", "virtio-net-pci,netdev=net,romfile="),  # nothing boots from it
             *("-virtfs", f"local,path={self.share},mount_tag=share,security_model=none"),
             *(
                 "-device",
