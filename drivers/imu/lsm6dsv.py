@@ -1,8 +1,8 @@
 """ST LSM6DSV, LSM6DSV16X and LSM6DSV16B, which have the same identity: an LSM6DSO with other rates, ranges and places.
 
-Linux (st_lsm6dsx_core.c) and ST's own driver (lsm6dsv16x_reg.h) agree, and Zephyr's with them. The FIFO has 256 words
-without compression. There is no way to switch I3C off without I2C. The LSM6DSV32X says the same of itself too, but its
-counts of acceleration are worth twice as much: as with an LSM6DSO32, only gravity at rest distinguishes them.
+Linux (st_lsm6dsx_core.c) and ST's own driver (lsm6dsv16x_reg.h) agree. The FIFO has 256 words without compression. I3C
+cannot be switched off without I2C. The LSM6DSV32X says the same of itself too, but its counts of acceleration are worth
+twice as much: as with an LSM6DSO32, only gravity at rest distinguishes them.
 """
 
 import sys

@@ -1,4 +1,4 @@
-"""LSM6DS3, LSM6DSO (DocID026899 rev. 8, DS12140 rev. 2) and LSM6DSV (as Zephyr has it) as registers."""
+"""LSM6DS3, LSM6DSO (DocID026899 rev. 8, DS12140 rev. 2) and LSM6DSV (lsm6dsv16x_reg.h) as registers."""
 
 import math
 import struct
