@@ -29,7 +29,10 @@ from release.foreign_pip import options_for
 SUITES = {"3.11": "bookworm", "3.13": "trixie", "3.14": "forky"}
 """The Debian that has it."""
 
-PACKAGES = ("python3", "libstdc++6", "libc-bin", "tzdata", "dash", "coreutils", "openssl", "procps", "mount")
+PACKAGES = (
+    *("python3", "libstdc++6", "libc-bin", "tzdata", "openssl", "procps", "mount"),
+    *("base-passwd", "bash", "dash", "coreutils", "grep", "sed"),
+)
 TESTS_NEED = "test"
 WITHOUT_A_WHEEL = ("argparse-manpage",)
 """Packages in Python alone that are published as source only; pip takes no source for another computer."""
@@ -67,11 +70,19 @@ class Python:
                 return subprocess.run([f"{place}/bin/python", *arguments], cwd=project, check=False).returncode
         for name in ("packages", "project", "proc", "dev", "tmp"):
             (self.root / name).mkdir(exist_ok=True)
+        _set_up(self.root)
         _import_from(self.root / f"usr/local/lib/python{self.version}/dist-packages", "/project", "/packages")
         settings = ["-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/tmp", "LANG=C.UTF-8"]
         apart = ["unshare", "--mount", "sh", "-ec", _IN_ROOT]
         places = [str(self.root), str(packages), str(project)]
         return subprocess.run([*apart, *places, *settings, "python3", *arguments], check=False).returncode
+
+
+def _set_up(root: Path) -> None:
+    """What an installed Debian has, and an unpacked one has not: the system's users, groups and own name."""
+    for name in ("passwd", "group"):
+        shutil.copy(root / f"usr/share/base-passwd/{name}.master", root / "etc" / name)
+    (root / "etc/hosts").write_text("127.0.0.1 localhost\n", encoding="ascii")
 
 
 def _import_from(site_packages: Path, *folders: Path | str) -> None:

@@ -83,6 +83,17 @@ def test_a_package_that_is_published_as_source_alone_becomes_a_wheel_first(
     assert install[install.index("--find-links") + 1] == wheel[wheel.index("--wheel-dir") + 1]
 
 
+def test_an_unpacked_debian_has_the_users_groups_and_names_of_an_installed_one(tmp_path: Path) -> None:
+    masters = tmp_path / "usr/share/base-passwd"
+    masters.mkdir(parents=True)
+    (tmp_path / "etc").mkdir()
+    (masters / "passwd.master").write_text("root::0:0:root:/root:/bin/bash\n")
+    (masters / "group.master").write_text("video:*:44:\n")
+    elsewhere._set_up(tmp_path)
+    held = {path.name: path.read_text().split(":")[0].split() for path in (tmp_path / "etc").iterdir()}
+    assert held == {"passwd": ["root"], "group": ["video"], "hosts": ["127.0.0.1", "localhost"]}
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may do it")
 def test_without_root_it_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     assert elsewhere.main(["aarch64", "3.13"]) == 1
