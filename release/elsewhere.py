@@ -73,6 +73,7 @@ class Python:
         _set_up(self.root)
         _import_from(self.root / f"usr/local/lib/python{self.version}/dist-packages", "/project", "/packages")
         settings = ["-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/tmp", "LANG=C.UTF-8"]
+        settings += ["GIT_PYTHON_REFRESH=quiet"]  # else what imports GitPython needs git
         apart = ["unshare", "--mount", "sh", "-ec", _IN_ROOT]
         places = [str(self.root), str(packages), str(project)]
         return subprocess.run([*apart, *places, *settings, "python3", *arguments], check=False).returncode
