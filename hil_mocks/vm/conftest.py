@@ -43,13 +43,21 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """Make the images, which no scenario's time limit counts."""
     if session.config.option.collectonly:
         return
-    modules = {item.getparent(pytest.Module) for item in session.items}
-    wanted = (getattr(module.obj, "SYSTEMS", (DEBIAN_12,)) for module in modules if module is not None)
-    systems = {_for_arch(session.config, system) for of_module in wanted for system in of_module}
+    systems = {_for_arch(session.config, system) for item in session.items for system in _systems(item)}
     try:
         session.config.stash[_IMAGES] = {system: image(system) for system in systems}
     except ImageError as error:
         pytest.exit(f"hil: {error}", 1)
+
+
+def _systems(item: pytest.Item) -> tuple[System, ...]:
+    """What a scenario may boot: its parameter, else what its module says."""
+    parameters: dict[str, object] = getattr(getattr(item, "callspec", None), "params", {})
+    chosen = parameters.get("machine")
+    if isinstance(chosen, System):
+        return (chosen,)
+    module = item.getparent(pytest.Module)
+    return getattr(module and module.obj, "SYSTEMS", (DEBIAN_12,))
 
 
 def _for_arch(config: pytest.Config, system: System) -> System:
