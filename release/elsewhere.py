@@ -19,6 +19,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from packaging.requirements import Requirement
+
 from lcf_edge.errors import LcfError
 from release import wheels
 from release.debian import MACHINES, Machine, ReleaseError, cache, get_tools, run, unpacked
@@ -27,8 +29,14 @@ from release.foreign_pip import options_for
 SUITES = {"3.11": "bookworm", "3.13": "trixie", "3.14": "forky"}
 """The Debian that has it."""
 
-PACKAGES = ("python3", "libstdc++6", "libc-bin", "tzdata", "dash", "coreutils", "openssl", "procps", "mount")
-TESTS_NEED = ("plot", "watch", "view", "foxglove", "test")
+PACKAGES = (
+    *("python3", "libstdc++6", "libc-bin", "tzdata", "openssl", "procps", "mount"),
+    *("base-passwd", "bash", "dash", "coreutils", "grep", "sed"),
+)
+TESTS_NEED = "test"
+WITHOUT_A_WHEEL = ("argparse-manpage",)
+"""Packages in Python alone that are published as source only; pip takes no source for another computer."""
+
 EMULATED_TIMEOUT_S = 3600  # of one test
 
 _IN_ROOT = """
@@ -62,11 +70,20 @@ class Python:
                 return subprocess.run([f"{place}/bin/python", *arguments], cwd=project, check=False).returncode
         for name in ("packages", "project", "proc", "dev", "tmp"):
             (self.root / name).mkdir(exist_ok=True)
+        _set_up(self.root)
         _import_from(self.root / f"usr/local/lib/python{self.version}/dist-packages", "/project", "/packages")
         settings = ["-i", "PATH=/usr/sbin:/usr/bin:/sbin:/bin", "HOME=/tmp", "LANG=C.UTF-8"]
+        settings += ["GIT_PYTHON_REFRESH=quiet"]  # else what imports GitPython needs git
         apart = ["unshare", "--mount", "sh", "-ec", _IN_ROOT]
         places = [str(self.root), str(packages), str(project)]
         return subprocess.run([*apart, *places, *settings, "python3", *arguments], check=False).returncode
+
+
+def _set_up(root: Path) -> None:
+    """What an installed Debian has, and an unpacked one has not: the system's users, groups and own name."""
+    for name in ("passwd", "group"):
+        shutil.copy(root / f"usr/share/base-passwd/{name}.master", root / "etc" / name)
+    (root / "etc/hosts").write_text("127.0.0.1 localhost\n", encoding="ascii")
 
 
 def _import_from(site_packages: Path, *folders: Path | str) -> None:
@@ -139,8 +156,12 @@ def packages(machine: Machine, version: str) -> Path:
     if not folder.exists():
         unfinished = folder.with_name("unfinished-packages")
         shutil.rmtree(unfinished, ignore_errors=True)
-        command = (sys.executable, "-m", "pip", "install", "--quiet", "--target", str(unfinished))
-        run(*command, *options_for(machine.name, version), *needed)
+        pip = (sys.executable, "-m", "pip")
+        with tempfile.TemporaryDirectory() as made:
+            sources = [need for need in needed if Requirement(need).name in WITHOUT_A_WHEEL]
+            run(*pip, "wheel", "--quiet", "--no-deps", "--wheel-dir", made, *sources)
+            install = (*pip, "install", "--quiet", "--no-compile", "--target", str(unfinished), "--find-links", made)
+            run(*install, *options_for(machine.name, version), *needed)
         unfinished.rename(folder)
     return folder
 
@@ -148,8 +169,15 @@ def packages(machine: Machine, version: str) -> Path:
 def _requirements() -> list[str]:
     """Of the project, and of its tests."""
     project = tomllib.loads((wheels.PROJECT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    extras = (need for extra in TESTS_NEED for need in project["optional-dependencies"][extra])
-    return sorted({*project["dependencies"], *(need for need in extras if not need.startswith("lcf-edge"))})
+
+    def of(extra: str) -> set[str]:
+        needed: set[str] = set()
+        for need in project["optional-dependencies"][extra]:
+            itself = Requirement(need).name == project["name"]
+            needed |= set().union(*map(of, Requirement(need).extras)) if itself else {need}
+        return needed
+
+    return sorted({*project["dependencies"], *of(TESTS_NEED)})
 
 
 def _project(machine: Machine, place: Path) -> Path:

@@ -42,6 +42,8 @@ DRIVERS = {
         ImuDriver("lsm6dso", "i2c", "lsm6dso", "Lsm6dso"),
         ImuDriver("lsm6dso32", "i2c", "lsm6dso32", "Lsm6dso32"),
         ImuDriver("ism330dhcx", "i2c", "ism330dhcx", "Ism330dhcx"),
+        ImuDriver("lsm6dsv", "i2c", "lsm6dsv", "Lsm6dsv"),
+        ImuDriver("lsm6dsv32", "i2c", "lsm6dsv32", "Lsm6dsv32"),
         ImuDriver("lsm9ds1", "i2c", "lsm9ds1", "Lsm9ds1"),
         ImuDriver("bmi088", "i2c", "bmi088", "Bmi088"),
         ImuDriver("bmi160", "i2c", "bmi160", "Bmi160"),

@@ -13,7 +13,7 @@ from hil_mocks.i2c.bus import SimulatedBus
 from hil_mocks.i2c.chip import SimulatedChip
 from hil_mocks.i2c.icm20948 import Icm20948
 from hil_mocks.i2c.icm42688 import Icm42688
-from hil_mocks.i2c.lsm6 import Ism330dhcx, Lsm6ds3, Lsm6dso, Lsm6dso32
+from hil_mocks.i2c.lsm6 import Ism330dhcx, Lsm6ds3, Lsm6dso, Lsm6dso32, Lsm6dsv, Lsm6dsv32
 from hil_mocks.i2c.lsm9ds1 import Lsm9ds1
 from hil_mocks.i2c.motion import Motion, replay
 from hil_mocks.i2c.mpu import Icm20602, Mpu6050, Mpu6500, Mpu9250
@@ -30,6 +30,8 @@ CHIPS: dict[str, type[SimulatedChip]] = {
     "lsm6dso": Lsm6dso,
     "lsm6dso32": Lsm6dso32,
     "ism330dhcx": Ism330dhcx,
+    "lsm6dsv": Lsm6dsv,
+    "lsm6dsv32": Lsm6dsv32,
     "lsm9ds1": Lsm9ds1,
     "bmi088": Bmi088,
     "bmi160": Bmi160,

@@ -1,4 +1,4 @@
-"""LSM6DS3 and LSM6DSO as registers (DocID026899 rev. 8, DS12140 rev. 2)."""
+"""LSM6DS3, LSM6DSO (DocID026899 rev. 8, DS12140 rev. 2) and LSM6DSV (lsm6dsv16x_reg.h) as registers."""
 
 import math
 import struct
@@ -17,7 +17,7 @@ TURN_MDPS_PER_COUNT = (8.75, 17.5, 35.0, 70.0)  # by FS_G
 
 
 class Lsm6(SimulatedChip):
-    """What both have alike. A reset while the FIFO fills is neither acknowledged nor done."""
+    """What all have alike. A reset while the FIFO fills is neither acknowledged nor done."""
 
     address = 0x6A
     lsb_per_c: float
@@ -27,10 +27,15 @@ class Lsm6(SimulatedChip):
         """Sample rate; 0 switched off."""
         return min(ODR_HZ[self.registers[0x10] >> 4], ODR_HZ[self.registers[0x11] >> 4])
 
+    def per_count(self) -> tuple[float, float]:
+        """What a count is worth: m°/s, mg."""
+        force_mg = self.force_mg_per_count[self.registers[0x10] >> 2 & 3]
+        return TURN_MDPS_PER_COUNT[self.registers[0x11] >> 2 & 3], force_mg
+
     def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
         """OUT_TEMP_L to OUTZ_H_XL."""
-        turn_radps = math.radians(TURN_MDPS_PER_COUNT[self.registers[0x11] >> 2 & 3]) / 1e3
-        force_mps2 = G_MPS2 * self.force_mg_per_count[self.registers[0x10] >> 2 & 3] / 1e3
+        turn_mdps, force_mg = self.per_count()
+        turn_radps, force_mps2 = math.radians(turn_mdps) / 1e3, G_MPS2 * force_mg / 1e3
         warmth = round((self.celsius - 25) * self.lsb_per_c)
         return {
             0x20: warmth.to_bytes(2, "little", signed=True),
@@ -105,6 +110,8 @@ class Lsm6dso(Lsm6):
     power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x6C, 0x12: 0x04, 0x18: 0xE0}
     lsb_per_c = 256.0
     mode_register = 0x0A
+    status_register = 0x3A
+    fifo_words = 512
     _moment = 0
 
     @property
@@ -126,13 +133,14 @@ class Lsm6dso(Lsm6):
 
     def clear_fifo(self) -> None:
         """Empty it."""
-        self._fifo: deque[bytes] = deque(maxlen=512)
+        self._fifo: deque[bytes] = deque(maxlen=self.fifo_words)
         self._overrun = False
 
     def _burst(self, register: int, length: int) -> bytes:
         full = len(self._fifo) == self._fifo.maxlen
         flags = self._overrun << 14 | full << 13 | self._overrun << 11
-        self.registers[0x3A:0x3C] = (flags | len(self._fifo)).to_bytes(2, "little")
+        at = self.status_register
+        self.registers[at : at + 2] = (flags | len(self._fifo)).to_bytes(2, "little")
         if register != 0x78:
             return super()._burst(register, length)
         words = [self._fifo.popleft() for _ in range(min(-(-length // 7), len(self._fifo)))]
@@ -149,3 +157,27 @@ class Lsm6dso32(Lsm6dso):
     """LSM6DSO32: an LSM6DSO whose codes mean 4, 32, 8, 16 g, with the same identity."""
 
     force_mg_per_count = (0.122, 0.976, 0.244, 0.488)
+
+
+class Lsm6dsv(Lsm6dso):
+    """LSM6DSV: the rates are the low bits of their registers, the ranges have registers of their own."""
+
+    power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x70, 0x12: 0x44}
+    status_register = 0x1B
+    fifo_words = 256
+    least_force_mg = 0.061  # by FS_XL: this, twice, four, eight times as much
+
+    def rate_hz(self) -> float:
+        """Sample rate; 0 switched off. Each code but the first two is twice the one before."""
+        code = min(self.registers[0x10] & 15, self.registers[0x11] & 15)
+        return 7.5 * 2 ** (code - 2) if code > 1 else 1.875 * code
+
+    def per_count(self) -> tuple[float, float]:
+        """What a count is worth: m°/s, mg."""
+        return 4.375 * 2 ** (self.registers[0x15] & 15), self.least_force_mg * 2 ** (self.registers[0x17] & 3)
+
+
+class Lsm6dsv32(Lsm6dsv):
+    """LSM6DSV32X: an LSM6DSV of twice the acceleration, with the same identity."""
+
+    least_force_mg = 0.122

@@ -21,6 +21,9 @@ CAMERAS = (
 
 PROCESSORS = {"amd64": HERE, "arm64": DEBIAN_13_ON_ARM.processor}
 
+PATIENT = "[Service]\\nWatchdogSec=60\\nTimeoutStartSec=300\\n"
+"""What the units get where the processor is emulated: a busy host may give it no time for longer than they wait."""
+
 _IMAGES = pytest.StashKey[dict[System, Image]]()
 _MACHINE = pytest.StashKey[Machine]()
 
@@ -40,13 +43,21 @@ def pytest_collection_finish(session: pytest.Session) -> None:
     """Make the images, which no scenario's time limit counts."""
     if session.config.option.collectonly:
         return
-    modules = {item.getparent(pytest.Module) for item in session.items}
-    wanted = (getattr(module.obj, "SYSTEMS", (DEBIAN_12,)) for module in modules if module is not None)
-    systems = {_for_arch(session.config, system) for of_module in wanted for system in of_module}
+    systems = {_for_arch(session.config, system) for item in session.items for system in _systems(item)}
     try:
         session.config.stash[_IMAGES] = {system: image(system) for system in systems}
     except ImageError as error:
         pytest.exit(f"hil: {error}", 1)
+
+
+def _systems(item: pytest.Item) -> tuple[System, ...]:
+    """What a scenario may boot: its parameter, else what its module says."""
+    parameters: dict[str, object] = getattr(getattr(item, "callspec", None), "params", {})
+    chosen = parameters.get("machine")
+    if isinstance(chosen, System):
+        return (chosen,)
+    module = item.getparent(pytest.Module)
+    return getattr(module and module.obj, "SYSTEMS", (DEBIAN_12,))
 
 
 def _for_arch(config: pytest.Config, system: System) -> System:
@@ -60,6 +71,11 @@ def booted(config: pytest.Config, system: System, folder: Path) -> Iterator[Mach
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     with Machine(config.stash[_IMAGES][_for_arch(config, system)], folder.resolve()) as machine:
+        if machine.emulated:
+            for unit in ("lcf-edge", "lcf-edge@"):
+                drop_in = f"/run/systemd/system/{unit}.service.d"
+                machine.run(f"mkdir -p {drop_in} && printf '{PATIENT}' > {drop_in}/patient.conf")
+            machine.run("systemctl daemon-reload")
         yield machine
 
 

@@ -52,7 +52,7 @@ class Machine:
     """Boots ``image``; changes to its disk are forgotten. Leaves its console and journal in ``folder``.
 
     ``share``: a folder that the guest sees as /mnt. ``endpoint``: where the host reaches the guest's Zenoh. ``imu``:
-    the other end of the guest's USB serial port. Raises ``MachineError``.
+    the other end of the guest's USB serial port. ``emulated``: whether its processor is. Raises ``MachineError``.
     """
 
     def __init__(self, image: Image, folder: Path) -> None:
@@ -62,6 +62,8 @@ class Machine:
         self.share.mkdir(parents=True)
         self.port = _free_port()
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
+        self._accelerator = _accelerator(image)
+        self.emulated = self._accelerator == EMULATED
         self._number, self._read = 0, b""
         self._agent_path, self._imu_path = folder / "agent.sock", folder / "imu.sock"
         with ExitStack() as resources:
@@ -78,13 +80,14 @@ class Machine:
     def _command(self, image: Image) -> list[str]:
         board = BOARDS[image.processor]
         return [
-            *(board.qemu, "-accel", _accelerator(image), *board.options),
+            *(board.qemu, "-accel", self._accelerator, *board.options),
             *("-m", str(MEMORY_MIB), "-smp", str(PROCESSORS)),
             *("-display", "none", "-monitor", "none", "-no-reboot", "-serial", f"file:{self.folder / 'console.txt'}"),
             *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
             *("-append", f"console={board.console} {KERNEL}"),
             *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
-            *("-nic", f"user,model=virtio-net-pci,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
+            *("-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
+            *("-device", "virtio-net-pci,netdev=net,romfile="),  # nothing boots from it
             *("-virtfs", f"local,path={self.share},mount_tag=share,security_model=none"),
             *(
                 "-device",

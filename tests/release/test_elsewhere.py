@@ -59,8 +59,39 @@ def test_what_is_tested_is_the_project_with_its_packages(
 
 def test_what_the_tests_need_is_what_the_project_says() -> None:
     needed = {requirement.split(">")[0] for requirement in elsewhere._requirements()}
-    assert {"numpy", "aiohttp", "foxglove-sdk", "pytest", "hypothesis"} <= needed
+    assert {"numpy", "aiohttp", "foxglove-sdk", "av", "distributed", "pytest", "hypothesis"} <= needed
     assert not any(name.startswith("lcf-edge") for name in needed)
+
+
+def test_a_package_that_is_published_as_source_alone_becomes_a_wheel_first(
+    other: Machine, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps = []
+
+    def do(*command: str) -> str:
+        steps.append(command)
+        if "install" in command:
+            Path(command[command.index("--target") + 1]).mkdir()
+        return ""
+
+    monkeypatch.setattr(elsewhere, "run", do)
+    monkeypatch.setenv("LCF_EDGE_RELEASE_CACHE", str(tmp_path))
+    elsewhere.packages(other, "3.13")
+    wheel, install = steps
+    assert [need.split(">")[0] for need in wheel if ">" in need] == list(elsewhere.WITHOUT_A_WHEEL)
+    assert "--only-binary=:all:" in install
+    assert install[install.index("--find-links") + 1] == wheel[wheel.index("--wheel-dir") + 1]
+
+
+def test_an_unpacked_debian_has_the_users_groups_and_names_of_an_installed_one(tmp_path: Path) -> None:
+    masters = tmp_path / "usr/share/base-passwd"
+    masters.mkdir(parents=True)
+    (tmp_path / "etc").mkdir()
+    (masters / "passwd.master").write_text("root::0:0:root:/root:/bin/bash\n")
+    (masters / "group.master").write_text("video:*:44:\n")
+    elsewhere._set_up(tmp_path)
+    held = {path.name: path.read_text().split(":")[0].split() for path in (tmp_path / "etc").iterdir()}
+    assert held == {"passwd": ["root"], "group": ["video"], "hosts": ["127.0.0.1", "localhost"]}
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may do it")

@@ -26,8 +26,6 @@ BY_HAND = "/opt/lcf-edge/bin/python -m drivers.camera"
 LIBCAMERA = f"{BY_HAND}.libcamera 'Sensor B' --width 160 --height 120 --fps 1"
 VIMC = "/sys/bus/platform/drivers/vimc"
 BINDING = "/usr/lib/python3/dist-packages/libcamera"
-DROP_IN, PATIENT = "/etc/systemd/system/lcf-edge.service.d", "[Service]\\nWatchdogSec=60\\n"
-"""For vimc computes its pictures as fast as it can, beside a filter that is emulated as well."""
 PROCESS = "systemctl show lcf-edge --property=ControlGroup --value | xargs -I{} cat /sys/fs/cgroup/{}/cgroup.procs"
 
 
@@ -35,8 +33,7 @@ PROCESS = "systemctl show lcf-edge --property=ControlGroup --value | xargs -I{} 
 def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
     """With a camera of the kernel's media controller."""
     with booted(pytestconfig, SYSTEMS[0], RESULTS / "libcamera") as running:
-        running.run(f"modprobe vimc && udevadm settle; mkdir -p {DROP_IN}; printf '{PATIENT}' > {DROP_IN}/patient.conf")
-        running.run("systemctl daemon-reload")
+        running.run("modprobe vimc && udevadm settle")
         yield running
 
 

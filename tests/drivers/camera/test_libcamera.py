@@ -35,7 +35,14 @@ from hil_mocks.v4l2_device import drawn_image
 
 SIZE = {"width": 160, "height": 120, "fps": 30.0}
 
+OPENING_S = 300.0  # a busy or an emulated computer may need longer to start a program than a vehicle has
+
 Open = Callable[..., LibcameraCamera]
+
+
+@pytest.fixture(autouse=True)
+def patient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(libcamera, "OPENING_S", OPENING_S)
 
 
 @pytest.fixture
@@ -327,8 +334,10 @@ class TestFaults:
     def test_the_process_does_not_outlive_the_program(self) -> None:
         """Not even one that is killed."""
         program = (
-            "import time; from drivers.camera.libcamera import LibcameraCamera as C;"
-            f"from hil_mocks.libcamera_device import *; c = C('imx219', command=command(World()), **{SIZE!r});"
+            "import time; from drivers.camera import libcamera;"
+            "from hil_mocks.libcamera_device import *;"
+            f"libcamera.OPENING_S = {OPENING_S};"
+            f"c = libcamera.LibcameraCamera('imx219', command=command(World()), **{SIZE!r});"
             "print(c._process._process.pid, flush=True); time.sleep(60)"
         )
         with subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True) as running:

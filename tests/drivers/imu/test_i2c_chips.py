@@ -32,7 +32,8 @@ every_chip = pytest.mark.parametrize("driver", REGISTER_CHIPS)
 # bmi270_core.c, bno055.c); the ICM-20948 as its data sheet has it
 INV_GYRO = {250: 0.000133090, 500: 0.000266181, 1000: 0.000532362, 2000: 0.001064724}
 ST_GYRO = {dps: math.radians(dps * 35e-6) for dps in (250, 500, 1000, 2000)}  # 8.75 m°/s to 70 m°/s
-ST = ("lsm6ds3", "lsm6dso", "lsm6dso32", "ism330dhcx")
+ST = ("lsm6ds3", "lsm6dso", "lsm6dso32", "ism330dhcx", "lsm6dsv", "lsm6dsv32")
+UP_TO_32_G = ("lsm6dso32", "lsm6dsv32")
 BMI_GYRO = {250: 133e-6, 500: 266e-6, 1000: 532e-6, 2000: 1065e-6}
 QMI_GYRO = {dps: math.radians(dps * 1.024 / 32768) for dps in (250, 500, 1000, 2000)}  # its 500 is 512
 BNO_GYRO = dict.fromkeys((250, 500, 1000, 2000), math.radians(1) / 16)  # data sheet: 16 counts for 1 °/s
@@ -122,7 +123,7 @@ def test_gyro_count_is_the_kernels(rig: RigMaker, driver: str, gyro_range_dps: i
 @pytest.mark.parametrize("accel_range_g", [2, 4, 8, 16, 32])
 def test_accelerometer_count_is_the_kernels(rig: RigMaker, driver: str, accel_range_g: int) -> None:
     settings = ImuSettings(accel_range_g=accel_range_g)
-    if accel_range_g == 32 and driver != "lsm6dso32":
+    if accel_range_g == 32 and driver not in UP_TO_32_G:
         with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 2, 4"):
             rig(driver, settings=settings).open()
         return
@@ -131,7 +132,7 @@ def test_accelerometer_count_is_the_kernels(rig: RigMaker, driver: str, accel_ra
             with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 2, 4"):
                 rig(driver, settings=settings).open()
         return
-    if driver == "lsm6dso32" and accel_range_g == 2:
+    if driver in UP_TO_32_G and accel_range_g == 2:
         with pytest.raises(UnsupportedSettingError, match=r"imu\.accel_range_g to one of 4, 8, 16, 32"):
             rig(driver, settings=settings).open()
         return
@@ -242,6 +243,7 @@ def test_the_whole_6500_family_is_known(rig: RigMaker, driver: str, identity: in
         ("mpu6050", 0x19, "icm20602"),
         ("lsm6ds3", 0x6C, "lsm6dso"),
         ("lsm6dso", 0x6B, "ism330dhcx"),
+        ("lsm6dso", 0x70, "lsm6dsv"),
     ],
 )
 def test_a_relative_is_reported_with_its_driver(rig: RigMaker, driver: str, identity: int, remedy: str) -> None:

@@ -30,7 +30,7 @@ RigMaker = Callable[..., Any]
 CHIPS = [driver for driver, chip in chips().items() if issubclass(chip, I2cImu)]  # those with registers
 every_chip = pytest.mark.parametrize("driver", CHIPS)
 FIFO_CHIPS = [driver for driver, chip in chips().items() if issubclass(chip, FifoImu)]
-ST = ("lsm6ds3", "lsm6dso", "lsm6dso32", "ism330dhcx")
+ST = ("lsm6ds3", "lsm6dso", "lsm6dso32", "ism330dhcx", "lsm6dsv", "lsm6dsv32")
 every_fifo_chip = pytest.mark.parametrize("driver", FIFO_CHIPS)
 
 FIFO_REGISTER = {
@@ -42,6 +42,8 @@ FIFO_REGISTER = {
     "lsm6dso": 0x78,
     "lsm6dso32": 0x78,
     "ism330dhcx": 0x78,
+    "lsm6dsv": 0x78,
+    "lsm6dsv32": 0x78,
     "bmi088": 0x3F,
     "bmi160": 0x24,
     "bmi270": 0x26,
@@ -51,6 +53,7 @@ GYRO_SCALE = {  # the register of the gyro's range, of those that are not like t
     "icm20948": 0x2001,
     "icm42688": 0x4F,
     **dict.fromkeys(ST, 0x11),
+    **dict.fromkeys(("lsm6dsv", "lsm6dsv32"), 0x15),
     "lsm9ds1": 0x10,
     "bmi088": 0x0F,
     "bmi160": 0x43,
@@ -341,7 +344,15 @@ def test_unplugged_and_plugged_in_again_it_comes_back(rig: RigMaker, driver: str
     assert kept.counts["opened"] == 2
 
 
-@pytest.mark.parametrize(("driver", "model", "gravity"), [("lsm6dso", "lsm6dso32", 0.5), ("lsm6dso32", "lsm6dso", 2.0)])
+@pytest.mark.parametrize(
+    ("driver", "model", "gravity"),
+    [
+        ("lsm6dso", "lsm6dso32", 0.5),
+        ("lsm6dso32", "lsm6dso", 2.0),
+        ("lsm6dsv", "lsm6dsv32", 0.5),
+        ("lsm6dsv32", "lsm6dsv", 2.0),
+    ],
+)
 def test_a_twin_that_says_the_same_of_itself_is_known_by_gravity_at_rest(
     rig: RigMaker, at_rest: Any, driver: str, model: str, gravity: float
 ) -> None:

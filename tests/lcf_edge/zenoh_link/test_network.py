@@ -76,6 +76,13 @@ def link(rover: zenoh.Session) -> Iterator[Link]:
     link.close()
 
 
+def strict(folder: Path) -> ssl.SSLContext:
+    """A client that takes no certificate which leaves something out, as every Python from 3.13 on does."""
+    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context.verify_flags |= ssl.VERIFY_X509_STRICT
+    return context
+
+
 class Gate:
     """``lcf-edge gate`` as a process, before ``endpoint``. ``endpoint``: of its own."""
 
@@ -415,7 +422,7 @@ def test_strangers_keep_no_planner_out_and_take_a_bounded_number_of_descriptors(
 
 def handshake(gate: Gate, folder: Path, name: str) -> None:
     """Somebody with a certificate who says nothing after it."""
-    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context = strict(folder)
     context.load_cert_chain(folder / f"{name}.pem", folder / f"{name}.key")
     plain = socket.create_connection(("127.0.0.1", gate.port), PATIENCE_S)
     with suppress(OSError), context.wrap_socket(plain, server_hostname="localhost") as one:
@@ -494,7 +501,7 @@ def test_a_stranger_who_says_nothing_is_let_go(gate: Gate) -> None:
 
 def test_a_party_may_have_so_many_connections_and_no_more(rover: zenoh.Session, gate: Gate, folder: Path) -> None:
     assert rover
-    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context = strict(folder)
     context.load_cert_chain(folder / "planner.pem", folder / "planner.key")
     held = []
     for _ in range(MAX_OF_ONE_NAME):
@@ -510,7 +517,7 @@ def test_a_party_may_have_so_many_connections_and_no_more(rover: zenoh.Session, 
 @pytest.mark.parametrize("who", ["unknown", "planner"])
 def test_who_is_refused_with_a_certificate_takes_no_descriptor(gate: Gate, folder: Path, who: str) -> None:
     """Of no name that the gate knows, or while the daemon is away; none of them ever ends its connection."""
-    context = ssl.create_default_context(cafile=str(folder / "ca.pem"))
+    context = strict(folder)
     context.load_cert_chain(folder / f"{who}.pem", folder / f"{who}.key")
     held = []
     for _ in range(30):
