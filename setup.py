@@ -56,20 +56,11 @@ LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of 
 
 # What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower.
 SMALL = ["-Os"]
-LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "columns", "derotation", "edge_rows"}
-LITTLE |= {"feedback", "ground_speed", "group_motion", "heading", "key_frames", "least_squares"}
-LITTLE |= {
-    "leaps",
-    "line_expert",
-    "normal_circles",
-    "patch_circles",
-    "patches",
-    "path",
-    "range_belief",
-    "rebel_circles",
-}
-LITTLE |= {"coarse_circles", "coarse_motion", "rest", "sample_ring", "scene_records", "settings", "situation"}
-LITTLE |= {"square_expert", "turmoil"}
+LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles", "coarse_circles", "coarse_motion", "columns"}
+LITTLE |= {"derotation", "edge_rows", "feedback", "flow_fit", "ground_speed", "group_motion", "heading", "key_frames"}
+LITTLE |= {"leaps", "least_squares", "line_expert", "normal_circles", "patch_circles", "patches", "path"}
+LITTLE |= {"range_belief", "rebel_circles", "rebel_detection", "rest", "sample_ring", "scene_records", "settings"}
+LITTLE |= {"situation", "square_expert", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))
