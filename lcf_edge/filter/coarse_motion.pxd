@@ -26,6 +26,7 @@ cdef double LIKENESS
 cdef int RING
 cdef double RING_LIKENESS
 cdef double RING_GREY
+cdef int MAX_SEEN
 cdef int MAX_SEARCHES
 cdef double SLOW_S
 cdef double MIN_SLOW_S
@@ -42,7 +43,7 @@ cdef class CoarseMotion:
     cdef double[:, :, ::1] turned
     cdef Homography back
     cdef double then_s, ahead_m, focus_x, focus_y, off_flow, base_x, base_y, share
-    cdef int pictures, keys, searches, here, across, down, least_still, least_moving
+    cdef int pictures, keys, seen, searches, here, across, down, least_still, least_moving
     cdef const double[::1] x, y
     cdef int[::1] rough, links_before, block
     cdef int[::1] links

@@ -37,7 +37,8 @@ LIKENESS = 0.5  # of the difference that is left if it stands, that is left at m
 RING = 3  # small px from its place, where a distinct piece fits worse by
 RING_LIKENESS = 1.25  # this factor,
 RING_GREY = 0.5  # and so much a pixel
-MAX_SEARCHES = 16  # in a frame
+MAX_SEEN = 32  # pieces in a frame that are sought where they would stand,
+MAX_SEARCHES = 12  # and all around
 SLOW_S = 0.3  # the older picture is no older than this,
 MIN_SLOW_S = 0.1  # nor younger
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
@@ -79,7 +80,7 @@ class CoarseMotion:
         self.back = Homography()
         self.then_s = self.ahead_m = self.focus_x = self.focus_y = self.off_flow = 0.0
         self.base_x = self.base_y = self.share = 0.0
-        self.pictures = self.keys = self.searches = self.here = self.across = self.down = 0
+        self.pictures = self.keys = self.seen = self.searches = self.here = self.across = self.down = 0
         self.least_still = self.least_moving = 0
         half = 0.5 * (WINDOW * side - 1)
         u, v = np.meshgrid(np.arange(self.columns) * STEP * side + half, np.arange(self.rows) * STEP * side + half)
@@ -341,8 +342,9 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
     end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
     coarse.share = coarse.shares[age, k]
-    if stands_as_lately(coarse, k, end_x, end_y):
+    if stands_as_lately(coarse, k, end_x, end_y) or coarse.seen >= MAX_SEEN:
         return False
+    coarse.seen += 1
     turned = flow.length(
         coarse.base_x - STEP * (k % coarse.columns), coarse.base_y - STEP * (k // coarse.columns)
     )  # where the lens is guessed, so is by how much a turn moved the piece
@@ -373,7 +375,7 @@ def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: 
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0
-    coarse.searches = 0
+    coarse.seen = coarse.searches = 0
     if coarse.pictures < 2 or not coarse.columns or not coarse.rows:
         return
     roughen(coarse)
