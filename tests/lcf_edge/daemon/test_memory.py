@@ -47,7 +47,7 @@ def test_a_budget_that_cannot_be_kept_is_refused_with_what_to_lower(config: Conf
 
 
 @pytest.mark.parametrize(
-    "config", [Config(camera=Camera(width=1920, height=1080)), Config(memory=Memory(budget_mib=1))]
+    "config", [Config(camera=Camera(width=1920, height=1080)), Config(memory=Memory(budget_mib=2))]
 )
 def test_what_it_says_to_raise_it_to_is_enough(config: Config) -> None:
     with pytest.raises(ConfigError) as refused:
