@@ -32,3 +32,5 @@ cdef int free_row(CircleColumns circles) noexcept nogil
 cdef int weakest_row(CircleColumns circles, Settings settings) noexcept nogil
 cdef void release(EdgeColumns edges, CircleColumns circles, bint rebel) noexcept nogil
 cdef int make_room(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil
+@cython.locals(c=int)
+cdef int row_for_newborn(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil

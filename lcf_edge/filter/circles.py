@@ -132,3 +132,9 @@ def make_room(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings:
         circles.active[c] = 0
         release(edges, circles, rebel)
     return c
+
+
+def row_for_newborn(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings: Settings) -> int:
+    """A row that is not in use, else one of which room is made; -1: there is none. ``rebel``: of C_r, else of C_n."""
+    c = free_row(circles)
+    return c if c >= 0 else make_room(edges, circles, rebel, settings)

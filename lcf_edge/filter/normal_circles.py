@@ -303,10 +303,8 @@ def found(
     sort_left(flowing, edges, around, settings)
     cell = largest_cell(flowing, settings.circle_support)
     while cell >= 0:
-        c = shared.free_row(circles)
-        if c < 0:
-            evicted += 1
-            c = shared.make_room(edges, circles, False, settings)
+        evicted += shared.free_row(circles) < 0
+        c = shared.row_for_newborn(edges, circles, False, settings)
         if c >= 0:
             average_cell(flowing, cell, flowing.members, edges, c)
             shared.give_birth(circles, c, flowing.members, c, settings, ids)

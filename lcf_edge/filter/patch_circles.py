@@ -244,10 +244,8 @@ def update(
             continue
         is_shown = c >= 0 and updated[c] != 0  # by rebels, to which it is left
         if c < 0:
-            c = shared.free_row(circles)
-            if c < 0:
-                evicted += 1
-                c = shared.make_room(edges, circles, True, settings)
+            evicted += shared.free_row(circles) < 0
+            c = shared.row_for_newborn(edges, circles, True, settings)
             if c >= 0:
                 shared.give_birth(circles, c, groups.members, p, settings, ids)
         elif not is_shown:

@@ -105,6 +105,7 @@ cdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py
 cpdef double bounded(double size_px, double shown_px) noexcept nogil
 cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef int largest_new(RebelGroups groups) noexcept nogil
+@cython.locals(evicted=int)
 cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
 cpdef double own_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil

@@ -570,10 +570,8 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
     evicted = 0
     g = largest_new(groups)
     while g >= 0:
-        c = shared.free_row(circles)
-        if c < 0:
-            evicted += 1
-            c = shared.make_room(edges, circles, True, settings)
+        evicted += shared.free_row(circles) < 0
+        c = shared.row_for_newborn(edges, circles, True, settings)
         if c >= 0:
             shared.give_birth(circles, c, groups.members, g, settings, ids)
             if groups.members.size[g] < SURE_REBELS:

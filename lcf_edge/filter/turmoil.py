@@ -261,10 +261,8 @@ def update(
             continue
         c = shared.nearest_circle(turmoil.members, g, circles, settings)
         if c < 0:
-            c = shared.free_row(circles)
-            if c < 0:
-                evicted += 1
-                c = shared.make_room(edges, circles, True, settings)
+            evicted += shared.free_row(circles) < 0
+            c = shared.row_for_newborn(edges, circles, True, settings)
             if c < 0:
                 continue
             shared.give_birth(circles, c, turmoil.members, g, settings, ids)
