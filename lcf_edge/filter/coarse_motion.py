@@ -61,11 +61,11 @@ class CoarseMotion:
     have been, if it stands.
 
     A row a piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its middle, px of the ideal pinhole; ``rough``: how
-    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last
-    picture; ``shares`` (2, pieces), where it lately stood, in the last picture and in the older one; ``links``:
-    pictures through which its motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated;
-    ``elapsed_s``, over which it was seen; ``links_before``,
-    ``vx_before``, ``vy_before`` of the last picture. ``block``: roughness of each ``STEP`` by ``STEP`` px.
+    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last picture, -1: it was not all in it; ``shares``
+    (2, pieces), where it lately stood, in the last picture and in the older one; ``links``: pictures through which its
+    motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which it
+    was seen; ``links_before``, ``vx_before``, ``vy_before`` of the last picture. ``block``: roughness of each ``STEP``
+    by ``STEP`` px.
     """
 
     def __init__(self, lens: Lens, side: int) -> None:
@@ -361,11 +361,13 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
 def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
     """Which pieces that are not known to move do so, since the picture then."""
     for k in range(coarse.columns * coarse.rows):
-        if coarse.links[k] or coarse.rough[k] < PLAIN_GREY * PIXELS or not put(coarse, k, plane):
+        known = coarse.links[k] > 0 or coarse.rough[k] < PLAIN_GREY * PIXELS
+        if known or not put(coarse, k, plane):
             continue
         if age == LAST:
             coarse.came_x[k], coarse.came_y[k] = coarse.base_x, coarse.base_y
-        if coarse.off_flow < MAX_OFF_FLOW and see(coarse, k, age, around):
+        told = coarse.came_x[k] >= 0 and coarse.off_flow < MAX_OFF_FLOW
+        if told and see(coarse, k, age, around):
             set_motion(coarse, k)
             chain(coarse, k, around.dt_s)
 
@@ -375,6 +377,7 @@ def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: 
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0
+        coarse.came_x[k] = -1.0
     coarse.seen = coarse.searches = 0
     if coarse.pictures < 2 or not coarse.columns or not coarse.rows:
         return

@@ -15,9 +15,13 @@ import pytest
 
 import lcf_edge
 from lcf_edge.config import Config, Memory
+from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.lens import Lens
 from tests.lcf_edge.filter.boards import LENS as BOARDS_LENS
 from tests.lcf_edge.filter.boards import Board
+from tests.lcf_edge.filter.test_coarse_motion import LENS as PASSING_LENS
+from tests.lcf_edge.filter.test_coarse_motion import SMALL as IN_SMALL
+from tests.lcf_edge.filter.test_coarse_motion import Passing
 
 SCRIPT = Path(__file__).with_name("digests.py")
 FISHEYE = Lens(640, 480, 330.0, 330.0, 319.5, 239.5, "equidistant", (0.02, -0.01, 0.0, 0.0))
@@ -73,6 +77,17 @@ def test_compiled_and_uncompiled_the_tables_hold_the_same_bytes_after_every_fram
 def test_compiled_and_uncompiled_patches_hold_the_same_bytes(tmp_path: Path) -> None:
     path = tmp_path / "frames"
     path.write_bytes(pickle.dumps((Config(), BOARDS_LENS, list(Board(frames=25)))))
+    (compiled, *digests), (uncompiled, *others) = run(path, pure=False), run(path, pure=True)
+    assert uncompiled == "uncompiled"
+    if compiled == "uncompiled":
+        pytest.skip("nothing is compiled here")
+    assert digests == others
+
+
+def test_compiled_and_uncompiled_coarse_motion_gives_the_same_bytes(tmp_path: Path) -> None:
+    path = tmp_path / "frames"
+    frames = [(NO_CORNERS, motion, image, IN_SMALL.of(image)) for motion, image in Passing(turn_rad=0.015)]
+    path.write_bytes(pickle.dumps((Config(), PASSING_LENS, frames)))
     (compiled, *digests), (uncompiled, *others) = run(path, pure=False), run(path, pure=True)
     assert uncompiled == "uncompiled"
     if compiled == "uncompiled":
