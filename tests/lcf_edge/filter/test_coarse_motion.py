@@ -142,7 +142,7 @@ def test_what_hangs_in_the_air_moves_for_another_reason_than_that_it_drives() ->
 
 
 def test_a_straight_edge_does_not_tell_how_it_moves() -> None:
-    half_of_the_picture = Passing(width=3000.0, top=-100.0, height=800.0, contrast=0.0)
+    half_of_the_picture = Passing(left=100.0, width=3000.0, top=-100.0, height=800.0, contrast=0.0)
     assert not any(rebels(half_of_the_picture))
 
 
