@@ -11,6 +11,7 @@ from lcf_edge.filter.situation cimport Situation
 cdef int LINKS
 cdef double MIN_S
 cdef int MIN_PIECES
+cdef int MANY_PIECES
 cdef int TOUCHING
 cdef int HALF_PIECE
 cdef double SPREAD_PX2
@@ -19,17 +20,17 @@ cdef double INFINITY
 cdef double NAN
 
 cdef class CoarseGroups:
-    cdef int[::1] group, circle
+    cdef int[::1] group, circle, lasting
     cdef Members members
     cdef double[::1] mean_vx, mean_vy, foot
 
-@cython.locals(is_any=bint, lasts=bint, k=int)
-cdef bint begin(CoarseGroups groups, CoarseMotion coarse, double dt_s) noexcept nogil
+@cython.locals(is_any=bint, linked=bint, k=int)
+cdef bint begin(CoarseGroups groups, CoarseMotion coarse) noexcept nogil
 @cython.locals(changed=bint, k=int, column=int, row=int, r=int, c=int, other=int)
 cdef void join(CoarseGroups groups, CoarseMotion coarse) noexcept nogil
 @cython.locals(k=int, g=int, pieces=int, share=double, spread=double)
-cdef void gather(CoarseGroups groups, Members members, CoarseMotion coarse) noexcept nogil
+cdef void gather(CoarseGroups groups, Members members, CoarseMotion coarse, double dt_s) noexcept nogil
 @cython.locals(k=int)
 cdef void tell(CoarseGroups groups, CoarseMotion coarse, int g, CircleColumns circles, int c, Situation around) noexcept nogil
-@cython.locals(evicted=int, g=int, c=int, in_the_air=bint)
+@cython.locals(evicted=int, g=int, c=int, in_the_air=bint, enough=bint)
 cdef int update(CoarseGroups groups, CoarseMotion coarse, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -12,9 +12,10 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-LINKS = 3  # pictures, through which the motion of a piece has led,
-MIN_S = 0.19  # and for so long
+LINKS = 3  # pictures, through which the motion of a piece has led;
+MIN_S = 0.19  # and for so long that of
 MIN_PIECES = 2
+MANY_PIECES = 6  # so many need not have moved for as long
 TOUCHING = 2  # pieces apart: they overlap by half
 HALF_PIECE = 4  # small px
 SPREAD_PX2 = 2.7  # small px², of what a piece shows about its middle
@@ -26,23 +27,24 @@ NAN = float("nan")
 class CoarseGroups:
     """A row a piece: ``group``, the lowest number of those that go with it, -1: none; ``circle``, row of C_r, -1: none.
 
-    A row a group: ``members``; means of the velocity, ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest row, px.
+    A row a group: ``members``; means of the velocity, ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest row, px;
+    ``lasting``: how many of it have moved for ``MIN_S``.
     """
 
     def __init__(self, pieces: int) -> None:
-        self.group, self.circle = integers(pieces), integers(pieces)
+        self.group, self.circle, self.lasting = (integers(pieces) for _ in range(3))
         self.members = Members(pieces)
         self.mean_vx, self.mean_vy, self.foot = (doubles(pieces) for _ in range(3))
 
 
-def begin(groups: CoarseGroups, coarse: CoarseMotion, dt_s: float) -> bool:
-    """Each piece whose motion has lasted is a group; False: there is none."""
+def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
+    """Each piece whose motion has led through pictures enough is a group; False: there is none."""
     is_any = False
     for k in range(coarse.columns * coarse.rows):
-        lasts = coarse.links[k] >= LINKS and (coarse.links[k] - 1) * dt_s >= MIN_S
-        groups.group[k] = k if lasts else -1
+        linked = coarse.links[k] >= LINKS
+        groups.group[k] = k if linked else -1
         groups.circle[k] = -1
-        is_any = is_any or lasts
+        is_any = is_any or linked
     return is_any
 
 
@@ -65,16 +67,20 @@ def join(groups: CoarseGroups, coarse: CoarseMotion) -> None:
                         changed = True
 
 
-def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion) -> None:
+def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion, dt_s: float) -> None:
     """What a circle takes from the pieces of each group."""
     pieces = coarse.columns * coarse.rows
     for g in range(pieces):
         shared.clear(members, g)
         groups.mean_vx[g] = groups.mean_vy[g] = 0.0
         groups.foot[g] = -INFINITY
+        groups.lasting[g] = 0
     for k in range(pieces):
-        if groups.group[k] >= 0:
-            members.size[groups.group[k]] += 1
+        g = groups.group[k]
+        if g >= 0:
+            members.size[g] += 1
+            if (coarse.links[k] - 1) * dt_s >= MIN_S:
+                groups.lasting[g] += 1
     for k in range(pieces):
         g = groups.group[k]
         if g >= 0:
@@ -119,13 +125,14 @@ def update(
     ``updated``: which circles others have updated, to which a group is left; those of groups are marked too.
     """
     evicted = 0
-    if not begin(groups, coarse, around.dt_s):
+    if not begin(groups, coarse):
         return evicted
     join(groups, coarse)
-    gather(groups, groups.members, coarse)
+    gather(groups, groups.members, coarse, around.dt_s)
     for g in range(coarse.columns * coarse.rows):
         in_the_air = groups.foot[g] < around.horizon_y
-        if groups.group[g] != g or groups.members.size[g] < MIN_PIECES or in_the_air:
+        enough = groups.lasting[g] >= MIN_PIECES or groups.members.size[g] >= MANY_PIECES
+        if groups.group[g] != g or not enough or in_the_air:
             continue
         c = shared.nearest_circle(groups.members, g, circles, settings)
         if c < 0:

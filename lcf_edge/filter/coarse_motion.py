@@ -37,8 +37,8 @@ LIKENESS = 0.5  # of the difference that is left if it stands, that is left at m
 RING = 3  # small px from its place, where a distinct piece fits worse by
 RING_LIKENESS = 1.25  # this factor,
 RING_GREY = 0.5  # and so much a pixel
-MAX_SEEN = 32  # pieces in a frame that are sought where they would stand,
-MAX_SEARCHES = 12  # and all around
+MAX_SEEN = 40  # pieces in a frame that are sought where they would stand,
+MAX_SEARCHES = 20  # and all around
 SLOW_S = 0.3  # the older picture is no older than this,
 MIN_SLOW_S = 0.1  # nor younger
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
@@ -360,7 +360,9 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
 
 def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
     """Which pieces that are not known to move do so, since the picture then."""
-    for k in range(coarse.columns * coarse.rows):
+    pieces = coarse.columns * coarse.rows
+    for back in range(pieces):
+        k = pieces - 1 - back
         known = coarse.links[k] > 0 or coarse.rough[k] < PLAIN_GREY * PIXELS
         if known or not put(coarse, k, plane):
             continue

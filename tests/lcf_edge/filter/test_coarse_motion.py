@@ -45,7 +45,7 @@ class Passing:
 
     ``left``, ``top``, ``width``, ``height``: px, in the first picture. ``pxps``: its motion. ``turn_rad``: by which the
     camera turns in each frame. ``grows``: by which it stands nearer in each. ``until_seq``: then it is gone.
-    ``contrast``: of the background.
+    ``contrast``: of the background. ``blobs``: of the thing itself, grey levels.
     """
 
     left: float = 120.0
@@ -59,6 +59,7 @@ class Passing:
     speed_mps: float = 0.0
     frames: int = 8
     contrast: float = 1.0
+    blobs: float = 0.0
     dt_s: float = DT_S
 
     def __iter__(self) -> Iterator[tuple[Motion, Grey]]:
@@ -78,8 +79,14 @@ class Passing:
         scale, time_s = self.grows**seq, seq * self.dt_s
         x = (self.left - LENS.cx) * scale + LENS.cx + self.pxps[0] * time_s + shift_px
         y = (self.top - LENS.cy) * scale + LENS.cy + self.pxps[1] * time_s
-        foot = round(x + self.width * scale), round(y + self.height * scale)
-        cv2.rectangle(image, (round(x), round(y)), foot, 30, -1)
+        left, top = round(x), round(y)
+        right, foot = round(x + self.width * scale), round(y + self.height * scale)
+        if not self.blobs:
+            cv2.rectangle(image, (left, top), (right, foot), 30, -1)
+            return
+        seen = slice(max(left, 0), max(right, 0))
+        paint = BACKGROUND[:, LENS.width :][:, seen.start - left : seen.stop - left]
+        image[max(top, 0) : foot, seen] = 60 + self.blobs * (paint[: foot - max(top, 0)] - 150.0) / 25
 
 
 def driven(scene: Passing, config: Config = CONFIG) -> Iterator[tuple[int, LineCircleFilter]]:
@@ -114,6 +121,14 @@ def test_what_crosses_without_a_corner_is_found_with_its_motion(turn_rad: float)
 def test_it_becomes_an_object() -> None:
     objects = [bool((tables.objects.active & (tables.objects.trust >= 3)).any()) for _, tables in driven(Passing())]
     assert objects[-1]
+
+
+@pytest.mark.parametrize(("left", "width", "first"), [(-300.0, 400.0, 6), (0.0, 300.0, 6), (0.0, 60.0, 4)])
+def test_what_passes_near_from_top_to_bottom_of_the_picture_is_found(left: float, width: float, first: int) -> None:
+    near = Passing(left=left, top=0.0, width=width, height=480.0, pxps=(500.0, 0.0), dt_s=0.05, blobs=20.0)
+    found = rebels(near)
+    assert found[first]
+    assert found[-1]
 
 
 def test_slow_motion_is_seen_since_an_older_picture() -> None:
