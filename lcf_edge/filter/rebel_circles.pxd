@@ -46,6 +46,8 @@ cdef double FASTEST_EXPANSION
 cdef double LINK_SHARE
 cdef double FAR_LINK_SHARE
 cdef double FAR_LINK_RAD
+cdef double NEAR_LINK_M
+cdef double NEAR_LIKE_HZ
 cdef double FAR_LIKE_SPEED
 cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
@@ -87,6 +89,9 @@ cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double dist
 cpdef int lowest_label(RebelGroups groups, int k) noexcept nogil
 cdef void join(RebelGroups groups, int a, int b) noexcept nogil
 cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cdef double near_link_px(double y, Situation around) noexcept nogil
+cdef void join_near(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, int support) noexcept nogil
+cdef void measure_sizes(RebelGroups groups) noexcept nogil
 cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

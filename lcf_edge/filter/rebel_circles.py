@@ -51,6 +51,8 @@ FASTEST_EXPANSION = 4.0  # of one object, over one horizon
 LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
 FAR_LINK_SHARE = 0.08  # or in this one, where they move alike
 FAR_LINK_RAD = 0.35  # but no farther
+NEAR_LINK_M = 0.3  # on the ground, over which groups are linked
+NEAR_LIKE_HZ = 0.3  # that move alike but for an expansion of this
 FAR_LIKE_SPEED = 0.3  # share of the faster one's speed, by which they then differ at most, and which noise stays below
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
@@ -265,13 +267,45 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
                 join(groups, a, b)
 
 
-def number_groups(groups: RebelGroups, support: int) -> None:
-    """Number the groups of at least ``support`` rebels."""
-    groups.groups = 0
+def near_link_px(y: float, around: Situation) -> float:
+    """``NEAR_LINK_M`` at the range of the ground that is seen at row ``y``: what is seen there is no farther off."""
+    if not around.camera_height_m > 0:
+        return 0.0
+    return NEAR_LINK_M * max(y - around.horizon_y, 0.0) / around.camera_height_m
+
+
+def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, support: int) -> None:
+    """Groups of one near thing, whose corners lie far apart in the picture, are one, if they move alike."""
+    measure_sizes(groups)
+    for a in range(groups.count):
+        i = verdicts.row[groups.verdict[a]]
+        for b in range(a):
+            one, other = lowest_label(groups, a), lowest_label(groups, b)
+            if one == other or groups.group[one] < support or groups.group[other] < support:
+                continue
+            k = verdicts.row[groups.verdict[b]]
+            distance = flow.length(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
+            if distance >= near_link_px(max(edges.y[i], edges.y[k]), around):
+                continue
+            difference = flow.length(groups.vx[a] - groups.vx[b], groups.vy[a] - groups.vy[b])
+            noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+            if difference < noise + NEAR_LIKE_HZ * distance:
+                join(groups, a, b)
+                groups.group[min(one, other)] += groups.group[max(one, other)]
+
+
+def measure_sizes(groups: RebelGroups) -> None:
+    """``group`` of the lowest rebel of each group: how many go with it."""
     for k in range(groups.count):
         groups.group[k] = 0
     for k in range(groups.count):
-        groups.group[lowest_label(groups, k)] += 1  # sizes, for now
+        groups.group[lowest_label(groups, k)] += 1
+
+
+def number_groups(groups: RebelGroups, support: int) -> None:
+    """Number the groups of at least ``support`` rebels."""
+    groups.groups = 0
+    measure_sizes(groups)
     for k in range(groups.count):
         lowest = lowest_label(groups, k)
         if lowest < k:
@@ -716,6 +750,7 @@ def update(
         groups.updated[c] = 0
     take_rebels(groups, rebels, breaking, verdicts, edges, baselines)
     cluster(groups, verdicts, edges, around, settings)
+    join_near(groups, verdicts, edges, around, settings.rebel_support)
     number_groups(groups, settings.rebel_support)
     average(groups, groups.members, verdicts, edges, baselines, around)
     fit_expansion(groups, verdicts)

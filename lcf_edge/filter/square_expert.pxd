@@ -55,6 +55,12 @@ cdef int SURE_EDGES
 cdef double COAST_S
 cdef double HIDDEN_S
 cdef double OUTSIDE_S
+cdef double COMING_S
+cdef double NEAR_S
+cdef double LINGERS_S
+cdef double THROUGH_S
+cdef int MIN_THROUGH
+cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
 cdef double LOSES_HZ
@@ -103,7 +109,11 @@ cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Se
 @cython.locals(y=double)
 cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
+cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(through=int)
+cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
 cdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
@@ -144,7 +154,7 @@ cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence ev
 @cython.locals(across=bint)
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
-cdef void go_on(ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef bint obeys(ObjectColumns objects, Py_ssize_t o, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, double share, Situation around) noexcept nogil
 cdef void set_reach(MotionSums bounds, MotionSums wholes, Py_ssize_t o) noexcept nogil

@@ -63,8 +63,14 @@ SURE_EDGES = 7
 COAST_S = 0.3  # an object goes on unseen for so long without losing trust,
 HIDDEN_S = 1.0  # and behind another one for so long,
 OUTSIDE_S = 1.0  # beside the picture,
-RESTING_S = 2.0  # and where it stands, or is near, before a vehicle that stands, too;
+COMING_S = 3.0  # and if it moves towards the path there;
+NEAR_S = 1.0  # where it is near,
 NEAR_M = 1.5
+RESTING_S = 2.0  # where it stands, or is near, before a vehicle that stands, too,
+LINGERS_S = 6.0  # and if nothing is seen through it;
+THROUGH_S = 0.5  # what has kept its place in the picture for so long is
+MIN_THROUGH = 3  # when there are so many of it in the middle of its box,
+THROUGH_SHARE = 0.3  # no farther from there than this share of it
 LOSES_HZ = 20.0  # trust that it loses then
 FOOT_PX = 2.0  # 1 sigma of where the lowest edge is
 BORDER_PX = 4.0
@@ -139,6 +145,8 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
         if math.isfinite(around.speed_mps) != math.isfinite(objects.reference[o]):
             forget_motion(objects, o)
         dt_s, looming = around.dt_s, looming_at(objects, o, around.speed_mps)
+        if lingers(objects, o, around):
+            dt_s = 0.0
         objects.x[o] += velocity_x(objects, o, objects.x[o], looming, around) * dt_s
         objects.y[o] += velocity_y(objects.y[o], looming, around) * dt_s
         growth = 1 + min(max(looming * dt_s, -MAX_LAG), MAX_LAG)
@@ -155,12 +163,14 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
         wander = (
             (WANDER_MPS if objects.unseen_s[o] == 0 else UNSEEN_MPS)
             * max(inverse, math.fabs(looming))
-            * math.sqrt(dt_s)
+            * math.sqrt(around.dt_s)
         )
         objects.mm[o] += wander * wander
         objects.qq[o] += wander * wander
-        objects.age_s[o] += dt_s
-        if is_passed(objects, o) or (not is_in_sight(objects, o, plane) and not is_beside(objects, o, settings)):
+        objects.age_s[o] += around.dt_s
+        if is_passed(objects, o) or (
+            not is_in_sight(objects, o, plane) and not is_beside(objects, o, around, settings)
+        ):
             objects.active[o] = 0
 
 
@@ -178,9 +188,32 @@ def is_passed(objects: ObjectColumns, o: int) -> bool:
     return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
 
 
-def is_beside(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Settings) -> bool:
     """Whether an object that left the picture at its side may still be met."""
-    return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < OUTSIDE_S and objects.middle[o] > 0
+    patience_s = outside_s(objects, o, around)
+    return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < patience_s and objects.middle[o] > 0
+
+
+def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
+    """For how long an object is remembered that left the picture at its side: longer if it moves towards the path."""
+    comes_mps = objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]
+    return COMING_S if comes_mps > SLOW_MPS else OUTSIDE_S
+
+
+def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
+    """Whether an object was lost that is near a vehicle that stands: where it goes to cannot be said."""
+    return objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < SLOW_MPS and objects.range[o] < NEAR_M
+
+
+def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
+    """Whether what stands is seen in the middle of the box of an object that is lost."""
+    through = 0
+    for i in range(edges.count):
+        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S:
+            across, down = math.fabs(edges.x[i] - objects.x[o]), math.fabs(edges.y[i] - objects.y[o])
+            if across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]:
+                through += 1
+    return through >= MIN_THROUGH
 
 
 # Circles of one object
@@ -729,7 +762,9 @@ def is_behind(objects: ObjectColumns, o: int) -> bool:
     return False
 
 
-def go_on(objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation, settings: Settings) -> None:
+def go_on(
+    objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
+) -> None:
     """An object that no edge shows in this frame is hidden, or coasts; in the end it is lost.
 
     What stands shows nothing to a vehicle that does, what is very near may show no corner, and what left the picture
@@ -740,9 +775,13 @@ def go_on(objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation, 
     objects.state[o] = HIDDEN if hidden else COASTING
     patience_s = HIDDEN_S if hidden else COAST_S
     if not is_in_sight(objects, o, plane):
-        patience_s = OUTSIDE_S
-    elif math.fabs(around.speed_mps) < SLOW_MPS and (objects.log_odds[o] > 0 or objects.range[o] < NEAR_M):
+        patience_s = outside_s(objects, o, around)
+    elif lingers(objects, o, around):
+        patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
+    elif math.fabs(around.speed_mps) < SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
+    elif objects.range[o] < NEAR_M:
+        patience_s = NEAR_S
     if objects.unseen_s[o] > patience_s:
         objects.trust[o] -= around.dt_s * LOSES_HZ
     if objects.trust[o] < settings.tr_cr:
@@ -996,7 +1035,7 @@ def update(
             objects.looming[o] = objects.sideways[o] = 0.0
             objects.reference[o] = around.speed_mps
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
-            go_on(objects, o, plane, around, settings)
+            go_on(objects, o, edges, plane, around, settings)
         collect_evidence(squares.evidence, objects, o, plane, around)
         if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or rests(objects, o, around)):
             coast(objects, o, squares.evidence, around)

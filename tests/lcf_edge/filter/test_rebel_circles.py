@@ -176,6 +176,19 @@ def test_rebels_that_do_not_go_together_make_two(scene: Scene, other: tuple[floa
     assert scene.update(CROSSING, other).trust == [NEWBORN, NEWBORN]
 
 
+@pytest.mark.parametrize(
+    ("y", "other_pxps", "height_m", "groups"),
+    [(430.0, 20.0, 0.5, 1), (430.0, 120.0, 0.5, 2), (330.0, 20.0, 0.5, 2), (430.0, 20.0, 0.0, 2)],
+    ids=["near", "near, but not alike", "farther off", "height unknown"],
+)
+def test_groups_far_apart_in_the_picture_are_one_where_what_is_seen_is_near(
+    situation: Situation, y: float, other_pxps: float, height_m: float, groups: int
+) -> None:
+    around = situation(camera_height_m=height_m)  # at row 430 the ground is 1.3 m off: 0.3 m are 114 px
+    scene = Scene(around).update((200.0, y - 110, math.pi, 20.0), (200.0, y, math.pi, other_pxps))
+    assert scene.groups.groups == groups
+
+
 @pytest.mark.parametrize("number", range(1, 6))
 def test_too_few_rebels_make_no_circle(scene: Scene, number: int) -> None:
     assert bool(scene.update(CROSSING, number=number).trust) == (number >= SETTINGS.rebel_support)
