@@ -275,11 +275,16 @@ def near_link_px(y: float, around: Situation) -> float:
 
 
 def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, support: int) -> None:
-    """Groups of one near thing, whose corners lie far apart in the picture, are one, if they move alike."""
+    """Groups of one near thing, whose corners lie far apart in the picture, are one, if they move alike.
+
+    Not what stands: that spreads over the ground, too.
+    """
     measure_sizes(groups)
     for a in range(groups.count):
         i = verdicts.row[groups.verdict[a]]
         for b in range(a):
+            if verdicts.incoming[groups.verdict[a]] or verdicts.incoming[groups.verdict[b]]:
+                continue
             one, other = lowest_label(groups, a), lowest_label(groups, b)
             if one == other or groups.group[one] < support or groups.group[other] < support:
                 continue
