@@ -20,10 +20,10 @@ class RefusedKeyError(Exception):
 
 
 class KeyLimits:
-    """Of one connection. ``wild``: the keys with wildcards of all connections of that name so far."""
+    """Of one connection. ``wild``: the keys with wildcards of all connections of that name so far, but for ``own``."""
 
-    def __init__(self, wild: set[bytes]) -> None:
-        self._wild = wild
+    def __init__(self, wild: set[bytes], own: frozenset[bytes] = frozenset()) -> None:
+        self._wild, self._own = wild, own
         self._declared: dict[int, bytes] = {}
         self._kept: set[bytes] = set()
         self._declared_bytes = 0
@@ -52,7 +52,7 @@ class KeyLimits:
         if key.is_kept and whole not in self._kept:
             self._kept.add(whole)
             self._count(whole)
-        if key.is_kept and b"*" in whole and whole not in self._wild:
+        if key.is_kept and b"*" in whole and whole not in self._own and whole not in self._wild:
             if len(self._wild) >= MOST_WILD:
                 raise RefusedKeyError("too many keys with wildcards")
             self._wild.add(whole)
