@@ -13,11 +13,12 @@ import socket
 from collections import Counter, defaultdict
 from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
+from functools import partial
 from typing import Any
 
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.gate.entrances import MAX_PARTIES, PIECE_BYTES, DaemonAwayError, Entrance, Party, Stream
-from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.key_limits import KeyLimits, NameKeys, RefusedKeyError
 from lcf_edge.gate.pace import Pace
 from lcf_edge.gate.zenoh_batches import GREETINGS, LENGTH_BYTES, NotUnderstoodError
 from lcf_edge.tallies import Tallies
@@ -56,18 +57,18 @@ async def serve(listening: Sequence[socket.socket], gate: "Gate", ends: int | No
 class Gate:
     """``counts``: ``let in``, and of those who were not: ``no certificate``, ``gave way``, ``unknown NAME``, …
 
-    ``own_keys``: keys with wildcards that everybody may use. ``tallies``: where the daemon sees how many were refused.
+    ``own_keys``: keys that everybody may use. ``tallies``: where the daemon sees how many were refused.
     """
 
     def __init__(self, entrance: Entrance, own_keys: Collection[bytes] = (), tallies: Tallies | None = None) -> None:
         self.counts: Counter[str] = Counter()
         self._reported: Counter[str] = Counter()
         self._entrance = entrance
-        self._own_keys = frozenset(own_keys)
         self._tallies = tallies
         self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
         self._parties: dict[asyncio.Task[None], str] = {}
-        self._wild: defaultdict[str, set[bytes]] = defaultdict(set)  # keys with wildcards, by name
+        self._keys: defaultdict[str, NameKeys] = defaultdict(partial(NameKeys, own_keys))
+        self._cut_parties = 0  # that do not know it yet
         self._gone = 0
 
     async def accept(self, listening: socket.socket) -> None:
@@ -168,7 +169,7 @@ class Gate:
             self._refuse("daemon away")
             return
         self.counts[f"{LET_IN}{name}"] += 1
-        limits = KeyLimits(self._wild[name], self._own_keys)
+        limits = KeyLimits(self._keys[name])
         brought = party.place.add if party.place is not None else int
         pumps = [
             asyncio.create_task(_pump_in(outer[0], inner[1], limits, GREETINGS - party.greeted, brought)),
@@ -188,10 +189,18 @@ class Gate:
             inner[1].transport.abort()
 
     async def _cut(self, inner: Stream, why: str) -> None:
-        """Away from the daemon at once; let it know a little later: it comes again as soon as it knows."""
+        """Away from the daemon, and from its place, at once; let it know a little later: it comes again at once."""
         self._refuse(why)
         inner[1].transport.abort()
-        await asyncio.sleep(PENALTY_S)
+        task = asyncio.current_task()
+        assert task is not None
+        self._parties.pop(task, None)
+        if self._cut_parties < MAX_PARTIES:
+            self._cut_parties += 1
+            try:
+                await asyncio.sleep(PENALTY_S)
+            finally:
+                self._cut_parties -= 1
 
 
 async def _pump_in(

@@ -26,7 +26,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser.add_argument("--listening", type=int, nargs="+", required=True, help="descriptors of sockets")
     parser.add_argument("--tallies", type=int, required=True, help="descriptor")
     parser.add_argument("--to", type=Path, required=True, help="Unix socket of the daemon")
-    parser.add_argument("--own-keys", nargs="*", default=[], help="keys with wildcards that everybody may use")
+    parser.add_argument("--own-keys", nargs="*", default=[], help="that everybody may use")
     arguments = parser.parse_args(argv)
     _step_back()
     log.start("warning")

@@ -23,10 +23,12 @@ import msgspec
 from lcf_edge.config import Publish, Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.tallies import Tallies
+from lcf_edge.zenoh_link.topics import STANDARD
 
 RESTART_S = 1.0
 ENDS_WITHIN_S = 1.0
 BACKLOG = 128
+_OWN = ("scene", "preview/compressed", "diagnostics", "speed", "query/scene", "query/config", "query/schema")
 _LONGEST_PATH = 80  # a Unix socket's is 107 bytes
 _TCP = re.compile(r"tcp/\[?(?P<host>[^\]#?/]+)\]?:(?P<port>\d+)")
 
@@ -134,7 +136,8 @@ class OwnGate:
 
     def _started(self) -> "subprocess.Popen[bytes]":
         sockets = [one.fileno() for one in self._sockets]
-        own_keys = [f"{self._prefix}/{rest}" for rest in ("**", "@alive/*", "@alive/**", "query/*")]
+        own_keys = [f"{self._prefix}/{rest}" for rest in ("**", "@alive/*", "@alive/**", "query/*", *_OWN)]
+        own_keys += [topic.key(self._prefix) for topic in STANDARD]
         return subprocess.Popen(
             (
                 *(sys.executable, "-P", "-m", "lcf_edge.gate.own", "--tallies", str(self._tallies.descriptor)),
