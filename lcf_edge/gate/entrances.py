@@ -3,6 +3,7 @@
 import asyncio
 import socket
 import struct
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -52,8 +53,8 @@ class Entrance(Protocol):
     stranger: str
     """What those are counted as who stay one."""
 
-    async def meet(self, connection: socket.socket) -> Party:
-        """Return who came; until then it is a stranger."""
+    async def meet(self, connection: socket.socket, greeted: Callable[[], object]) -> Party:
+        """Return who came; until then it is a stranger. ``greeted``: called when it has said how it greets."""
         ...
 
     def knows(self, name: str) -> bool:
@@ -74,7 +75,7 @@ class ByCertificate:
     def __init__(self, certificates: Certificates, daemon_port: int) -> None:
         self._certificates, self._daemon_port = certificates, daemon_port
 
-    async def meet(self, connection: socket.socket) -> Party:
+    async def meet(self, connection: socket.socket, _greeted: Callable[[], object]) -> Party:
         """Return who has shown a certificate."""
         loop = asyncio.get_running_loop()
         reader = asyncio.StreamReader(PIECE_BYTES)
@@ -107,15 +108,17 @@ class ByUser:
     def __init__(self, path: Path, tallies: Tallies | None = None) -> None:
         self._path, self._tallies = path, tallies or Tallies()
 
-    async def meet(self, connection: socket.socket) -> Party:
+    async def meet(self, connection: socket.socket, greeted: Callable[[], object]) -> Party:
         """Return who has opened a session with the daemon."""
         stream = await asyncio.open_connection(sock=connection, limit=PIECE_BYTES)
         party = Party(stream, "")
         try:
             async with asyncio.timeout(HANDSHAKE_S):
                 said = await _greeting(stream[0])
+                greeted()
+                name = _user(connection)
                 place = self._tallies.take()
-                party = Party(stream, _user(connection), None, GREETINGS, place)
+                party = Party(stream, name, None, GREETINGS, place)
                 inner = await self._connected(place)
                 party = Party(stream, party.name, inner, GREETINGS, place)
                 await _exchange(said, party.stream, inner)
@@ -161,6 +164,9 @@ async def _greeting(reader: asyncio.StreamReader) -> bytes:
     said = await _batch(reader)
     if not is_greeting(said):
         raise OSError("nothing of Zenoh's")
+    await asyncio.sleep(0)  # whose farewell has come as well is nobody for the daemon
+    if reader.at_eof() or reader.exception() is not None:
+        raise OSError("gone")
     return said
 
 

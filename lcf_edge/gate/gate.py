@@ -1,7 +1,8 @@
 """Lets parties through to the daemon. Whatever strangers do takes no more than ``MAX_STRANGERS`` descriptors.
 
-A connection is a stranger's until its TLS handshake has shown a certificate. The oldest stranger gives way to the
-newest: an honest handshake is over in a few round trips, long before so many others have come. What a party says is
+A connection is a stranger's until its TLS handshake has shown a certificate, or the daemon has opened a session for it.
+The oldest stranger gives way to the newest: an honest handshake is over in a few round trips, long before so many
+others have come. Who has begun to open a session gives way only to others who have. What a party says is
 read on its way: one whose keys are beyond the limits of ``key_limits`` is cut before the daemon hears of them.
 """
 
@@ -24,12 +25,13 @@ from lcf_edge.gate.zenoh_batches import GREETINGS, LENGTH_BYTES, NotUnderstoodEr
 from lcf_edge.tallies import Tallies
 
 MAX_STRANGERS = 64
+MAX_GREETERS = 48  # strangers who have said something that strangers say
 SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
 PAUSE_S = 0.1  # when the system refuses a connection
 PENALTY_S = 1.0
 TELL_EACH_S = 10.0
 COLLECT_EACH = 32  # connections: asyncio leaves each in a reference cycle with 256 KiB of buffer
-BACKLOG = 128
+BACKLOG = 1024  # who does not fit would come again after a second
 LET_IN = "let in "
 
 
@@ -66,6 +68,7 @@ class Gate:
         self._entrance = entrance
         self._tallies = tallies
         self._strangers: dict[asyncio.Task[None], None] = {}  # oldest first
+        self._greeters: dict[asyncio.Task[None], None] = {}
         self._parties: dict[asyncio.Task[None], str] = {}
         self._keys: defaultdict[str, NameKeys] = defaultdict(partial(NameKeys, own_keys))
         self._cut_parties = 0  # that do not know it yet
@@ -82,15 +85,31 @@ class Gate:
                 self._refuse("no descriptor")
                 await asyncio.sleep(PAUSE_S)
                 continue
-            while len(self._strangers) >= MAX_STRANGERS:
-                oldest = next(iter(self._strangers))
-                del self._strangers[oldest]
-                oldest.cancel()
-                self._refuse("gave way")
-            task = loop.create_task(self._meet(connection))
-            self._strangers[task] = None
-            task.add_done_callback(self._forget)
+            self._begin(connection)
             await asyncio.sleep(0)  # lets handshakes go on, however many connections come
+
+    def _begin(self, connection: socket.socket) -> None:
+        """Let a stranger in place of the oldest."""
+        self._make_room(self._strangers, MAX_STRANGERS)
+        task = asyncio.get_running_loop().create_task(self._meet(connection))
+        self._strangers[task] = None
+        task.add_done_callback(self._forget)
+
+    def _make_room(self, among: dict[asyncio.Task[None], None], most: int) -> None:
+        while len(among) >= most:
+            oldest = next(iter(among))
+            del among[oldest]
+            oldest.cancel()
+            self._refuse("gave way")
+
+    def _greeted(self) -> None:
+        """Give the current task's stranger one of the places of those who have said something."""
+        task = asyncio.current_task()
+        assert task is not None
+        if task in self._strangers:
+            del self._strangers[task]
+            self._make_room(self._greeters, MAX_GREETERS)
+            self._greeters[task] = None
 
     async def tell(self) -> None:
         """Now and then, until cancelled."""
@@ -113,6 +132,7 @@ class Gate:
 
     def _forget(self, task: asyncio.Task[None]) -> None:
         self._strangers.pop(task, None)
+        self._greeters.pop(task, None)
         self._parties.pop(task, None)
         if not task.cancelled() and task.exception() is not None:
             self._refuse("failed")
@@ -134,6 +154,7 @@ class Gate:
             return
         finally:
             self._strangers.pop(task, None)
+            self._greeters.pop(task, None)
         try:
             refusal = self._refusal(party.name)
             if refusal:
@@ -147,7 +168,7 @@ class Gate:
     async def _met(self, connection: socket.socket) -> Party:
         try:
             connection.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            return await self._entrance.meet(connection)
+            return await self._entrance.meet(connection, self._greeted)
         except BaseException:
             connection.close()
             raise

@@ -27,7 +27,7 @@ from lcf_edge.zenoh_link.topics import STANDARD
 
 RESTART_S = 1.0
 ENDS_WITHIN_S = 1.0
-BACKLOG = 128
+BACKLOG = 1024  # as that of lcf_edge.gate
 _OWN = ("scene", "preview/compressed", "diagnostics", "speed", "query/scene", "query/config", "query/schema")
 _LONGEST_PATH = 80  # a Unix socket's is 107 bytes
 _TCP = re.compile(r"tcp/\[?(?P<host>[^\]#?/]+)\]?:(?P<port>\d+)")

@@ -21,7 +21,9 @@ def test_the_bounds_of_the_gate() -> None:
     assert f"{gate.MAX_STRANGERS} places, the oldest gives way; {entrances.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
     assert f"{entrances.MAX_OF_ONE_NAME} connections of one name, {entrances.MAX_PARTIES} of all" in DOCUMENT
     users = f"{entrances.MAX_OF_ONE_USER} connections of one user, {entrances.MAX_PARTIES} of all"
-    assert f"{gate.MAX_STRANGERS} places until it has a session, {users}" in DOCUMENT
+    assert (
+        f"{gate.MAX_STRANGERS} places until it greets, {gate.MAX_GREETERS} until it has a session, {users}" in DOCUMENT
+    )
     assert "MemoryMax=96M" in GATE_UNIT
     assert "CPUQuota=50%" in GATE_UNIT
 

@@ -5,6 +5,7 @@ import resource
 import select
 import signal
 import socket
+import struct
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -19,6 +20,7 @@ from lcf_edge.config import Publish, Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.gate.entrances import MAX_OF_ONE_USER
 from lcf_edge.gate.key_limits import MOST_NEW_LEVELS
+from lcf_edge.tallies import PLACES
 from lcf_edge.zenoh_link.own_gate import OwnGate, behind, gated
 
 BUDGET_MIB = 85.0
@@ -142,6 +144,18 @@ def test_programs_that_only_say_hello_keep_nobody_out(daemon: Daemon, local: Cal
             one = held.enter_context(socket.create_connection(("127.0.0.1", port)))
             one.sendall((b"", HELLO, b"\xff\xff", b"\x02\x00\x01")[number % 4])
         assert local().get("lcf/query/schema")
+
+
+def test_programs_that_say_hello_and_are_gone_take_no_place_with_them(
+    daemon: Daemon, local: Callable[[], Any], endpoint: str
+) -> None:
+    assert daemon
+    port = int(endpoint.rpartition(":")[2])
+    for _ in range(2 * PLACES):
+        with socket.create_connection(("127.0.0.1", port)) as one:
+            one.sendall(HELLO)
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))  # a reset at the end
+    assert local().get("lcf/query/schema")
 
 
 def test_one_user_has_not_all_places(daemon: Daemon, local: Callable[[], Any]) -> None:
