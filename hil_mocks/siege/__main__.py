@@ -137,13 +137,15 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
         Strangers("nonsense at the gate", 0.01, outer, HTTP),
         Strangers("silence at the gate", 0.02, outer, b""),
         Strangers("half a handshake", 0.02, outer, CLIENT_HELLO),
-        Strangers("silence at the local port", 0.1, local, b""),
+        Strangers("silence at the local port", 0.02, local, b""),
+        Strangers("nonsense at the local port", 0.02, local, HTTP),
         Strangers("slow page", 0.02, page_port, HALF_A_REQUEST),
         Strangers("slow metrics", 0.1, metrics_port, HALF_A_REQUEST),
         Attack("wrong frames", 0.1, frames(page_port)),
         Attack("liar", 0.5, liar(f"tcp/127.0.0.1:{local}")),
         Attack("declarer", 1.0, declarer(f"tcp/127.0.0.1:{local}")),
         Attack("wild keys", 0.5, wild(f"tls/localhost:{outer}", str(planner_settings(folder / "tls")))),
+        Attack("wild keys at the local port", 0.5, wild(f"tcp/127.0.0.1:{local}")),
         Attack("flood", 0.5, flood(f"tcp/127.0.0.1:{local}")),
         Attack("reload", 1.0, reloads(file, to_toml(config))),
         wild_imu,
@@ -153,7 +155,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
         planner = str(planner_settings(folder / "tls"))
         wait_for_planner(f"tls/localhost:{outer}", planner, PATIENCE_S)
         time.sleep(WARM_S)
-        watched(figures, processes, attacks, seconds, outer, page_port, planner)
+        watched(figures, processes, attacks, seconds, outer, page_port, planner, local)
     finally:
         for attack in attacks:
             if attack.ident is not None:
@@ -177,6 +179,7 @@ def watched(
     outer: int,
     page_port: int,
     planner: str,
+    local: int,
 ) -> None:
     """Attack, and look once a second."""
     daemon = processes[0]
@@ -203,7 +206,8 @@ def watched(
             if not paused_s and time.monotonic() > begin_s + seconds / 2:
                 pause(daemon.pid, PAUSE_S)
                 paused_s = PAUSE_S
-            figures.let_in_s.append(wait_for_planner(f"tls/localhost:{outer}", planner, PATIENCE_S))
+            for endpoint, settings in ((f"tls/localhost:{outer}", planner), (f"tcp/127.0.0.1:{local}", "")):
+                figures.let_in_s.append(wait_for_planner(endpoint, settings, PATIENCE_S))
             with suppress(OSError):
                 figures.pages += page_is_served(page_port)
             if any(process.status is not None for process in processes):

@@ -137,8 +137,8 @@ def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
     return wave
 
 
-def wild(endpoint: str, settings: str, prefix: str = "lcf") -> Callable[[], None]:
-    """A party with a certificate whose keys take Zenoh long to compare: one with many wildcards, and many with two."""
+def wild(endpoint: str, settings: str = "", prefix: str = "lcf") -> Callable[[], None]:
+    """A party, or a local program, whose keys take Zenoh long to compare: one of many wildcards, many of two."""
     turn = iter(range(2**30))
     options = Zenoh(mode="client", connect=[endpoint], listen=[], config_file=settings)
 

@@ -20,7 +20,7 @@ def gate(tls: Path | None, host: str | None, port: int, to: str | None, tell: Ca
     import socket
 
     from lcf_edge.daemon import log
-    from lcf_edge.gate.gate import BACKLOG, serve
+    from lcf_edge.gate.gate import BACKLOG, Gate, serve
 
     entrance, leads = _by_user(host, to) if tls is None else _by_certificate(tls, to)
     host = host or ("127.0.0.1" if tls is None else "0.0.0.0")
@@ -36,7 +36,7 @@ def gate(tls: Path | None, host: str | None, port: int, to: str | None, tell: Ca
         ) from error
     with listening:
         tell(f"{'tls' if tls else 'tcp'}/{host}:{listening.getsockname()[1]} leads to {leads}")
-        asyncio.run(serve(listening, entrance))
+        asyncio.run(serve([listening], Gate(entrance)))
 
 
 def _by_certificate(tls: Path, to: str | None) -> "tuple[Entrance, str]":

@@ -37,6 +37,7 @@ def run(
     from lcf_edge.daemon.memory import check_budget
     from lcf_edge.daemon.service import Service
     from lcf_edge.zenoh_link.link import Link
+    from lcf_edge.zenoh_link.own_gate import OwnGate, behind, gated
     from lcf_edge.zenoh_link.session import close_session, open_session
 
     use_one_heap()
@@ -47,10 +48,17 @@ def run(
         log.LOGGER.warning("%s", reason)
     check_budget(config)
     with ExitStack() as stack:
-        opened = partial(open_session, config.zenoh, config.publish)
+        options, gate = config.zenoh, None
+        if endpoints := gated(options, config.publish):
+            gate = OwnGate(endpoints, config.publish.prefix, partial(log.LOGGER.warning, "%s"))
+            stack.callback(gate.close)
+            options = behind(options, config.publish, gate.endpoint)
+        opened = partial(open_session, options, config.publish)
         session = opened()
         stack.callback(close_session, session)
-        link = Link(session, config, opened if config.zenoh.mode != "client" else None, lens_for)
+        link = Link(session, config, opened if options.mode != "client" else None, lens_for, gate)
+        if gate is not None:
+            gate.start()
         stack.pop_all()  # from here on the service closes it
     service = Service(config, link, path, settings, destination=destination, seconds=seconds)
     with service.signals_minded():

@@ -216,6 +216,7 @@ class Zenoh(Table, frozen=True):
     mode: Literal["peer", "client", "router"] = "peer"
     connect: list[str] = []
     listen: list[str] = msgspec.field(default_factory=lambda: ["tcp/127.0.0.1:7447"])
+    gate: bool = True  # a process before plain TCP ports on loopback, which keeps out what would end the daemon
     gossip: bool = False  # connect to the peers of peers, as rmw_zenoh does
     config_file: str = ""  # Zenoh's own (JSON5), for TLS and access control; the keys above override it
 

@@ -61,9 +61,10 @@ def daemon_with(path: Path, proc: Path) -> Process | None:
 
 
 def listening(endpoint: Endpoint, proc: Path) -> Process | None:
-    """Return the process that listens on a port, if this user may know it."""
+    """Return the process that listens on a port, if this user may know it: a daemon rather than its gate."""
     sockets = {f"socket:[{inode}]" for inode in _inodes(endpoint, proc)}
-    return next((process for process in processes(proc) if sockets & (process.files or set())), None)
+    found = [process for process in processes(proc) if sockets & (process.files or set())]
+    return min(found, key=lambda process: not process.is_daemon, default=None)
 
 
 def _open_files(folder: Path) -> frozenset[str] | None:

@@ -17,7 +17,7 @@ _KIND = 0x1F  # of a message's first byte; the rest are flags
 _Z = 0x80  # extensions follow
 _NAMED = 0x20  # a key has a suffix
 
-_CLOSE, _KEEP_ALIVE, _FRAME = 0x03, 0x04, 0x05
+_INIT, _CLOSE, _KEEP_ALIVE, _FRAME = 0x01, 0x03, 0x04, 0x05
 _INTEREST, _RESPONSE_FINAL, _REQUEST, _PUSH, _DECLARE, _OAM = 0x19, 0x1A, 0x1C, 0x1D, 0x1E, 0x1F
 _PUT, _DELETE, _QUERY = 0x01, 0x02, 0x03
 _DECLARE_KEY, _DECLARE_SUBSCRIBER, _DECLARE_QUERYABLE, _DECLARE_TOKEN, _DECLARE_FINAL = 0x00, 0x02, 0x04, 0x06, 0x1A
@@ -40,6 +40,11 @@ class Key:
     suffix: bytes
     declared_as: int = 0  # the number that it gets
     is_kept: bool = True  # Zenoh keeps it, and compares it with all others
+
+
+def is_greeting(batch: bytes) -> bool:
+    """Whether a batch, with its length, may be the first that is said."""
+    return len(batch) > LENGTH_BYTES and batch[LENGTH_BYTES] & _KIND == _INIT
 
 
 def keys(batch: bytes) -> tuple[list[Key], int]:

@@ -1,15 +1,15 @@
 """Who is connected, and how much of the daemon's memory each is charged with.
 
 Zenoh keeps what peers declare, has no limit for it, and does not say who declared what. So whenever the memory of the
-process has grown, the TCP connections that have brought something meanwhile are charged with it, each by its share, but
-with no more than its bytes can have caused. Unix sockets do not count bytes: what TCP leaves unexplained is charged to
-all of them alike.
+process has grown, the connections that have brought something meanwhile are charged with it, each by its share, but
+with no more than its bytes can have caused. TCP counts bytes, and so does a gate; other Unix sockets do not: what is
+left unexplained is charged to all of them alike.
 """
 
 import os
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import suppress
 
 _DESCRIPTORS = "/proc/self/fd"
@@ -25,9 +25,13 @@ Connection = int
 
 
 class Connections:
-    """The connections that others have made to this process. Totals of all: ``charged_mib``, ``received_bytes``."""
+    """The connections that others have made to this process. Totals of all: ``charged_mib``, ``received_bytes``.
 
-    def __init__(self) -> None:
+    ``received_from``: what a gate has counted from the address of a Unix socket; None: it is none of a gate's.
+    """
+
+    def __init__(self, received_from: Callable[[str | bytes], int | None] = lambda _: None) -> None:
+        self._received_from = received_from
         self.charged_mib = 0.0
         self.received_bytes = 0
         self._received: dict[Connection, int] = {}  # bytes, at the last look
@@ -36,7 +40,7 @@ class Connections:
     def charge(self, grown_mib: float) -> None:
         """Charge connections by what each has brought since the last call, while memory grew by that much (0: not)."""
         try:
-            received = {number: _bytes_received(one) for number, one in _accepted()}
+            received = {number: self._bytes_received(one) for number, one in _accepted()}
         except OSError:  # no descriptor is left to look with: the next look counts this one's
             return
         silent = [number for number, count in received.items() if count is None]
@@ -51,6 +55,13 @@ class Connections:
             self._lay(number, explained_mib * count / max(total, 1))
         for number in silent:
             self._lay(number, (grown_mib - explained_mib) / len(silent))
+
+    def _bytes_received(self, one: socket.socket) -> int | None:
+        """None: unknown."""
+        if one.family == socket.AF_UNIX:
+            return self._received_from(one.getpeername())
+        info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES)
+        return int.from_bytes(info[_RECEIVED], sys.byteorder)
 
     def _lay(self, number: Connection, charge_mib: float) -> None:
         self.charged_mib += charge_mib
@@ -114,11 +125,3 @@ def _stream_socket(number: str) -> socket.socket | None:
         return one
     one.close()
     return None
-
-
-def _bytes_received(one: socket.socket) -> int | None:
-    """None: unknown."""
-    if one.family == socket.AF_UNIX:
-        return None
-    info = one.getsockopt(socket.IPPROTO_TCP, socket.TCP_INFO, _TCP_INFO_BYTES)
-    return int.from_bytes(info[_RECEIVED], sys.byteorder)

@@ -15,6 +15,7 @@ from lcf_edge.errors import PublishError
 from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link.connections import Connections
 from lcf_edge.zenoh_link.diagnostics import DiagnosticsPublisher
+from lcf_edge.zenoh_link.own_gate import OwnGate
 from lcf_edge.zenoh_link.preview import PreviewPublisher
 from lcf_edge.zenoh_link.queryables import Answer, Queryables
 from lcf_edge.zenoh_link.ros2 import Ros2Node
@@ -41,7 +42,8 @@ class Link:
 
     No method waits for a peer or raises because of one; failures are counted in ``counts``. Each ``put`` may have a
     thread of its own. ``reopen``: opens another session like the first, for ``renew``. ``lens_for``: gives the lens of
-    the images. Raises ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
+    the images. ``gate``: before the session, closed with it. Raises ``PublishError`` when ``publish.prefix`` or
+    ``publish.robot`` is no valid key.
     """
 
     def __init__(
@@ -50,6 +52,7 @@ class Link:
         config: Config,
         reopen: Callable[[], zenoh.Session] | None = None,
         lens_for: LensFor = lens_by_config,
+        gate: OwnGate | None = None,
     ) -> None:
         self.most_sessions = MAX_SESSIONS
         self._config = config
@@ -58,7 +61,8 @@ class Link:
         self._lens_for = lens_for
         self._own: Counter[str] = Counter(dict.fromkeys(_COUNTED, 0))  # all keys at once: read meanwhile
         self._closed: Counter[str] = Counter()  # by sessions that are closed
-        self._connections = Connections()
+        self._gate = gate
+        self._connections = Connections() if gate is None else Connections(gate.received_bytes)
         self._parts: _Parts | None = None
         self._parts = self._declared(session)
 
@@ -67,7 +71,8 @@ class Link:
         """What happened so far, by part: ``scene sent``, ``speed stale``, ``query answered``, …"""
         parts = self._parts
         received = Counter({"bytes received": self._connections.received_bytes})
-        return self._own + self._closed + received + (Counter() if parts is None else parts.counts)
+        gate = Counter[str]() if self._gate is None else self._gate.counts
+        return self._own + self._closed + received + gate + (Counter() if parts is None else parts.counts)
 
     @property
     def sessions(self) -> int:
@@ -145,9 +150,11 @@ class Link:
             self._parts.messages.config = config
 
     def close(self) -> None:
-        """Stop listening and answering, then close the session; 1.2 s at most, may be called twice."""
+        """Stop listening and answering, then close session and gate; 1.4 s at most, may be called twice."""
         if self._parts is not None:
             self._parts.close()
+        if self._gate is not None:
+            self._gate.close()
 
     def _send(self, part: str, put: Callable[["_Parts"], object]) -> None:
         """Within, count data that do not fit a message, or a missing session, instead of raising."""

@@ -20,6 +20,10 @@ GATE_UNIT = (ROOT / "systemd/lcf-edge-gate.service").read_text(encoding="utf-8")
 def test_the_bounds_of_the_gate() -> None:
     assert f"{gate.MAX_STRANGERS} places, the oldest gives way; {entrances.HANDSHAKE_S:g} s each; 96 MiB" in DOCUMENT
     assert f"{entrances.MAX_OF_ONE_NAME} connections of one name, {entrances.MAX_PARTIES} of all" in DOCUMENT
+    users = f"{entrances.MAX_OF_ONE_USER} connections of one user, {entrances.MAX_PARTIES} of all"
+    assert (
+        f"{gate.MAX_STRANGERS} places until it greets, {gate.MAX_GREETERS} until it has a session, {users}" in DOCUMENT
+    )
     assert "MemoryMax=96M" in GATE_UNIT
     assert "CPUQuota=50%" in GATE_UNIT
 
@@ -30,6 +34,9 @@ def test_what_a_party_may_say() -> None:
     assert f"a key of more than {levels} levels, {most_bytes} bytes or two of `**` and `$*`" in DOCUMENT
     assert f"more than {key_limits.MOST_WILD} different keys with wildcards of one name" in DOCUMENT
     assert f"more than {key_limits.MOST_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
+    most, per_s = key_limits.MOST_NEW_LEVELS, key_limits.NEW_LEVELS_PER_S
+    assert f"different keys of one name may have {most} levels in all, and {per_s} more a second" in DOCUMENT
+    assert f"hears of it after {'a second' if gate.PENALTY_S == 1 else gate.PENALTY_S}" in DOCUMENT
     assert f"the gate reads {pace.MOST_PER_S} messages a second" in DOCUMENT
 
 
@@ -59,7 +66,15 @@ def test_the_bound_of_videos() -> None:
 
 
 def test_every_loss_that_is_counted_is_reported() -> None:
-    counts = {"scene failed", "scene unfit", "bytes received", "sessions", "connections cut", "renewals"}
+    counts = {
+        "scene failed",
+        "scene unfit",
+        "bytes received",
+        "sessions",
+        "connections cut",
+        "renewals",
+        "gate refused",
+    }
     queries = Queryables.COUNTED - {"answered"}
     assert [one for one in counts | {f"query {one}" for one in queries} if f"`{one}`" not in DOCUMENT] == []
 

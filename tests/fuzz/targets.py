@@ -38,7 +38,7 @@ from lcf_edge.config import Config, Publish, load, to_toml
 from lcf_edge.config.attached import IN_RECORDING
 from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.errors import ConfigError, LcfError, RecordingError
-from lcf_edge.gate.key_limits import KeyLimits, RefusedKeyError
+from lcf_edge.gate.key_limits import KeyLimits, NameKeys, RefusedKeyError
 from lcf_edge.gate.zenoh_batches import NotUnderstoodError
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
@@ -208,7 +208,7 @@ def parties(_: Path) -> Iterator[Take]:
     """What a party says at the gate."""
 
     def take(data: bytes) -> str:
-        limits = KeyLimits(set())
+        limits = KeyLimits(NameKeys())
         try:
             messages = limits.check(data)
         except (RefusedKeyError, NotUnderstoodError) as error:

@@ -7,8 +7,11 @@ from lcf_edge.gate.key_limits import (
     MOST_DECLARED_BYTES,
     MOST_KEY_BYTES,
     MOST_LEVELS,
+    MOST_NEW_LEVELS,
     MOST_WILD,
+    NEW_LEVELS_PER_S,
     KeyLimits,
+    NameKeys,
     RefusedKeyError,
 )
 from lcf_edge.gate.zenoh_batches import NotUnderstoodError, keys
@@ -43,7 +46,7 @@ def written(number: int) -> bytes:
 
 @pytest.fixture
 def limits() -> KeyLimits:
-    return KeyLimits(set())
+    return KeyLimits(NameKeys())
 
 
 def test_the_keys_of_a_planner_pass(limits: KeyLimits) -> None:
@@ -78,13 +81,27 @@ def test_a_key_is_judged_with_what_it_begins_with(limits: KeyLimits) -> None:
 
 
 def test_so_many_different_keys_with_wildcards_are_kept_of_one_name_and_no_more() -> None:
-    wild: set[bytes] = set()
+    wild = NameKeys()
     KeyLimits(wild).check(FRAME + declared(1, "**"))
     for number in range(MOST_WILD - 1):  # each of another connection
         KeyLimits(wild).check(FRAME + declared(1, "**") + subscribed(f"/{number}", 1))
     KeyLimits(wild).check(FRAME + subscribed("**/0") + asked("lcf/*") + sent("lcf/*", b""))
     with pytest.raises(RefusedKeyError, match="too many keys with wildcards"):
         KeyLimits(wild).check(FRAME + declared(1, "**") + subscribed("/one-more", 1))
+
+
+def test_different_keys_of_one_name_are_few_at_first_and_fewer_later() -> None:
+    now_s = 0.0
+    name = NameKeys([b"lcf/scene"], lambda: now_s)
+    for number in range(MOST_NEW_LEVELS // 2):  # each of another connection
+        KeyLimits(name).check(FRAME + subscribed(f"a/{number}"))
+    with pytest.raises(RefusedKeyError, match="too many new keys"):
+        KeyLimits(name).check(FRAME + subscribed("a/b"))
+    KeyLimits(name).check(FRAME + subscribed("a/0") + subscribed("lcf/scene"))  # nothing new
+    now_s += 2 / NEW_LEVELS_PER_S
+    KeyLimits(name).check(FRAME + subscribed("a/b"))
+    with pytest.raises(RefusedKeyError, match="too many new keys"):
+        KeyLimits(name).check(FRAME + subscribed("a/c"))
 
 
 def test_a_number_stands_for_one_key_even_if_it_was_taken_back(limits: KeyLimits) -> None:

@@ -29,8 +29,10 @@ Pair = tuple[socket.socket, socket.socket]
 
 @pytest.fixture
 def daemon(without_camera: Callable[..., Daemon]) -> Daemon:
-    """With little memory to spare."""
-    return without_camera(f"memory.budget_mib={BUDGET_MIB}", "camera.width=320", "camera.height=240")
+    """With little memory to spare, and no gate."""
+    return without_camera(
+        "zenoh.gate=false", f"memory.budget_mib={BUDGET_MIB}", "camera.width=320", "camera.height=240"
+    )
 
 
 @pytest.fixture
