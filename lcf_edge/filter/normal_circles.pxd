@@ -2,7 +2,7 @@ cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
 from lcf_edge.filter cimport rounding
-from lcf_edge.filter cimport edge_equations, flow, image_plane, path
+from lcf_edge.filter cimport edge_equations, flow, image_plane, lengths, path
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
