@@ -49,3 +49,5 @@ cdef void average_cell(Flowing flowing, int cell, Members members, EdgeColumns e
 @cython.locals(evicted=int)
 cdef int found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
 cpdef int update(Flowing flowing, EdgeColumns edges, CircleColumns circles, unsigned char[::1] ignored, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(edges=int)
+cpdef double mean_expansion(CircleColumns circles) noexcept nogil

@@ -342,3 +342,13 @@ def update(
     evicted = found(flowing, edges, circles, around, settings, ids)
     direct(circles, around)
     return evicted
+
+
+def mean_expansion(circles: CircleColumns) -> float:
+    """Mean |V/r|, 1/s, of the circles, weighted by their edges; 0 without any."""
+    total, edges = 0.0, 0
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            total += math.fabs(circles.expansion[c]) * circles.support[c]
+            edges += circles.support[c]
+    return total / max(edges, 1)
