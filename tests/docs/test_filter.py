@@ -18,6 +18,6 @@ def test_every_module_of_the_filter_is_described(text: Callable[[str], str]) -> 
     """Except those that only hold records or what others share."""
     modules = {path.name for path in (ROOT / "lcf_edge/filter").glob("*.py")}
     records = {"__init__.py", "inputs.py", "columns.py", "edge_rows.py"}
-    shared = records | {"circles.py", "lengths.py", "memory.py", "rounding.py"}
+    shared = records | {"circles.py", "memory.py", "rounding.py"}
     described = set(re.findall(r"\(\.\./lcf_edge/filter/(\w+\.py)\)", text("docs/filter.md")))
     assert described == modules - shared
