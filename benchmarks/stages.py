@@ -3,6 +3,7 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -78,7 +79,10 @@ def measure_frame(drive: Drive, config: Config) -> list[Stage]:
 def _parts(pipeline: Pipeline) -> dict[str, list[float]]:
     """Of what the pipeline does with a frame."""
     parts = vars(pipeline)
+    parts["_stillness"] = SimpleNamespace(look=parts["_stillness"].look)  # nothing can be set on what is compiled
     steps = (
+        (parts["_repeats"], "is_repeat", "whether the picture repeats the last one"),
+        (parts["_small_image"], "of", "picture in small"),
         (parts["_detector"], "detect", "corners"),
         (parts["_quality"], "notes", "what is wrong with the picture"),
         (parts["_stillness"], "look", "whether the picture stands still"),

@@ -58,21 +58,20 @@ class DurationHistogram:
     """Durations from 10 µs to 10 s, in steps of 3 %; counts of the last one or two ``turn``s."""
 
     def __init__(self) -> None:
-        self._counts = np.zeros((2, _BINS), np.int64)
+        self._now, self._before = [0] * _BINS, [0] * _BINS
 
     def add(self, seconds: float) -> None:
         """Count one duration."""
         place = math.log(max(seconds, _FINEST_S) / _FINEST_S, _RESOLUTION)
-        self._counts[0, min(math.ceil(place), _BINS - 1)] += 1
+        self._now[min(math.ceil(place), _BINS - 1)] += 1
 
     def turn(self) -> None:
         """Forget what is older than the last turn."""
-        self._counts[1] = self._counts[0]
-        self._counts[0] = 0
+        self._now, self._before = [0] * _BINS, self._now
 
     def percentile_s(self, percent: float) -> float:
         """Return the upper edge, s, of the bin that completes this share of the durations; NaN: there are none."""
-        counts = self._counts.sum(axis=0)
+        counts = np.add(self._now, self._before)
         total = int(counts.sum())
         if not total:
             return math.nan

@@ -26,6 +26,7 @@ from lcf_edge.filter import LineCircleFilter
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import NO_CORNERS, Corners
 from lcf_edge.filter.line_circle_filter import Mounting
+from lcf_edge.filter.normal_circles import mean_expansion
 from lcf_edge.filter.tables import Floats
 from lcf_edge.lens import Lens
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, Timing, View
@@ -162,7 +163,9 @@ class Pipeline:
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
         if step.residual is not None:
-            self._motion.correct(step.residual.turn_rad, step.residual.sigma_rad, self._expansion_hz())
+            self._motion.correct(
+                step.residual.turn_rad, step.residual.sigma_rad, mean_expansion(self.filter.normal.columns)
+            )
         filtered = time.perf_counter_ns()
         (circles, circle_objects), objects, psi = self._circles(), self._objects(), self._psi()
         notes = [*ego.notes, *look.notes]
@@ -205,12 +208,6 @@ class Pipeline:
             return ego
         turn = self._image_rotation.turn(small)
         return ego if turn is None else self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
-
-    def _expansion_hz(self) -> float:
-        """Return the mean V/Z of the normal circles, 1/s, weighted by their edges; 0 without any."""
-        normal = self.filter.normal
-        weight = normal.support * normal.active
-        return float(np.abs(normal.expansion) @ weight / max(weight.sum(), 1))
 
     def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
         """Return the circles from Tr_s up, rebels first, and the object id of each, 0: none."""

@@ -139,16 +139,16 @@ class CornerDetector:
 def strongest(squares: Squares, found: Found, share: int) -> Found:
     """The ``share`` strongest corners of each square, in the same order; the arrays are written."""
     pixel, strength, samples = found
-    listed, square = np.empty((2, len(pixel)), np.int32)
-    count = keep_strongest(squares, pixel.data, strength.data, samples.data, listed.data, square.data, share)
+    order, square = np.empty((2, len(pixel)), np.int32)
+    count = keep_strongest(squares, pixel.data, strength.data, samples.data, order.data, square.data, share)
     return pixel[:count], strength[:count], samples[:count]
 
 
 def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capacity: int) -> npt.NDArray[np.int32]:
     """Rows, ascending, of the ``capacity`` corners to keep: the strongest of every square, then the second, and on."""
-    listed, place = np.empty((2, len(pixel)), np.int32)
+    order, place = np.empty((2, len(pixel)), np.int32)
     count = min(capacity, len(pixel))
-    keep_spread(squares, pixel.data, strength.data, listed.data, place.data, count)
+    keep_spread(squares, pixel.data, strength.data, order.data, place.data, count)
     return place[:count]
 
 

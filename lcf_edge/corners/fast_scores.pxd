@@ -21,7 +21,8 @@ cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int
 @cython.locals(y=cython.int, at=cython.int, darkest=cython.uchar)
 cdef bint is_dark(Scores scores, const unsigned char[::1] image, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(y=cython.int, first=cython.int, last=cython.int, w=cython.int, at=cython.int, count=cython.int,
-               word=cython.ulonglong, add=cython.ulonglong, hits=cython.int, k=cython.int, start=cython.int)
+               word=cython.ulonglong, next_word=cython.ulonglong, high=cython.ulonglong,
+               add=cython.ulonglong, hits=cython.int, k=cython.int, start=cython.int)
 cdef int list_above(Scores scores, int threshold, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, at=cython.Py_ssize_t, first=cython.Py_ssize_t,
                second=cython.Py_ssize_t, third=cython.Py_ssize_t, fourth=cython.Py_ssize_t, count=cython.Py_ssize_t,

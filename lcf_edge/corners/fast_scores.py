@@ -31,9 +31,9 @@ class Scores:
     """Scores of the pixels of an image, row after row, and work space. ``dark``: grey level below which a pixel is.
 
     ``plane``: uint8, of each pixel, or a bound of it; ``words``: the same memory, 8 pixels each; ``above``: int32,
-    the pixels above a threshold, and ``some``: int32, the words of a row that have any; ``ring``: how much farther on
-    each of the 16 lies. ``around``, ``least``, ``best``: of the pixels that are scored together those of the ring,
-    uint8 (16, ``BLOCK``), and work space.
+    the pixels above a threshold; ``some``: int32, the words of a row that, or the next ones, have any; ``ring``: how
+    much farther on each of the 16 lies. ``around``, ``least``, ``best``: of the pixels that are scored together those
+    of the ring, uint8 (16, ``BLOCK``), and work space.
     """
 
     def __init__(self, width: int, height: int, dark: int) -> None:
@@ -41,7 +41,7 @@ class Scores:
         words = np.zeros(width * height // 8 + 1, np.uint64)
         self.words, self.plane = memory_of(words), memory_of(words.view(np.uint8))
         self.above = integers(width * height)
-        self.some = integers(width // 8 + 2)
+        self.some = integers(width // 16 + 2)
         self.ring = memory_of(np.array(RING_PX) @ (1, width))
         self.around, self.least, self.best = octets(16, BLOCK), octets(16, BLOCK), octets(2, BLOCK)
 
@@ -121,13 +121,14 @@ def list_above(scores: Scores, threshold: int, left: int, top: int, right: int, 
     for y in range(top, bottom):
         first, last = y * scores.width + left, y * scores.width + right
         hits = 0
-        for w in range(first // 8, (last + 7) // 8):
-            word = words[w]
+        for w in range(first // 8, (last + 7) // 8, 2):
+            word, next_word = words[w], words[w + 1]
             some[hits] = w
-            hits += (((word & LOW_BITS) + add) | word) & HIGH_BITS != 0  # one of the 8 is above min(threshold, 127)
+            high = ((word & LOW_BITS) + add) | word | ((next_word & LOW_BITS) + add) | next_word
+            hits += high & HIGH_BITS != 0  # one of the 16 is above min(threshold, 127)
         for k in range(hits):
             start = 8 * some[k]
-            for at in range(max(start, first), min(start + 8, last)):
+            for at in range(max(start, first), min(start + 16, last)):
                 found[count] = at
                 count += plane[at] > threshold
     return count

@@ -1,8 +1,9 @@
 """What is wrong with an image, in a word or two: few corners, dark, glare, blurred."""
 
-import cv2
 import numpy as np
 import numpy.typing as npt
+
+from lcf_edge.corners.image_sums import brightness, fine_share
 
 FEW_CORNERS = 40
 DARK = 25  # mean grey level
@@ -11,6 +12,7 @@ GLARE_SHARE = 0.2  # of the image that is burnt out
 BLURRED = 0.65  # of the usual sharpness
 MEMORY = 0.05  # share by which each image changes the usual sharpness
 GREY_STEP_PX, LINE_STEP_PX = 8, 32  # of the samples
+FAR_PX = 4
 
 Grey = npt.NDArray[np.uint8]
 
@@ -20,18 +22,22 @@ class ImageQuality:
 
     def __init__(self) -> None:
         self._typical: float | None = None  # sharpness
+        self._sums = np.empty(2, np.int32)  # of grey levels, and of pixels that are burnt out
 
     def notes(self, image: Grey, corners: int) -> tuple[str, ...]:
         """Return what degrades this (height, width) image, in which that many corners were found; usually nothing."""
-        grey = np.ascontiguousarray(image[::GREY_STEP_PX, ::GREY_STEP_PX])
+        height, width = image.shape
+        pixels = np.ascontiguousarray(image).reshape(-1).data
+        brightness(pixels, width, height, GREY_STEP_PX, BURNT_OUT, self._sums.data)
+        (grey, burnt_out), samples = self._sums.tolist(), -(-height // GREY_STEP_PX) * -(-width // GREY_STEP_PX)
         notes: list[str] = []
         if not corners:
             notes.append("no corners")
         elif corners < FEW_CORNERS:
             notes.append("few corners")
-        if cv2.norm(grey, cv2.NORM_L1) < DARK * grey.size:
+        if grey < DARK * samples:
             notes.append("dark")
-        if np.count_nonzero(grey >= BURNT_OUT) > GLARE_SHARE * grey.size:
+        if burnt_out > GLARE_SHARE * samples:
             notes.append("glare")
         sharp = sharpness(image)
         typical = sharp if self._typical is None else self._typical
@@ -46,20 +52,12 @@ def sharpness(image: Grey) -> float:
 
     The smaller of rows and columns, because motion blurs one direction only.
     """
-    rows = image[LINE_STEP_PX // 2 :: LINE_STEP_PX]
-    columns = np.ascontiguousarray(image[:, LINE_STEP_PX // 2 :: LINE_STEP_PX].T)
-    return min(_fine_share(rows), _fine_share(columns))
-
-
-def _fine_share(lines: Grey) -> float:
-    """``lines``: uint8 (n, length), each along a row or a column of the image."""
-    if lines.shape[0] == 0 or lines.shape[1] <= 4:
-        return 1.0
-    near, far = _square_difference(lines, 1), _square_difference(lines, 4)
-    return near / max(far, 1.0)
-
-
-def _square_difference(lines: Grey, apart: int) -> float:
-    """Return the mean square difference of pixels ``apart`` px apart, squared grey levels."""
-    count = lines.shape[0] * (lines.shape[1] - apart)
-    return float(cv2.norm(lines[:, apart:], lines[:, :-apart], cv2.NORM_L2SQR) / count)
+    height, width = image.shape
+    pixels, first = np.ascontiguousarray(image).reshape(-1).data, LINE_STEP_PX // 2
+    rows, columns = len(range(first, height, LINE_STEP_PX)), len(range(first, width, LINE_STEP_PX))
+    along = across = 1.0
+    if rows and width > FAR_PX:
+        along = fine_share(pixels, first * width, rows, LINE_STEP_PX * width, 1, width, FAR_PX)
+    if columns and height > FAR_PX:
+        across = fine_share(pixels, first, columns, LINE_STEP_PX, width, height, FAR_PX)
+    return min(along, across)

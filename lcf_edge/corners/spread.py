@@ -7,28 +7,34 @@ before a bright sky has none that strong. So the image is divided into squares.
 
 from typing import Any, TypeAlias
 
-from lcf_edge.filter.memory import integers, octets
+import numpy as np
+
+from lcf_edge.filter import rounding
+from lcf_edge.filter.memory import integers, memory_of, octets
 
 Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
 Grid: TypeAlias = Any  # and [i, j]
 MEAN_GREY = 128  # of an appearance
 NOISE = 3  # grey levels
 ALIKE_SHARE = 0.6  # of the contrast; at half of it one is taken for the other
+LEVELS = 256  # of strength
 LEAVES = -1  # in place of a square: the corner is surplus
 
 
 class Squares:
     """The squares of one size of image, row after row.
 
-    ``begin``: of each square, where its corners begin in the list ordered by squares, or how many it has;
-    ``poor``: uint8, 1 where there are few; ``rectangles``: int32 (n, 4), left, top, right, bottom, px,
-    the last two beyond it; as many in use as ``find_poor`` says.
+    ``row_of``: the row, or column, that each coordinate lies in. ``counted``: corners of each square. ``ends``: of each
+    strength, where its corners end, or begin, in the list ordered by it. ``poor``: uint8, 1 where there are few;
+    ``rectangles``: int32 (n, 4), left, top, right, bottom, px, the last two beyond it; as many in use as ``find_poor``
+    says.
     """
 
     def __init__(self, width: int, height: int, side_px: int) -> None:
         self.side_px = side_px
         self.rows, self.columns = -(-height // side_px), -(-width // side_px)
-        self.begin = integers(self.rows * self.columns + 1)
+        self.row_of = memory_of(np.arange(max(width, height), dtype=np.int32) // side_px)
+        self.counted, self.ends = integers(self.rows * self.columns), integers(LEVELS)
         self.poor = octets(self.rows * self.columns)
         self.rectangles = integers(self.rows * self.columns, 4)
 
@@ -55,7 +61,7 @@ def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, 
             across, down = pixel[k, 0] - pixel[i, 0], pixel[k, 1] - pixel[i, 1]
             if down < 0 or down > reach:
                 break
-            if -reach <= across <= reach and look_alike(samples, i, k):
+            if abs(across) <= reach and look_alike(samples, i, k):
                 beaten[i if strength[k] > strength[i] else k] = 1
     kept = 0
     for i in range(corners):
@@ -77,87 +83,81 @@ def look_alike(samples: Grid, i: int, k: int) -> bool:
 
 def count(squares: Squares, pixel: Grid, square: Column) -> None:
     """How many corners each square has; ``square``, int32 (n,), of each corner, is written."""
-    for s in range(squares.begin.shape[0]):
-        squares.begin[s] = 0
+    for s in range(squares.counted.shape[0]):
+        squares.counted[s] = 0
     for i in range(pixel.shape[0]):
-        square[i] = pixel[i, 1] // squares.side_px * squares.columns + pixel[i, 0] // squares.side_px
-        squares.begin[square[i]] += 1
+        s = squares.row_of[pixel[i, 1]] * squares.columns + squares.row_of[pixel[i, 0]]
+        square[i] = s
+        squares.counted[s] += 1
 
 
-def gather(squares: Squares, square: Column, listed: Column) -> None:
-    """List the counted corners by squares: ``listed``, int32 (n,), is written."""
-    for s in range(1, squares.begin.shape[0]):
-        squares.begin[s] += squares.begin[s - 1]
-    for i in range(square.shape[0] - 1, -1, -1):
-        squares.begin[square[i]] -= 1
-        listed[squares.begin[square[i]]] = i
+def order_by_strength(squares: Squares, strength: Column, order: Column) -> None:
+    """List the corners, the strongest first, of equals the first; ``order``, int32 (n,), is written."""
+    ends = squares.ends
+    for level in range(ends.shape[0]):
+        ends[level] = 0
+    for i in range(strength.shape[0]):
+        ends[rounding.whole(strength[i])] += 1
+    for level in range(ends.shape[0] - 1, 0, -1):
+        ends[level - 1] += ends[level]
+    for i in range(strength.shape[0] - 1, -1, -1):
+        level = rounding.whole(strength[i])
+        ends[level] -= 1
+        order[ends[level]] = i
 
 
-def place_in_square(squares: Squares, s: int, i: int, strength: Column, listed: Column, enough: int) -> int:
-    """How many corners of a gathered square are stronger than one of them, or as strong and earlier; or ``enough``."""
-    place = 0
-    for k in range(squares.begin[s], squares.begin[s + 1]):
-        other = listed[k]
-        if strength[other] > strength[i] or (strength[other] == strength[i] and other < i):
-            place += 1
-            if place >= enough:
-                break
-    return place
-
-
-def keep_spread(squares: Squares, pixel: Grid, strength: Column, listed: Column, place: Column, capacity: int) -> None:
+def keep_spread(squares: Squares, pixel: Grid, strength: Column, order: Column, place: Column, capacity: int) -> None:
     """Write to ``place`` which ``capacity`` corners stay, ascending: the strongest of every square, then the second,
     and on; of the last ones the strongest of all.
 
-    ``listed``, ``place``: int32 (n,), written; ``capacity``: n at most.
+    ``strength``: whole, below ``LEVELS``. ``order``, ``place``: int32 (n,), written; ``capacity``: n at most.
     """
+    corners, counted = pixel.shape[0], squares.counted
     count(squares, pixel, place)
     last, fit = 0, 0  # ranks within a square that fit, and corners of these ranks
     while fit < capacity:
         last += 1
         fit = 0
-        for s in range(squares.rows * squares.columns):
-            fit += min(squares.begin[s], last)
-    gather(squares, place, listed)
+        for s in range(counted.shape[0]):
+            fit += min(counted[s], last)
+    for s in range(counted.shape[0]):
+        counted[s] = 0
+    order_by_strength(squares, strength, order)
     room = capacity
-    for i in range(pixel.shape[0]):
-        place[i] = place_in_square(squares, place[i], i, strength, listed, last)
+    for k in range(corners):
+        i = order[k]
+        s = place[i]
+        place[i] = counted[s]
+        counted[s] += 1
         room -= place[i] < last - 1
-    rivals = 0
-    for i in range(pixel.shape[0]):
+    for k in range(corners):
+        i = order[k]
         if place[i] == last - 1:
-            listed[rivals] = i
-            rivals += 1
-    for k in range(rivals):
-        stronger = 0
-        for j in range(rivals):
-            more = strength[listed[j]] > strength[listed[k]]
-            stronger += more or (strength[listed[j]] == strength[listed[k]] and j < k)
-            if stronger >= room:
-                break
-        if stronger >= room:
-            place[listed[k]] = last
+            place[i] = last - 1 if room > 0 else last
+            room -= 1
     kept = 0
-    for i in range(pixel.shape[0]):
+    for i in range(corners):
         if place[i] < last:
             place[kept] = i
             kept += 1
 
 
 def keep_strongest(
-    squares: Squares, pixel: Grid, strength: Column, samples: Grid, listed: Column, square: Column, share: int
+    squares: Squares, pixel: Grid, strength: Column, samples: Grid, order: Column, square: Column, share: int
 ) -> int:
     """Move the ``share`` strongest corners of each square to the front, in the same order. Return how many.
 
-    ``listed``, ``square``: int32 (n,), written.
+    ``strength``: whole, below ``LEVELS``. ``order``, ``square``: int32 (n,), written.
     """
+    counted = squares.counted
     count(squares, pixel, square)
-    gather(squares, square, listed)
-    for i in range(pixel.shape[0]):
+    order_by_strength(squares, strength, order)
+    for k in range(pixel.shape[0] - 1, -1, -1):
+        i = order[k]
         s = square[i]
-        if squares.begin[s + 1] - squares.begin[s] > share:  # with fewer, all stay
-            leaves = place_in_square(squares, s, i, strength, listed, share) >= share
-            square[i] = LEAVES if leaves else s
+        if counted[s] > share:
+            counted[s] -= 1
+            square[i] = LEAVES
     kept = 0
     for i in range(pixel.shape[0]):
         if square[i] != LEAVES:
@@ -177,7 +177,7 @@ def find_poor(squares: Squares, pixel: Grid, square: Column, few: int, among: Gr
     for row in range(squares.rows):
         for column in range(squares.columns):
             s = row * squares.columns + column
-            squares.poor[s] = squares.begin[s] < few and row >= first_row and among[row, column] != 0
+            squares.poor[s] = squares.counted[s] < few and row >= first_row and among[row, column] != 0
     found = 0
     for row in range(squares.rows):
         column = 0

@@ -14,7 +14,7 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``path``             its path over the ground: how far beside it something lies, and how long the way to it is
 ``image_plane``      where a position of the ideal pinhole is seen through the lens
 ``least_squares``    of a few unknowns
-``rounding``         to whole numbers, as C does
+``rounding``         to whole numbers, as C does; ``lengths`` of offsets
 ``derotation``       step 0: the camera's rotation is taken out of all that is stored
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow
+from lcf_edge.filter cimport flow, lengths
 from lcf_edge.filter.flow cimport Homography, Pinhole
 from lcf_edge.filter.key_frames cimport KeyFrames
 from lcf_edge.filter.situation cimport Situation

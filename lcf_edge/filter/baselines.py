@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import flow
+from lcf_edge.filter import flow, lengths
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
@@ -24,7 +24,7 @@ class Baselines:
 
     def __init__(self) -> None:
         self.h = doubles(KEYS, 9)
-        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = (doubles(KEYS) for _ in range(5))
+        self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = [doubles(KEYS) for _ in range(5)]
         self.is_fitted = False
         self.rate_covariance = doubles(3, 3)
 
@@ -86,7 +86,7 @@ def sigma_along(baselines: Baselines, pinhole: Pinhole, slot: int, x: float, y: 
     if not baselines.is_fitted:
         return baselines.sigma_px[slot]
     dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
-    r = max(flow.length(dx, dy), MIN_R_PX)
+    r = max(lengths.of(dx, dy), MIN_R_PX)
     cos, sin = dx / r, dy / r
     variance = 0.0
     for i in range(3):

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport edge_equations, flow
+from lcf_edge.filter cimport edge_equations, lengths
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.settings cimport Settings
 

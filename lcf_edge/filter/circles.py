@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import edge_equations, flow
+from lcf_edge.filter import edge_equations, lengths
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
@@ -38,7 +38,7 @@ class Members:
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
         self.size = integers(capacity)
-        self.x, self.y, self.variance_x, self.variance_y = (doubles(capacity) for _ in range(4))
+        self.x, self.y, self.variance_x, self.variance_y = [doubles(capacity) for _ in range(4)]
 
 
 def clear(members: Members, g: int) -> None:
@@ -91,7 +91,7 @@ def nearest_circle(members: Members, g: int, circles: CircleColumns, settings: S
     reach = radius_of(members, g, settings.bs_px) + settings.member_margin_px
     for c in range(circles.capacity):
         if circles.active[c]:
-            away = flow.length(circles.x[c] - members.x[g], circles.y[c] - members.y[g])
+            away = lengths.of(circles.x[c] - members.x[g], circles.y[c] - members.y[g])
             away -= max(circles.radius[c], reach)
             if away < least:
                 nearest, least = c, away

@@ -3,7 +3,7 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import coarse_motion, edge_equations, flow, situation
+from lcf_edge.filter import coarse_motion, edge_equations, lengths, situation
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
@@ -34,7 +34,7 @@ class CoarseGroups:
     def __init__(self, pieces: int) -> None:
         self.group, self.circle, self.lasting = (integers(pieces) for _ in range(3))
         self.members = Members(pieces)
-        self.mean_vx, self.mean_vy, self.foot = (doubles(pieces) for _ in range(3))
+        self.mean_vx, self.mean_vy, self.foot = [doubles(pieces) for _ in range(3)]
 
 
 def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
@@ -102,7 +102,7 @@ def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion, dt_s: f
 def tell(groups: CoarseGroups, coarse: CoarseMotion, g: int, circles: CircleColumns, c: int, around: Situation) -> None:
     """The motion of a group's circle; what it moves on is no nearer than the ground that is seen under it."""
     circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
-    circles.speed[c] = flow.length(groups.mean_vx[g], groups.mean_vy[g])
+    circles.speed[c] = lengths.of(groups.mean_vx[g], groups.mean_vy[g])
     circles.cause[c], circles.ttc[c], circles.lateral[c] = CROSSING, INFINITY, NAN
     circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
     for k in range(coarse.columns * coarse.rows):

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from libc.stdlib cimport abs
-from lcf_edge.filter cimport flow, image_plane, rounding
+from lcf_edge.filter cimport flow, image_plane, lengths, rounding
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.flow cimport Homography, Pinhole
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -38,8 +38,8 @@ cdef int WORST
 
 cdef class CoarseMotion:
     cdef readonly int width, height, side, columns, rows
-    cdef unsigned char[::1] now, last, then
-    cdef unsigned char[:, ::1] kept
+    cdef unsigned char[::1] now, kept, pieces, pieces_last, then
+    cdef unsigned long long[::1] words, words_last, words_then
     cdef double[:, :, ::1] turned
     cdef Homography back
     cdef double then_s, ahead_m, focus_x, focus_y, off_flow, base_x, base_y, share
@@ -51,17 +51,18 @@ cdef class CoarseMotion:
     cdef double[:, ::1] shares
     cdef double[::1] vx, vy, elapsed_s
 
-@cython.locals(k=int, i=int, j=int)
+@cython.locals(k=cython.Py_ssize_t, i=int, j=int)
 cpdef void take(CoarseMotion coarse, const unsigned char[::1] small) noexcept nogil
+@cython.locals(x=int, y=int, word=cython.ulonglong, grey=cython.ulonglong)
+cdef void lay_out(CoarseMotion coarse, const unsigned char[::1] picture, int first, unsigned long long[::1] words) noexcept nogil
 @cython.locals(i=int, j=int)
 cpdef void turn(CoarseMotion coarse, const double[:, :, ::1] rotation) noexcept nogil
-@cython.locals(k=int)
+@cython.locals(k=cython.Py_ssize_t)
 cpdef void keep(CoarseMotion coarse, int slot) noexcept nogil
 @cython.locals(i=int, j=int)
 cdef void turn_back(CoarseMotion coarse, Pinhole pinhole, const double[:, :, ::1] rotation, int k, KeyFrames keys) noexcept nogil
-@cython.locals(k=int)
+@cython.locals(k=cython.Py_ssize_t)
 cdef void look_back(CoarseMotion coarse, KeyFrames keys, Situation around) noexcept nogil
-@cython.locals(k=int)
 cdef void look_farther_back(CoarseMotion coarse, int slot, KeyFrames keys, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(k=int, oldest=int, most=double)
 cdef int older_slot(CoarseMotion coarse, Baselines baselines) noexcept nogil
@@ -69,7 +70,7 @@ cdef int older_slot(CoarseMotion coarse, Baselines baselines) noexcept nogil
 cdef void roughen(CoarseMotion coarse) noexcept nogil
 cdef int calm(CoarseMotion coarse, int k) noexcept nogil
 cdef int nearest_px(double x) noexcept nogil
-@cython.locals(total=int, here=int, there=int, k=int)
+@cython.locals(total=int, here=cython.Py_ssize_t, there=cython.Py_ssize_t, k=cython.Py_ssize_t)
 cdef int difference(CoarseMotion coarse, int x, int y, int most) noexcept nogil
 @cython.locals(x=int, y=int, most=int)
 cdef bint stands_as_lately(CoarseMotion coarse, int k, double end_x, double end_y) noexcept nogil

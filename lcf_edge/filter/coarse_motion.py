@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from lcf_edge.filter import flow, image_plane, rounding
+from lcf_edge.filter import flow, image_plane, lengths, rounding
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
-from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, memory_of, octets
+from lcf_edge.filter.memory import Bytes, Doubles, Words, doubles, integers, memory_of, octets
 from lcf_edge.filter.situation import Situation
 from lcf_edge.lens import Lens
 
@@ -50,13 +50,17 @@ WORST = 256 * 64
 class CoarseMotion:
     """The picture in small, ``width`` by ``height``, each px of which is ``side`` px of the input frame.
 
-    Pixels, row after row: ``now``, ``last``; ``kept`` (KEYS, pixels), of the key frames, ``keys`` of them so far.
+    Pixels, row after row: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far.
     ``turned``: (1, 3, 3), the rotation since the last one.
 
-    The picture in which pieces are sought: ``then``, ``then_s`` ago; ``back``, from where what is far off is seen now
-    to where it was seen then; ``ahead_m``, ``focus_x``, ``focus_y``: how far and where the vehicle drove since;
-    ``off_flow``, small px. Of the piece that is sought: ``here``, its first pixel; ``base_x``, ``base_y``, where it was
-    if it is far off, small px of its upper left; ``across``, ``down``, from there, where it was if it moves;
+    Pixels laid out so that those of a piece lie together: of each column the ``WINDOW`` px to the right of it, row
+    after row. ``pieces``, ``pieces_last``, of this picture and the last one.
+
+    The picture in which pieces are sought: ``then``, laid out, ``then_s`` ago; ``back``, from where what is far off is
+    seen now to where it was seen then; ``ahead_m``, ``focus_x``, ``focus_y``: how far and where the vehicle drove
+    since; ``off_flow``, small px. ``words``, ``words_last``, ``words_then``: the memory of what is laid out, a row of a
+    piece each. Of the piece that is sought: ``here``, its first pixel in ``pieces``; ``base_x``, ``base_y``, where it
+    was if it is far off, small px of its upper left; ``across``, ``down``, from there, where it was if it moves;
     ``least_still``, ``least_moving``, the difference that is left; ``share``: of the way to where the nearest would
     have been, if it stands.
 
@@ -74,8 +78,11 @@ class CoarseMotion:
         self.columns = max((self.width - WINDOW) // STEP + 1, 0)
         self.rows = max((self.height - WINDOW) // STEP + 1, 0)
         pieces, pixels = self.columns * self.rows, self.width * self.height
-        self.now, self.last, self.then = octets(pixels), octets(pixels), octets(pixels)
-        self.kept = octets(KEYS, pixels)
+        self.now, self.kept = octets(pixels), octets(KEYS * pixels)
+        laid_out = max(self.width - WINDOW + 1, 0) * self.height
+        words = np.zeros((3, laid_out), np.uint64)
+        self.words, self.words_last, self.words_then = [memory_of(each) for each in words]
+        self.pieces, self.pieces_last, self.then = [memory_of(each.view(np.uint8)) for each in words]
         self.turned = memory_of(np.eye(3).reshape(1, 3, 3))
         self.back = Homography()
         self.then_s = self.ahead_m = self.focus_x = self.focus_y = self.off_flow = 0.0
@@ -86,10 +93,10 @@ class CoarseMotion:
         u, v = np.meshgrid(np.arange(self.columns) * STEP * side + half, np.arange(self.rows) * STEP * side + half)
         middles = lens.undistort(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float32)).astype(np.float64)
         self.x, self.y = memory_of(middles[:, 0]), memory_of(middles[:, 1])
-        self.rough, self.links, self.links_before = (integers(pieces) for _ in range(3))
+        self.rough, self.links, self.links_before = [integers(pieces) for _ in range(3)]
         self.block = integers((self.columns + 1) * (self.rows + 1))
         self.came_x, self.came_y, self.shares = doubles(pieces), doubles(pieces), doubles(2, pieces)
-        self.vx, self.vy, self.vx_before, self.vy_before = (doubles(pieces) for _ in range(4))
+        self.vx, self.vy, self.vx_before, self.vy_before = [doubles(pieces) for _ in range(4)]
         self.elapsed_s = doubles(pieces)
 
 
@@ -99,12 +106,25 @@ class CoarseMotion:
 def take(coarse: CoarseMotion, small: Bytes) -> None:
     """Take the next picture in small, row after row."""
     for k in range(coarse.width * coarse.height):
-        coarse.last[k] = coarse.now[k]
         coarse.now[k] = small[k]
+    for k in range(coarse.words.shape[0]):
+        coarse.words_last[k] = coarse.words[k]
+    lay_out(coarse, coarse.now, 0, coarse.words)
     for i in range(3):
         for j in range(3):
             coarse.turned[0, i, j] = 1.0 if i == j else 0.0
     coarse.pictures = min(coarse.pictures + 1, 2)
+
+
+def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> None:
+    """Lay out a picture from its first pixel on."""
+    for y in range(coarse.height):
+        word = 0
+        for x in range(coarse.width):
+            grey = picture[first + y * coarse.width + x]
+            word = word >> 8 | grey << 56
+            if x >= WINDOW - 1:
+                words[(x - WINDOW + 1) * coarse.height + y] = word
 
 
 def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
@@ -119,7 +139,7 @@ def keep(coarse: CoarseMotion, slot: int) -> None:
     """This picture is that of the key frame in ``slot``."""
     coarse.keys = min(coarse.keys + 1, KEYS)
     for k in range(coarse.width * coarse.height):
-        coarse.kept[slot, k] = coarse.now[k]
+        coarse.kept[slot * coarse.width * coarse.height + k] = coarse.now[k]
 
 
 def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int, keys: KeyFrames) -> None:
@@ -132,8 +152,8 @@ def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int,
 
 def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
     """Pieces are sought in the last picture."""
-    for k in range(coarse.width * coarse.height):
-        coarse.then[k] = coarse.last[k]
+    for k in range(coarse.words.shape[0]):
+        coarse.words_then[k] = coarse.words_last[k]
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
     coarse.then_s = around.dt_s
     coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else 0.0
@@ -146,8 +166,7 @@ def look_farther_back(
     coarse: CoarseMotion, slot: int, keys: KeyFrames, baselines: Baselines, around: Situation
 ) -> None:
     """Pieces are sought in the picture of the key frame in ``slot``."""
-    for k in range(coarse.width * coarse.height):
-        coarse.then[k] = coarse.kept[slot, k]
+    lay_out(coarse, coarse.kept, slot * coarse.width * coarse.height, coarse.words_then)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
     coarse.then_s, coarse.ahead_m = baselines.elapsed_s[slot], baselines.depth_m[slot]
     coarse.focus_x, coarse.focus_y = baselines.focus_x[slot], baselines.focus_y[slot]
@@ -196,17 +215,12 @@ def nearest_px(x: float) -> int:
 
 
 def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
-    """Sum of absolute grey differences of the piece sought from that then at (x, y); beyond ``most`` it may end."""
+    """Sum of absolute grey differences of the piece sought from that then at (x, y); outside it is above ``most``."""
     if x < 0 or x > coarse.width - WINDOW or y < 0 or y > coarse.height - WINDOW:
         return most + 1
-    total, here, there = 0, coarse.here, y * coarse.width + x
-    for _ in range(WINDOW):
-        for k in range(WINDOW):
-            total += abs(coarse.now[here + k] - coarse.then[there + k])
-        if total > most:
-            return total
-        here += coarse.width
-        there += coarse.width
+    total, here, there = 0, coarse.here, WINDOW * (x * coarse.height + y)
+    for k in range(PIXELS):
+        total += abs(coarse.pieces[here + k] - coarse.then[there + k])
     return total
 
 
@@ -245,7 +259,7 @@ def seek_standing(coarse: CoarseMotion, k: int, end_x: float, end_y: float, off_
 def off_segment(x: float, y: float, end_x: float, end_y: float) -> float:
     """Distance of a point from the segment between the origin and its end."""
     along = min(max((x * end_x + y * end_y) / max(end_x * end_x + end_y * end_y, 1.0), 0.0), 1.0)
-    return flow.length(x - along * end_x, y - along * end_y)
+    return lengths.of(x - along * end_x, y - along * end_y)
 
 
 def try_moving(coarse: CoarseMotion, across: int, down: int, end_x: float, end_y: float, off_flow: float) -> None:
@@ -304,8 +318,8 @@ def set_motion(coarse: CoarseMotion, k: int) -> None:
 
 def are_alike(coarse: CoarseMotion, vx: float, vy: float, other_vx: float, other_vy: float) -> bool:
     """Whether two motions may be one."""
-    speed = max(flow.length(vx, vy), flow.length(other_vx, other_vy))
-    return flow.length(vx - other_vx, vy - other_vy) <= SAME_SMALL_PX * coarse.side / coarse.then_s + SAME_SHARE * speed
+    speed = max(lengths.of(vx, vy), lengths.of(other_vx, other_vy))
+    return lengths.of(vx - other_vx, vy - other_vy) <= SAME_SMALL_PX * coarse.side / coarse.then_s + SAME_SHARE * speed
 
 
 def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
@@ -326,7 +340,7 @@ def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
 def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
     """Set ``here`` and ``base`` of a piece; False: if it is far off, it was not all in the picture."""
     left, top = STEP * (k % coarse.columns), STEP * (k // coarse.columns)
-    coarse.here = top * coarse.width + left
+    coarse.here = WINDOW * (left * coarse.height + top)
     if not image_plane.project(plane, coarse.x[k], coarse.y[k]):
         return False
     u, v = plane.u, plane.v
@@ -345,7 +359,7 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     if stands_as_lately(coarse, k, end_x, end_y) or coarse.seen >= MAX_SEEN:
         return False
     coarse.seen += 1
-    turned = flow.length(
+    turned = lengths.of(
         coarse.base_x - STEP * (k % coarse.columns), coarse.base_y - STEP * (k // coarse.columns)
     )  # where the lens is guessed, so is by how much a turn moved the piece
     off_flow = coarse.off_flow + TURN_SIGMAS * around.turn_share * turned

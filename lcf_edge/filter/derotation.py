@@ -63,9 +63,9 @@ class OffLine:
 
     def __init__(self) -> None:
         self.count = 0
-        self.pitch, self.yaw, self.roll, self.px = (doubles(MAX_EDGES) for _ in range(4))
+        self.pitch, self.yaw, self.roll, self.px = [doubles(MAX_EDGES) for _ in range(4)]
         self.turn_x = self.turn_y = self.turn_z = self.sigma = 0.0
-        self.alone, self.alone_sigma = (doubles(3) for _ in range(2))
+        self.alone, self.alone_sigma = [doubles(3) for _ in range(2)]
         self.equations = NormalEquations()
 
 

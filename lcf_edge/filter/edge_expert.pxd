@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport edge_equations, edge_rows, flow, image_plane, line_expert, rebel_circles
+from lcf_edge.filter cimport edge_equations, edge_rows, image_plane, lengths, line_expert, rebel_circles
 from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings

@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import edge_equations, edge_rows, flow, image_plane, line_expert, rebel_circles
+from lcf_edge.filter import edge_equations, edge_rows, image_plane, lengths, line_expert, rebel_circles
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Bytes
@@ -27,7 +27,7 @@ def direct(edges: EdgeColumns, i: int, around: Situation) -> float:
     Normal edges go out along their flow line, rebels along β + DL, chains along β.
     """
     dx, dy = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
-    r = flow.length(dx, dy)
+    r = lengths.of(dx, dy)
     if edges.own_way(i):
         heading = edges.beta[i] + (edges.deviation[i] if edges.rebel[i] else 0.0)
         edges.cos[i], edges.sin[i] = math.cos(heading), math.sin(heading)
@@ -171,7 +171,7 @@ def trust_in_prediction(
 def turn_own_way(edges: EdgeColumns, i: int) -> None:
     """β of a rebel or chain is the direction from its O, and DL follows its turn."""
     dx, dy, before = edges.x[i] - edges.origin_x[i], edges.y[i] - edges.origin_y[i], edges.beta[i]
-    if flow.length(dx, dy) > MIN_ORIGIN_PX:
+    if lengths.of(dx, dy) > MIN_ORIGIN_PX:
         edges.beta[i] = math.atan2(dy, dx)
     deviation = edge_equations.update_deviation(edges.deviation[i], edges.beta[i] - before)
     edges.deviation[i] = edge_equations.bound_deviation(deviation)
@@ -194,7 +194,7 @@ def stray(
     x, y = corners.x[corner], corners.y[corner]
     edges.x[row], edges.y[row] = x, y
     edges.beta[row] = math.atan2(y - y0, x - x0)
-    edges.speed[row] = flow.length(x - x0, y - y0) / dt_s
+    edges.speed[row] = lengths.of(x - x0, y - y0) / dt_s
     edges.origin_x[row], edges.origin_y[row] = x0, y0
     edges.deviation[row] = 0.0
     edges.trust[row] = settings.tr_new
@@ -238,7 +238,7 @@ def add(
             row = edges.count
             edges.count += 1
             x, y = corners.x[k], corners.y[k]
-            r = flow.length(x - around.focus_x, y - around.focus_y)
+            r = lengths.of(x - around.focus_x, y - around.focus_y)
             edge_rows.empty_row(edges, row)
             edges.x[row], edges.y[row] = x, y
             edges.speed[row] = first_expansion(x, y, normal, groups, around, settings) * r
@@ -276,7 +276,7 @@ def join_rebels(edges: EdgeColumns, start: int, circles: CircleColumns, around: 
             vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)
             edges.suspect_keys[i] = 1
             edges.beta[i] = math.atan2(vy, vx)
-            edges.speed[i] = flow.length(vx, vy)
+            edges.speed[i] = lengths.of(vx, vy)
             edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]
             step = JOIN_GATE_SHARE * edges.speed[i] * around.dt_s
             edges.bl[i] = max(STRAY_GATE_SHARE * settings.bl0_px, step)

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport circles, flow, image_plane, key_frames, normal_circles
+from lcf_edge.filter cimport circles, image_plane, key_frames, lengths, normal_circles
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane cimport ImagePlane

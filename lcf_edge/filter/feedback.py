@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import circles, flow, image_plane, key_frames, normal_circles
+from lcf_edge.filter import circles, image_plane, key_frames, lengths, normal_circles
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.image_plane import ImagePlane
@@ -29,8 +29,8 @@ class Candidates:
     """
 
     def __init__(self, capacity: int) -> None:
-        self.ignored, self.passing, self.ready = (octets(capacity) for _ in range(3))
-        self.members, self.watched = (integers(capacity) for _ in range(2))
+        self.ignored, self.passing, self.ready = [octets(capacity) for _ in range(3)]
+        self.members, self.watched = [integers(capacity) for _ in range(2)]
 
 
 def advance(psi: PsiColumns, normal: CircleColumns, around: Situation) -> None:
@@ -153,8 +153,8 @@ def is_near(psi: PsiColumns, p: int, x: float, y: float, reach_px: float) -> boo
     dx, dy = math.fabs(x - psi.x[p]), math.fabs(y - psi.y[p])
     half_x, half_y = 0.5 * psi.width[p], 0.5 * psi.height[p]
     if psi.shape[p] == CIRCLE_SHAPE:
-        return flow.length(dx, dy) - half_x <= reach_px
-    return flow.length(max(dx - half_x, 0.0), max(dy - half_y, 0.0)) <= reach_px
+        return lengths.of(dx, dy) - half_x <= reach_px
+    return lengths.of(max(dx - half_x, 0.0), max(dy - half_y, 0.0)) <= reach_px
 
 
 def end_near(psi: PsiColumns, x: float, y: float, reach_px: float) -> None:

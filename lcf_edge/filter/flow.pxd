@@ -12,6 +12,5 @@ cdef class Homography:
 
 cpdef double wrap(double angle) noexcept nogil
 cpdef double line_distance(double dx, double dy, double cos, double sin) noexcept nogil
-cdef double length(double dx, double dy) noexcept nogil
 cpdef void set_homography(Homography h, Pinhole pinhole, const double[:, :, ::1] rotation, Py_ssize_t k) noexcept nogil
 cpdef void warp(Homography h, double x, double y) noexcept nogil

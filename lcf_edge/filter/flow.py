@@ -23,11 +23,6 @@ def line_distance(dx: float, dy: float, cos: float, sin: float) -> float:
     return dy * cos - dx * sin
 
 
-def length(dx: float, dy: float) -> float:
-    """√(dx² + dy²)."""
-    return math.sqrt(dx * dx + dy * dy)
-
-
 class Pinhole:
     """The ideal camera that positions refer to, px. ``focal``: mean of ``fx`` and ``fy``."""
 

@@ -16,7 +16,7 @@ share of that way (``turn_share``), which is learnt.
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow, key_frames, least_squares, rounding
+from lcf_edge.filter import flow, key_frames, least_squares, lengths, rounding
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.flow import Pinhole
@@ -79,11 +79,11 @@ class FlowFit:
         self.count = 0
         self.focus_x = self.focus_y = self.scale_px = 0.0
         self.focus_sigma_x = self.focus_sigma_y = self.prior_x = self.prior_y = 0.0
-        self.drift, self.pitch, self.yaw, self.roll = (doubles(MAX_EDGES) for _ in range(4))
-        self.elapsed_s, self.on_x, self.on_y, self.share = (doubles(MAX_EDGES) for _ in range(4))
-        self.turned, self.rest = (doubles(MAX_EDGES) for _ in range(2))
+        self.drift, self.pitch, self.yaw, self.roll = [doubles(MAX_EDGES) for _ in range(4)]
+        self.elapsed_s, self.on_x, self.on_y, self.share = [doubles(MAX_EDGES) for _ in range(4)]
+        self.turned, self.rest = [doubles(MAX_EDGES) for _ in range(2)]
         self.turn_share = TURN_SHARE
-        self.slot, self.cell = (integers(MAX_EDGES) for _ in range(2))
+        self.slot, self.cell = [integers(MAX_EDGES) for _ in range(2)]
         self.cells = integers(COLUMNS * ROWS)
         self.bins = integers(BINS)
         self.equations = NormalEquations()
@@ -126,7 +126,7 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     x = lines.then_x(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     y = lines.then_y(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
-    r = flow.length(dx, dy)
+    r = lengths.of(dx, dy)
     if r <= MIN_R_PX:
         return
     k = fit.count

@@ -41,12 +41,12 @@ class MotionSums:
 
     def __init__(self, capacity: int) -> None:
         self.count = integers(capacity)
-        self.weight, self.x, self.y, self.vx, self.vy = (doubles(capacity) for _ in range(5))
-        self.xx, self.yy, self.xvx, self.yvy = (doubles(capacity) for _ in range(4))
-        self.focus_x, self.focus_y = (doubles(capacity) for _ in range(2))
-        self.forward, self.elapsed, self.common = (doubles(capacity) for _ in range(3))
-        self.b2v0, self.b4v0, self.b1v1, self.b2v1, self.b0v2 = (doubles(capacity) for _ in range(5))
-        self.left, self.top, self.right, self.bottom = (doubles(capacity) for _ in range(4))
+        self.weight, self.x, self.y, self.vx, self.vy = [doubles(capacity) for _ in range(5)]
+        self.xx, self.yy, self.xvx, self.yvy = [doubles(capacity) for _ in range(4)]
+        self.focus_x, self.focus_y = [doubles(capacity) for _ in range(2)]
+        self.forward, self.elapsed, self.common = [doubles(capacity) for _ in range(3)]
+        self.b2v0, self.b4v0, self.b1v1, self.b2v1, self.b0v2 = [doubles(capacity) for _ in range(5)]
+        self.left, self.top, self.right, self.bottom = [doubles(capacity) for _ in range(4)]
         self.expansion = self.spread = 0.0
 
 

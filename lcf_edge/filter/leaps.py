@@ -35,8 +35,8 @@ class Leaps:
     def __init__(self, capacity: int) -> None:
         self.rows, self.part = integers(capacity), integers(capacity)
         self.u, self.v = doubles(capacity), doubles(capacity)
-        self.seen, self.lost = (integers(COLUMNS * ROWS) for _ in range(2))
-        self.votes, self.voter, self.shifts = (integers(SIDE * SIDE) for _ in range(3))
+        self.seen, self.lost = [integers(COLUMNS * ROWS) for _ in range(2)]
+        self.votes, self.voter, self.shifts = [integers(SIDE * SIDE) for _ in range(3)]
         for shift in range(SIDE * SIDE):
             self.voter[shift] = -1
         self.asking = self.count = self.across = self.down = self.most = 0

@@ -17,8 +17,8 @@ class NormalEquations:
 
     def __init__(self) -> None:
         self.unknowns = MAX_UNKNOWNS
-        self.row, self.right, self.solution = (doubles(MAX_UNKNOWNS) for _ in range(3))
-        self.matrix, self.factor, self.inverse = (doubles(MAX_UNKNOWNS, MAX_UNKNOWNS) for _ in range(3))
+        self.row, self.right, self.solution = [doubles(MAX_UNKNOWNS) for _ in range(3)]
+        self.matrix, self.factor, self.inverse = [doubles(MAX_UNKNOWNS, MAX_UNKNOWNS) for _ in range(3)]
 
 
 def begin(equations: NormalEquations, unknowns: int) -> None:

@@ -171,7 +171,7 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
-            "coarse motion": (KEYS + 3) * self._coarse.width * self._coarse.height,  # its pictures
+            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its pictures, three laid out
         }
 
     @property

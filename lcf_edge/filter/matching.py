@@ -115,15 +115,15 @@ def likeness_needed(own_contrast: float, settings: Settings) -> float:
     return min(LIKENESS_FLOOR + settings.appearance_share * own_contrast, settings.appearance_max)
 
 
-def list_near(index: CornerIndex, x: float, y: float, gate: float) -> int:
-    """List the places of the corners within ``gate`` of (x, y), px. Return how many there are."""
+def list_near(index: CornerIndex, corners: CornerColumns, x: float, y: float, gate: float) -> int:
+    """List the places of the free corners within ``gate`` of (x, y), px. Return how many there are."""
     count, gate2 = 0, gate * gate
     left, right = first_cell(x, gate, index.columns), last_cell(x, gate, index.columns)
     for row in range(first_cell(y, gate, index.rows), last_cell(y, gate, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - x, index.y[place] - y
             index.listed[count] = place  # no branch: which corners are near cannot be guessed
-            count += dx * dx + dy * dy <= gate2
+            count += (dx * dx + dy * dy <= gate2) & corners.free[index.order[place]]
     return count
 
 
@@ -134,11 +134,9 @@ def choose(
 
     ``most``: mean grey difference of its looks that is still the same corner.
     """
-    for k in range(list_near(index, x, y, gate)):
+    for k in range(list_near(index, corners, x, y, gate)):
         place = index.listed[k]
         corner = index.order[place]
-        if not corners.free[corner]:
-            continue
         dx, dy = index.x[place] - x, index.y[place] - y
         far = DISTANCE_COST * math.sqrt(dx * dx + dy * dy)
         edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]

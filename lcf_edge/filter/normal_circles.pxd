@@ -2,7 +2,7 @@ cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
 from lcf_edge.filter cimport rounding
-from lcf_edge.filter cimport edge_equations, flow, image_plane, path
+from lcf_edge.filter cimport edge_equations, flow, image_plane, lengths, path
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -49,3 +49,5 @@ cdef void average_cell(Flowing flowing, int cell, Members members, EdgeColumns e
 @cython.locals(evicted=int)
 cdef int found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
 cpdef int update(Flowing flowing, EdgeColumns edges, CircleColumns circles, unsigned char[::1] ignored, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(edges=int)
+cpdef double mean_expansion(CircleColumns circles) noexcept nogil

@@ -3,7 +3,7 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, image_plane, path, rounding
+from lcf_edge.filter import edge_equations, flow, image_plane, lengths, path, rounding
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.image_plane import ImagePlane
@@ -41,12 +41,12 @@ class Flowing:
     def __init__(self, edges: int, circles: int) -> None:
         self.count = self.open_count = 0
         self.row, self.cell = integers(edges), integers(edges)
-        self.r, self.cos, self.sin, self.expansion = (doubles(edges) for _ in range(4))
+        self.r, self.cos, self.sin, self.expansion = [doubles(edges) for _ in range(4)]
         self.cell_size = integers(CELLS * CELLS * OCTAVES)
         self.members = Members(circles)
-        self.before, self.included, self.open = (integers(circles) for _ in range(3))
-        self.mean_cos, self.mean_sin, self.mean_expansion = (doubles(circles) for _ in range(3))
-        self.beta_cos, self.beta_sin = (doubles(circles) for _ in range(2))
+        self.before, self.included, self.open = [integers(circles) for _ in range(3)]
+        self.mean_cos, self.mean_sin, self.mean_expansion = [doubles(circles) for _ in range(3)]
+        self.beta_cos, self.beta_sin = [doubles(circles) for _ in range(2)]
 
 
 def predict(circles: CircleColumns, plane: ImagePlane, around: Situation) -> None:
@@ -85,7 +85,7 @@ def gather(flowing: Flowing, edges: EdgeColumns, around: Situation, settings: Se
         if edges.trust[i] < settings.tr_s or edges.held[i] or edges.own_way(i):
             continue
         dx, dy = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
-        r = max(flow.length(dx, dy), MIN_R_PX)
+        r = max(lengths.of(dx, dy), MIN_R_PX)
         if math.fabs(edges.speed[i]) > fastest * r + SPEED_NOISE_PX / around.dt_s:
             continue
         j = flowing.count
@@ -225,7 +225,7 @@ def compare(flowing: Flowing, circles: CircleColumns, ignored: Bytes, settings: 
                 circles.trust[c], settings.tr_cr, circles.expansion[c], flowing.mean_expansion[c]
             )
             shared.blend(circles, c, flowing.members, c, settings)
-            circles.corr[c] = flow.length(flowing.mean_cos[c], flowing.mean_sin[c])
+            circles.corr[c] = lengths.of(flowing.mean_cos[c], flowing.mean_sin[c])
         circles.trust[c] = edge_equations.change_trust(circles.trust[c], change, settings.tr_max)
 
 
@@ -235,7 +235,7 @@ def direct(circles: CircleColumns, around: Situation) -> None:
         if circles.active[c]:
             dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
             circles.beta[c] = math.atan2(dy, dx)
-            circles.speed[c] = circles.expansion[c] * flow.length(dx, dy)
+            circles.speed[c] = circles.expansion[c] * lengths.of(dx, dy)
 
 
 def cell_of(x: float, y: float, expansion: float, around: Situation, size_px: float) -> int:
@@ -342,3 +342,13 @@ def update(
     evicted = found(flowing, edges, circles, around, settings, ids)
     direct(circles, around)
     return evicted
+
+
+def mean_expansion(circles: CircleColumns) -> float:
+    """Mean |V/r|, 1/s, of the circles, weighted by their edges; 0 without any."""
+    total, edges = 0.0, 0
+    for c in range(circles.capacity):
+        if circles.active[c]:
+            total += math.fabs(circles.expansion[c]) * circles.support[c]
+            edges += circles.support[c]
+    return total / max(edges, 1)

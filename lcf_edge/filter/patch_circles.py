@@ -6,7 +6,7 @@ Two patches at least must agree. Their circle is *incoming*; one that rebels sho
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, path
+from lcf_edge.filter import edge_equations, lengths, path
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import Bytes, octets
@@ -48,7 +48,7 @@ class PatchGroups:
     """
 
     def __init__(self, patches: int) -> None:
-        self.obstacle, self.taken = (octets(max(patches, 1)) for _ in range(2))
+        self.obstacle, self.taken = [octets(max(patches, 1)) for _ in range(2)]
         self.members = Members(max(patches, 1))
         self.left = self.top = self.right = self.bottom = self.weight = self.inverse = self.uneven = 0.0
 
@@ -99,7 +99,7 @@ def is_upright(patches: Patches, p: int, around: Situation) -> bool:
             continue
         nearer = (patches.y[q] - patches.y[p]) / around.pinhole.fy / around.camera_height_m
         short = nearer - (patches.inverse[q] - patches.inverse[p])
-        doubt = flow.length(patches.doubt[p], patches.doubt[q])
+        doubt = lengths.of(patches.doubt[p], patches.doubt[q])
         if (
             math.fabs(nearer) > UPRIGHT_SHARE * patches.inverse[p]
             and (short if nearer > 0 else -short) > UPRIGHT_SIGMAS * doubt
@@ -127,7 +127,7 @@ def agree(patches: Patches, p: int, q: int) -> bool:
     if math.fabs(patches.y[p] - patches.y[q]) >= STACK_SIDES * half:
         return False
     one, other = patches.inverse[p], patches.inverse[q]
-    doubt = flow.length(patches.doubt[p], patches.doubt[q])
+    doubt = lengths.of(patches.doubt[p], patches.doubt[q])
     apart = math.fabs(one - other)
     return (
         other > ALIKE_SIGMAS * patches.doubt[q]
@@ -175,7 +175,7 @@ def grows_evenly(groups: PatchGroups) -> bool:
     Things in a row beside the way flow apart, the nearer the farther from the focus, and seem to be a nearer one that
     grows; but only along their row. The ground grows more down than across.
     """
-    return groups.inverse > MIN_SIGMAS * flow.length(1 / math.sqrt(groups.weight), UNEVEN * groups.uneven)
+    return groups.inverse > MIN_SIGMAS * lengths.of(1 / math.sqrt(groups.weight), UNEVEN * groups.uneven)
 
 
 def claim(groups: PatchGroups, p: int, patches: Patches, circle: int) -> None:
@@ -194,7 +194,7 @@ def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Set
     for c in range(circles.capacity):
         if not circles.active[c]:
             continue
-        away = flow.length(circles.x[c] - groups.members.x[g], circles.y[c] - groups.members.y[g])
+        away = lengths.of(circles.x[c] - groups.members.x[g], circles.y[c] - groups.members.y[g])
         if away < max(circles.radius[c], half) + settings.member_margin_px and away < least:
             nearest, least = c, away
     return nearest
@@ -211,7 +211,7 @@ def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Si
     circles.ttc[c], circles.range[c] = 1 / rate, range_m
     circles.lateral[c] = path.least_miss(right_m, range_m, around)
     dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
-    circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * flow.length(dx, dy)
+    circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * lengths.of(dx, dy)
 
 
 def update(

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow, image_plane, path, rounding
+from lcf_edge.filter cimport flow, image_plane, lengths, path, rounding
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.flow cimport Homography
 from lcf_edge.filter.image_plane cimport ImagePlane

@@ -8,7 +8,7 @@ at Z was seen ΔZ farther off, so it has grown by s = (Z + ΔZ)/Z.
 
 import math
 
-from lcf_edge.filter import flow, image_plane, path, rounding
+from lcf_edge.filter import flow, image_plane, lengths, path, rounding
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.flow import Homography
 from lcf_edge.filter.image_plane import ImagePlane
@@ -69,16 +69,16 @@ class Patches:
     def __init__(self, capacity: int) -> None:
         self.capacity = capacity
         self.active = octets(max(capacity, 1))
-        self.misses, self.circle = (integers(max(capacity, 1)) for _ in range(2))
-        self.x, self.y, self.first_x, self.first_y = (doubles(max(capacity, 1)) for _ in range(4))
-        self.half_px, self.scale, self.sigma, self.elapsed_s = (doubles(max(capacity, 1)) for _ in range(4))
-        self.depth_m, self.inverse, self.doubt = (doubles(max(capacity, 1)) for _ in range(3))
-        self.contrast, self.unit = (doubles(max(capacity, 1)) for _ in range(2))
-        self.grey, self.across, self.down, self.growing = (doubles(max(capacity, 1), SAMPLES) for _ in range(4))
+        self.misses, self.circle = [integers(max(capacity, 1)) for _ in range(2)]
+        self.x, self.y, self.first_x, self.first_y = [doubles(max(capacity, 1)) for _ in range(4)]
+        self.half_px, self.scale, self.sigma, self.elapsed_s = [doubles(max(capacity, 1)) for _ in range(4)]
+        self.depth_m, self.inverse, self.doubt = [doubles(max(capacity, 1)) for _ in range(3)]
+        self.contrast, self.unit = [doubles(max(capacity, 1)) for _ in range(2)]
+        self.grey, self.across, self.down, self.growing = [doubles(max(capacity, 1), SAMPLES) for _ in range(4)]
         self.stretching = doubles(max(capacity, 1), SAMPLES)
         self.sums, self.inverted = doubles(max(capacity, 1), 8), doubles(max(capacity, 1), 9)
         self.coupled = doubles(max(capacity, 1), 3)
-        self.alone, self.stretch = (doubles(max(capacity, 1)) for _ in range(2))
+        self.alone, self.stretch = [doubles(max(capacity, 1)) for _ in range(2)]
         self.weight, self.sampled = doubles(SAMPLES), doubles(SAMPLES)
         self.u = self.v = self.right_u = self.right_v = self.down_u = self.down_v = 0.0
         self.mean = self.square = self.shared = 0.0
@@ -236,7 +236,7 @@ def find(patches: Patches, p: int, image: Bytes, plane: ImagePlane) -> bool:
         rest = patches.contrast[p] * patches.contrast[p] - gain * patches.shared
         change = step(patches, p, gain)
     noise = max(math.sqrt(max(rest, 0.0)), NOISE_GREY) * patches.unit[p] * patches.scale[p]
-    patches.sigma[p] = flow.length(noise, MIN_SCALE_SIGMA)
+    patches.sigma[p] = lengths.of(noise, MIN_SCALE_SIGMA)
     return likeness >= LIKENESS and MIN_SCALE < patches.scale[p] < MAX_SCALE
 
 

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow, path
+from lcf_edge.filter cimport lengths, path
 from lcf_edge.filter.situation cimport Situation
 
 cdef int RANGES

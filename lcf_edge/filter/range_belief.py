@@ -11,7 +11,7 @@ standard deviation. Somebody who walks away to the side does not loom: nothing t
 
 import math
 
-from lcf_edge.filter import flow, path
+from lcf_edge.filter import lengths, path
 from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.situation import Situation
 
@@ -86,8 +86,8 @@ class Belief:
     def __init__(self) -> None:
         self.stands = self.log_odds = self.met = 0.0
         self.middle = self.middle_sigma = NAN
-        self.weight, self.mean, self.sigma = (doubles(QUANTITIES) for _ in range(3))
-        self.inverse, self.standing, self.moving = (doubles(RANGES) for _ in range(3))
+        self.weight, self.mean, self.sigma = [doubles(QUANTITIES) for _ in range(3)]
+        self.inverse, self.standing, self.moving = [doubles(RANGES) for _ in range(3)]
         self.inner_forward = self.inner_right = self.inner_forward_var = self.inner_right_var = 0.0
         self.inner_rate = self.inner_rate_var = 0.0
 
@@ -272,12 +272,12 @@ def tell_front(belief: Belief, evidence: Evidence) -> None:
     deep = DEPTH_SHARE * evidence.half_width + MIN_DEPTH
     belief.middle, belief.middle_sigma = math.exp(belief.mean[RANGE]), belief.sigma[RANGE]
     range_m = belief.middle * nearer
-    belief.sigma[RANGE] = range_m * flow.length(belief.sigma[RANGE], deep)
+    belief.sigma[RANGE] = range_m * lengths.of(belief.sigma[RANGE], deep)
     belief.mean[RANGE] = range_m
     belief.mean[RATE] /= nearer
-    belief.sigma[RATE] = flow.length(belief.sigma[RATE], deep * belief.mean[RATE])
+    belief.sigma[RATE] = lengths.of(belief.sigma[RATE], deep * belief.mean[RATE])
     belief.mean[CLOSEST] *= nearer
-    belief.sigma[CLOSEST] = flow.length(belief.sigma[CLOSEST], deep * belief.mean[CLOSEST])
+    belief.sigma[CLOSEST] = lengths.of(belief.sigma[CLOSEST], deep * belief.mean[CLOSEST])
 
 
 def consider(belief: Belief, evidence: Evidence, around: Situation) -> None:

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport coarse_circles, edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
+from lcf_edge.filter cimport coarse_circles, edge_equations, flow, image_plane, lengths, patch_circles, path, situation, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.coarse_circles cimport CoarseGroups

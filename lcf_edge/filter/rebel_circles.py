@@ -3,7 +3,17 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import coarse_circles, edge_equations, flow, image_plane, patch_circles, path, situation, turmoil
+from lcf_edge.filter import (
+    coarse_circles,
+    edge_equations,
+    flow,
+    image_plane,
+    lengths,
+    patch_circles,
+    path,
+    situation,
+    turmoil,
+)
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.coarse_circles import CoarseGroups
@@ -81,24 +91,24 @@ class RebelGroups:
 
     def __init__(self, rebels: int, circles: int) -> None:
         self.count = self.groups = 0
-        self.verdict, self.label, self.group = (integers(rebels) for _ in range(3))
-        self.vx, self.vy, self.elapsed_s = (doubles(rebels) for _ in range(3))
+        self.verdict, self.label, self.group = [integers(rebels) for _ in range(3)]
+        self.vx, self.vy, self.elapsed_s = [doubles(rebels) for _ in range(3)]
         self.members = Members(rebels)
-        self.mean_vx, self.mean_vy, self.mean_s = (doubles(rebels) for _ in range(3))
-        self.closing_mps, self.focus_rate = (doubles(rebels) for _ in range(2))
-        self.focus_r2, self.below2, self.below_vy = (doubles(rebels) for _ in range(3))
-        self.rate_below, self.r2_below2 = (doubles(rebels) for _ in range(2))
-        self.then_x, self.then_y, self.spread, self.spreading = (doubles(rebels) for _ in range(4))
-        self.expansion, self.weight, self.weighed_rate = (doubles(rebels) for _ in range(3))
-        self.left, self.right, self.top, self.bottom = (doubles(rebels) for _ in range(4))
-        self.standing, self.inwards, self.flowing, self.circle = (integers(rebels) for _ in range(4))
+        self.mean_vx, self.mean_vy, self.mean_s = [doubles(rebels) for _ in range(3)]
+        self.closing_mps, self.focus_rate = [doubles(rebels) for _ in range(2)]
+        self.focus_r2, self.below2, self.below_vy = [doubles(rebels) for _ in range(3)]
+        self.rate_below, self.r2_below2 = [doubles(rebels) for _ in range(2)]
+        self.then_x, self.then_y, self.spread, self.spreading = [doubles(rebels) for _ in range(4)]
+        self.expansion, self.weight, self.weighed_rate = [doubles(rebels) for _ in range(3)]
+        self.left, self.right, self.top, self.bottom = [doubles(rebels) for _ in range(4)]
+        self.standing, self.inwards, self.flowing, self.circle = [integers(rebels) for _ in range(4)]
         self.odd = octets(rebels)
         self.votes = integers(rebels, circles)
         self.best_circle, self.best_group = (
             integers(rebels),
             integers(circles),
         )
-        self.updated, self.missed = (octets(circles) for _ in range(2))
+        self.updated, self.missed = [octets(circles) for _ in range(2)]
 
 
 # Prediction
@@ -170,7 +180,7 @@ def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) ->
     least = 0.0
     for c in range(circles.capacity):
         if circles.active[c] and circles.trust[c] >= settings.tr_s and not turmoil.is_shown_by(circles, c):
-            away = flow.length(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - settings.member_margin_px
+            away = lengths.of(x - circles.x[c], y - circles.y[c]) - circles.radius[c] - settings.member_margin_px
             if away < least:
                 nearest, least = c, away
     return nearest
@@ -223,13 +233,13 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     apart: these must move alike, and be known to.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
-    one, other = flow.length(ax, ay), flow.length(bx, by)
+    one, other = lengths.of(ax, ay), lengths.of(bx, by)
     slower, faster = min(one, other), max(one, other)
     near = max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster)
     far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
     if distance >= max(near, far):  # most are
         return False
-    difference = flow.length(ax - bx, ay - by)
+    difference = lengths.of(ax - bx, ay - by)
     noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
     if distance >= near:
         return max(difference, noise) < FAR_LIKE_SPEED * faster
@@ -262,7 +272,7 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
         i = verdicts.row[groups.verdict[a]]
         for b in range(a):
             k = verdicts.row[groups.verdict[b]]
-            distance = flow.length(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
+            distance = lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
             if are_linked(groups, a, b, distance, around, settings):
                 join(groups, a, b)
 
@@ -465,7 +475,7 @@ def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
     if not around.camera_height_m > 0:
         return True
     range_m = situation.ground_range_m(around, edges.y[i])
-    away_px = flow.length(edges.x[i] - around.focus_x, edges.y[i] - around.focus_y)
+    away_px = lengths.of(edges.x[i] - around.focus_x, edges.y[i] - around.focus_y)
     return away_px * math.fabs(around.speed_mps) * LIKELY_OWN_S > SEEN_TO_MOVE_PX * range_m
 
 
@@ -505,7 +515,7 @@ def vote(
         if g < 0:
             continue
         for c in range(circles.capacity):
-            away = flow.length(edges.x[i] - circles.x[c], edges.y[i] - circles.y[c])
+            away = lengths.of(edges.x[i] - circles.x[c], edges.y[i] - circles.y[c])
             inside = circles.active[c] != 0 and away < circles.radius[c] + settings.member_margin_px
             if inside or c == edges.circle[i]:
                 groups.votes[g, c] += 1
@@ -562,7 +572,7 @@ def is_aligned(
     """
     if turmoil.is_shown_by(circles, c):
         return True
-    beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), flow.length(groups.mean_vx[g], groups.mean_vy[g])
+    beta, speed = math.atan2(groups.mean_vy[g], groups.mean_vx[g]), lengths.of(groups.mean_vx[g], groups.mean_vy[g])
     still = STILL_PX / groups.mean_s[g]
     turn = math.fabs(flow.wrap(beta - circles.beta[c]))
     most = circles.speed[c] + settings.eps_v_circle_rebel * around.scene_flow_pxps
@@ -769,7 +779,7 @@ def update(
         c = groups.circle[g]
         if c >= 0:
             circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
-            circles.speed[c] = flow.length(groups.mean_vx[g], groups.mean_vy[g])
+            circles.speed[c] = lengths.of(groups.mean_vx[g], groups.mean_vy[g])
             contact(groups, g, circles, around, settings)
     for k in range(groups.count):
         if groups.group[k] >= 0:

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport baselines as lines
-from lcf_edge.filter cimport edge_equations, flow, path
+from lcf_edge.filter cimport edge_equations, flow, lengths, path
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.settings cimport Settings

@@ -9,7 +9,7 @@ the horizon inside the vehicle's width, and stands above the ground, is *incomin
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import edge_equations, flow, path
+from lcf_edge.filter import edge_equations, flow, lengths, path
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.memory import doubles, integers, octets
@@ -54,11 +54,11 @@ class Verdicts:
 
     def __init__(self, capacity: int) -> None:
         self.count = 0
-        self.row, self.slot, self.oldest, self.near = (integers(capacity) for _ in range(4))
-        self.x, self.y, self.r, self.drift = (doubles(capacity) for _ in range(4))
-        self.short, self.over, self.outward, self.expansion = (doubles(capacity) for _ in range(4))
-        self.mover, self.incoming = (octets(capacity) for _ in range(2))
-        self.sigma, self.inverse, self.doubt = (doubles(capacity) for _ in range(3))
+        self.row, self.slot, self.oldest, self.near = [integers(capacity) for _ in range(4)]
+        self.x, self.y, self.r, self.drift = [doubles(capacity) for _ in range(4)]
+        self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
+        self.mover, self.incoming = [octets(capacity) for _ in range(2)]
+        self.sigma, self.inverse, self.doubt = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
 
@@ -72,7 +72,7 @@ def link(
     verdicts.row[j], verdicts.slot[j] = i, slot
     verdicts.x[j], verdicts.y[j] = x, y
     rotation_px = lines.sigma_along(baselines, around.pinhole, slot, x, y)
-    verdicts.sigma[j] = flow.length(rotation_px, around.turn_share * flow.length(x - key_x, y - key_y))
+    verdicts.sigma[j] = lengths.of(rotation_px, around.turn_share * lengths.of(x - key_x, y - key_y))
 
 
 def judge(
@@ -85,7 +85,7 @@ def judge(
     i, slot = verdicts.row[j], verdicts.slot[j]
     ax, ay = verdicts.x[j] - baselines.focus_x[slot], verdicts.y[j] - baselines.focus_y[slot]
     mx, my = edges.x[i] - verdicts.x[j], edges.y[i] - verdicts.y[j]
-    r = max(flow.length(ax, ay), MIN_R_PX)
+    r = max(lengths.of(ax, ay), MIN_R_PX)
     outward = (mx * ax + my * ay) / r
     drift = (my * ax - mx * ay) / r
     depth_m = baselines.depth_m[slot]
@@ -251,10 +251,10 @@ def give_birth(
     x3, y3 = edges.x[i], edges.y[i]
     beta = math.atan2(y3 - y1, x3 - x1)
     edges.deviation[i] = 0.0
-    if flow.length(x2 - x1, y2 - y1) > MIN_FIRST_LINK_PX:
+    if lengths.of(x2 - x1, y2 - y1) > MIN_FIRST_LINK_PX:
         turn = flow.wrap(beta - math.atan2(y2 - y1, x2 - x1))
         edges.deviation[i] = edge_equations.bound_deviation(turn)
-    edges.speed[i] = flow.length(x3 - x2, y3 - y2) / elapsed_s
+    edges.speed[i] = lengths.of(x3 - x2, y3 - y2) / elapsed_s
     edges.beta[i] = beta
     edges.origin_x[i], edges.origin_y[i] = x1, y1
     edges.rebel[i] = 1

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport baselines as lines
-from lcf_edge.filter cimport flow, key_frames
+from lcf_edge.filter cimport key_frames, lengths
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.key_frames cimport KeyFrames

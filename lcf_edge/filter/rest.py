@@ -3,7 +3,7 @@
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow, key_frames
+from lcf_edge.filter import key_frames, lengths
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.inputs import KEYS
@@ -48,8 +48,8 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
     """Note one edge: how far it went since a key frame, and how far the ground there must have gone."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
     x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
-    way = flow.length(edges.x[i] - x, edges.y[i] - y)
-    r = flow.length(x - baselines.focus_x[slot], y - baselines.focus_y[slot])
+    way = lengths.of(edges.x[i] - x, edges.y[i] - y)
+    r = lengths.of(x - baselines.focus_x[slot], y - baselines.focus_y[slot])
     focal = around.pinhole.focal
     below = max(edges.y[i] - around.horizon_y - focal * around.pitch_sigma_rad, 0.0)
     driven_m = math.fabs(test.measured_mps) * baselines.elapsed_s[slot]

@@ -7,7 +7,7 @@ what is left founds new ones. Objects keep their identity while they are hidden 
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, path, range_belief, turmoil
+from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, turmoil
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.coarse_circles import CoarseGroups
@@ -265,8 +265,8 @@ def moves_alike(
     sideways = objects.qq[o] + across * across * objects.mm[o] + 2 * across * objects.mq[o]
     variance_x = own + fx * fx * max(sideways, 0.0)
     variance_y = own + fy * fy * down * down * objects.mm[o]
-    like = share * flow.length(vx, vy) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
-    doubt = DOUBT_SHARE * max(flow.length(vx, vy), flow.length(vx - dx, vy - dy))
+    like = share * lengths.of(vx, vy) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
+    doubt = DOUBT_SHARE * max(lengths.of(vx, vy), lengths.of(vx - dx, vy - dy))
     return (
         math.fabs(dx) < min(LIKE_SIGMAS * math.sqrt(variance_x), doubt) + like
         and math.fabs(dy) < min(LIKE_SIGMAS * math.sqrt(variance_y), doubt) + like
@@ -327,8 +327,8 @@ def object_in_turmoil(objects: ObjectColumns, circles: CircleColumns, c: int) ->
         meets = dx < 0.5 * max(objects.width[o], circles.width[c]) and dy < 0.5 * max(
             objects.height[o], circles.height[c]
         )
-        if objects.active[o] and meets and flow.length(dx, dy) < least:
-            nearest, least = o, flow.length(dx, dy)
+        if objects.active[o] and meets and lengths.of(dx, dy) < least:
+            nearest, least = o, lengths.of(dx, dy)
     return nearest
 
 
@@ -340,7 +340,7 @@ def nearest_object(
     least = INFINITY
     for o in range(objects.capacity):
         if objects.active[o] and belongs(objects, o, circles, c, squares.parts, around, settings):
-            away = flow.length(objects.x[o] - circles.x[c], objects.y[o] - circles.y[c])
+            away = lengths.of(objects.x[o] - circles.x[c], objects.y[o] - circles.y[c])
             if away < least:
                 nearest, least = o, away
     return nearest
@@ -608,9 +608,9 @@ def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: 
     """What an object shows, in angles."""
     fx, fy = around.pinhole.fx, around.pinhole.fy
     evidence.looming, evidence.sideways = objects.looming[o], objects.sideways[o]
-    whole = flow.length(BODY_SHARE * evidence.looming, BODY_HZ)
+    whole = lengths.of(BODY_SHARE * evidence.looming, BODY_HZ)
     evidence.mm, evidence.mq = objects.mm[o] + whole * whole, objects.mq[o]
-    whole = flow.length(SWING_SHARE * evidence.sideways, SWING_HZ)
+    whole = lengths.of(SWING_SHARE * evidence.sideways, SWING_HZ)
     evidence.qq = objects.qq[o] + whole * whole
     evidence.across = (objects.x[o] - around.focus_x) / fx
     evidence.half_width = 0.5 * objects.width[o] / fx
@@ -693,13 +693,13 @@ def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
 def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
     """What is not seen goes on as it went: all follows from its place and its velocity, which become unsure."""
     drift_mps = UNSEEN_MPS * math.sqrt(around.dt_s) if objects.unseen_s[o] > 0 else 0.0
-    objects.forward_sigma[o] = flow.length(objects.forward_sigma[o], drift_mps)
-    objects.right_sigma[o] = flow.length(objects.right_sigma[o], drift_mps)
+    objects.forward_sigma[o] = lengths.of(objects.forward_sigma[o], drift_mps)
+    objects.right_sigma[o] = lengths.of(objects.right_sigma[o], drift_mps)
     range_m, closing_mps = objects.range[o], around.speed_mps - objects.forward[o]
     right_mps = objects.right[o]
     if objects.unseen_s[o] > 0:
-        objects.range_sigma[o] = flow.length(objects.range_sigma[o], objects.forward_sigma[o] * around.dt_s)
-    share = flow.length(objects.range_sigma[o] / range_m, objects.forward_sigma[o] / max(closing_mps, SLOW_MPS))
+        objects.range_sigma[o] = lengths.of(objects.range_sigma[o], objects.forward_sigma[o] * around.dt_s)
+    share = lengths.of(objects.range_sigma[o] / range_m, objects.forward_sigma[o] / max(closing_mps, SLOW_MPS))
     objects.probability[o] = 0.0
     objects.lateral[o] = objects.lateral_sigma[o] = objects.closest[o] = objects.closest_sigma[o] = NAN
     tell_contact(objects, o, closing_mps / range_m, share * math.fabs(closing_mps) / range_m, around)
@@ -709,9 +709,9 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
     objects.closest[o], objects.closest_sigma[o] = time_s, time_sigma_s
     right_m = range_m * evidence.across + right_mps * time_s
     objects.lateral[o] = path.miss(right_m, range_m + objects.forward[o] * time_s, around)
-    aside = flow.length(range_m * evidence.across_sigma, evidence.across * objects.range_sigma[o])
-    late = flow.length(objects.right_sigma[o] * time_s, right_mps * time_sigma_s)
-    objects.lateral_sigma[o] = flow.length(aside, late)
+    aside = lengths.of(range_m * evidence.across_sigma, evidence.across * objects.range_sigma[o])
+    late = lengths.of(objects.right_sigma[o] * time_s, right_mps * time_sigma_s)
+    objects.lateral_sigma[o] = lengths.of(aside, late)
     half_m = around.half_width_m + evidence.half_width * range_m
     variance = objects.lateral_sigma[o] * objects.lateral_sigma[o]
     beside = range_belief.below(half_m, objects.lateral[o], variance)
@@ -822,7 +822,7 @@ def obeys(
     lag = 1 - min(max(0.5 * elapsed_s * looming, -MAX_LAG), MAX_LAG)
     vx, vy = velocity_x(objects, o, x, looming, around) * lag, velocity_y(y, looming, around) * lag
     dx, dy = (edges.x[i] - verdicts.x[j]) / elapsed_s - vx, (edges.y[i] - verdicts.y[j]) / elapsed_s - vy
-    most = STRAY_SIGMAS * around.noise_px / elapsed_s + share * flow.length(vx, vy)
+    most = STRAY_SIGMAS * around.noise_px / elapsed_s + share * lengths.of(vx, vy)
     return dx * dx + dy * dy < most * most
 
 

@@ -9,7 +9,7 @@ frames, while the rest of the picture is found, is a circle of C_r. When it is m
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, rounding, situation
+from lcf_edge.filter import edge_equations, lengths, rounding, situation
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, octets
@@ -47,7 +47,7 @@ class Turmoil:
         self.side_px, self.per_px = width / ACROSS, ACROSS / width
         self.down = (height * ACROSS + width - 1) // width
         cells = self.across * self.down
-        self.found, self.lost, self.found_now, self.lost_now = (doubles(cells) for _ in range(4))
+        self.found, self.lost, self.found_now, self.lost_now = [doubles(cells) for _ in range(4)]
         self.unruly = octets(cells)
         self.lasts_s = doubles(cells)
         self.place = integers(cells)
@@ -120,7 +120,7 @@ def stays_px(turmoil: Turmoil, k: int, around: Situation) -> float:
     rate = 1 / MET_S
     if math.fabs(around.speed_mps) < SLOW_MPS:
         rate *= math.fabs(around.speed_mps) / SLOW_MPS
-    return rate * around.dt_s * flow.length(x - around.focus_x, y - around.focus_y)
+    return rate * around.dt_s * lengths.of(x - around.focus_x, y - around.focus_y)
 
 
 def is_unruly(turmoil: Turmoil, k: int, around: Situation, settings: Settings) -> bool:

@@ -127,7 +127,7 @@ class Link:
             self._send("messages", lambda parts: parts.messages.put_transform(stamp_ns))
 
     def has_preview_subscriber(self) -> bool:
-        """Whether somebody subscribes to previews, and the next is due by ``publish.preview_hz``. Takes 2 µs."""
+        """Whether somebody subscribes to previews, known within 0.2 s, and the next is due."""
         parts = self._parts
         return parts is not None and parts.preview.has_subscriber
 

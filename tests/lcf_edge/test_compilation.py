@@ -82,6 +82,22 @@ pixel = np.stack((random.integers(7, 57, 40), random.integers(7, 41, 40)), axis=
 print(zlib.crc32(appearance(image, pixel).tobytes()))
 """
 
+_PICTURES = """
+import zlib, numpy as np
+from lcf_edge.corners.image_quality import ImageQuality, sharpness
+from lcf_edge.corners.repeats import Repeats
+from lcf_edge.ego_motion.stillness import Stillness
+random, repeats, quality, stillness = np.random.default_rng(3), Repeats(), ImageQuality(), Stillness(62, 45)
+pixel = np.stack((random.integers(7, 55, 60), random.integers(7, 38, 60)), axis=1).astype(np.int32)
+told = []
+for frame in range(30):
+    image = random.integers(0, 256, (45, 62), np.uint8) if frame % 3 else np.full((45, 62), 8 * frame, np.uint8)
+    moved = pixel + np.array((frame // 20, 0), np.int32)
+    told += [repeats.is_repeat(50_000_000 * frame, image), sharpness(image), quality.notes(image, 60)]
+    told += [stillness.look(50_000_000 * frame, moved)]
+print(told)
+"""
+
 _EGO_MOTION = """
 import zlib, numpy as np
 from drivers.samples import ImuSample, SpeedSample
@@ -104,7 +120,7 @@ print(zlib.crc32(b"".join(outputs)))
 
 
 @needs_extension
-@pytest.mark.parametrize("code", [_APPEARANCE, _EGO_MOTION], ids=["appearance", "ego-motion"])
+@pytest.mark.parametrize("code", [_APPEARANCE, _PICTURES, _EGO_MOTION], ids=["appearance", "pictures", "ego-motion"])
 def test_uncompiled_gives_the_same_bytes(code: str) -> None:
     assert in_another_process(code) == in_another_process(code, LCF_EDGE_PURE="1")
 

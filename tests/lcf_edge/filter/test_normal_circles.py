@@ -273,3 +273,10 @@ def test_nothing_is_known_to_pass_by_when_the_vehicle_does_not_drive_forward(
     circles = CircleTable(1)
     circles.active[0], circles.x[0], circles.expansion[0], circles.radius[0] = True, 600, 0.5, 20
     assert not normal_circles.passes_by(circles.columns, 0, situation(speed_mps=speed_mps))
+
+
+def test_the_mean_expansion_is_that_of_the_circles_in_use_weighted_by_their_edges() -> None:
+    circles = CircleTable(4)
+    assert normal_circles.mean_expansion(circles.columns) == 0
+    circles.active[:], circles.expansion[:], circles.support[:] = (1, 0, 1, 1), (0.5, 9.0, -0.2, 0.0), (3, 5, 1, 4)
+    assert normal_circles.mean_expansion(circles.columns) == pytest.approx((3 * 0.5 + 0.2) / 8)

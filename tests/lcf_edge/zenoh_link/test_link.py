@@ -104,7 +104,11 @@ def test_diagnostics_tell_of_every_device(received: Callable[..., Any], ros: Typ
     assert [(pair.key, pair.value) for pair in array.status[0].values] == list(STATUS[0].values.items())
 
 
-def test_a_preview_is_wanted_only_while_somebody_looks(session: zenoh.Session, peer: Any) -> None:
+def test_a_preview_is_wanted_only_while_somebody_looks(
+    session: zenoh.Session, peer: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_ns = 10**12
+    monkeypatch.setattr(time, "monotonic_ns", lambda: now_ns)
     link = Link(session, Config(publish=Publish(preview_hz=100.0)))
     looking, gone = threading.Event(), threading.Event()
 
@@ -116,6 +120,8 @@ def test_a_preview_is_wanted_only_while_somebody_looks(session: zenoh.Session, p
         assert not link.has_preview_subscriber()
         peer.subscribe("lcf/preview/*")
         assert looking.wait(PATIENCE_S)
+        assert not link.has_preview_subscriber()  # it was just asked
+        now_ns += 200_000_000
         assert link.has_preview_subscriber()
         peer.end()
         assert gone.wait(PATIENCE_S)

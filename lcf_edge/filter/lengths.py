@@ -1,0 +1,8 @@
+"""Lengths of offsets in the picture; the .pxd beside it is a header that serves the compiled modules."""
+
+import math
+
+
+def of(dx: float, dy: float) -> float:
+    """√(dx² + dy²)."""
+    return math.sqrt(dx * dx + dy * dy)
