@@ -98,3 +98,13 @@ def test_an_unpacked_debian_has_the_users_groups_and_names_of_an_installed_one(t
 def test_without_root_it_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     assert elsewhere.main(["aarch64", "3.13"]) == 1
     assert "(sudo make test-" in capsys.readouterr().err
+
+
+def test_byte_code_is_made_ahead_with_the_names_that_it_has_there_and_what_fails_is_left(tmp_path: Path) -> None:
+    (tmp_path / "whole.py").write_text("def where(): raise ValueError\n")
+    (tmp_path / "of_python_2.py").write_text("print 'old'\n")
+    elsewhere.compile_ahead(sys.executable, tmp_path, "/project")
+    (made,) = tmp_path.glob("__pycache__/*.pyc")
+    assert made.name == f"whole.{sys.implementation.cache_tag}.pyc"
+    assert b"/project/whole.py" in made.read_bytes()
+    assert str(tmp_path).encode() not in made.read_bytes()
