@@ -36,7 +36,7 @@ def test_another_processors_is_that_of_the_debian_that_has_it(
     other: Machine, version: str, suite: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        elsewhere, "unpacked", lambda machine, suite, packages: Path(machine.debian, suite, packages[0])
+        elsewhere, "unpacked", lambda machine, suite, packages, *_: Path(machine.debian, suite, packages[0])
     )
     assert elsewhere.find(other, version).root == Path(other.debian, suite, "python3")
 
