@@ -65,7 +65,7 @@ class Python:
         """Run pytest, which tells what it does; return its exit status."""
         arguments = ["-m", "pytest", "-p", "no:cacheprovider", *tests]
         if not machine.is_this:
-            arguments += ["-o", f"timeout={EMULATED_TIMEOUT_S}"]
+            arguments += ["-o", f"timeout={EMULATED_TIMEOUT_S}", "--hypothesis-profile=emulated"]
         if self.root is None:
             with tempfile.TemporaryDirectory() as place:
                 run(self.program, "-m", "venv", "--without-pip", place)

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from release import elsewhere
 from release.debian import MACHINES, Machine, ReleaseError
@@ -55,6 +56,18 @@ def test_what_is_tested_is_the_project_with_its_packages(
     (tmp_path / "test_it.py").write_text(f"import project\ndef test_it(): assert project.VALUE == {value}\n")
     packages = Path(pytest.__file__).parents[1]
     assert elsewhere.Python(THIS, sys.executable).test(here, packages, tmp_path, ("-q", "test_it.py")) == status
+
+
+def test_an_emulated_processor_is_asked_for_fewer_examples(other: Machine, tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text(
+        "from hypothesis import settings\nsettings.register_profile('emulated', max_examples=7)\n"
+    )
+    (tmp_path / "test_it.py").write_text(
+        "from hypothesis import settings\ndef test_it(): assert settings().max_examples == 7\n"
+    )
+    packages = Path(pytest.__file__).parents[1]
+    assert elsewhere.Python(THIS, sys.executable).test(other, packages, tmp_path, ("-q", "test_it.py")) == 0
+    assert settings.get_profile("emulated").max_examples < settings.get_profile("lcf-edge").max_examples
 
 
 def test_what_the_tests_need_is_what_the_project_says() -> None:
