@@ -57,12 +57,13 @@ demo: $(VENV)/.run $(VENV)/.compiled
 test: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest
 
-# As root, where a Python is a Debian's. TESTS: what pytest is told.
+# As root, where a Python is a Debian's. TESTS: what pytest is told (all, but for those of what releases the project, which
+# is always done by the Python of .venv, with its pip).
 RELEASE := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e ".[release]"
 ELSEWHERE := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.elsewhere
 test-all: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
-	$(ELSEWHERE) "$$(uname -m)" $(or $(PYTHONS),3.11 3.12 3.13 3.14) --tests $(TESTS)
+	$(ELSEWHERE) "$$(uname -m)" $(or $(PYTHONS),3.11 3.12 3.13 3.14) --tests $(or $(TESTS),--ignore tests/release)
 
 # Not what runs the filter uncompiled or over whole drives, hours of an emulated processor: `make wheels` compares one.
 ON_ARM := $(addprefix --ignore tests/lcf_edge/filter/,test_compiled.py test_replay.py) \
