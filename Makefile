@@ -57,17 +57,18 @@ demo: $(VENV)/.run $(VENV)/.compiled
 test: $(VENV)/.dev $(VENV)/.compiled
 	$(BIN)/python -m pytest
 
-# As root, where a Python is a Debian's. TESTS: what pytest is told.
+# As root, where a Python is a Debian's. TESTS: what pytest is told (all, but for those of what releases the project, which
+# is always done by the Python of .venv, with its pip).
 RELEASE := $(BIN)/python -m pip install --quiet --disable-pip-version-check --no-build-isolation -e ".[release]"
 ELSEWHERE := PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m release.elsewhere
 test-all: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
-	$(ELSEWHERE) "$$(uname -m)" $(or $(PYTHONS),3.11 3.12 3.13 3.14) --tests $(TESTS)
+	$(ELSEWHERE) "$$(uname -m)" $(or $(PYTHONS),3.11 3.12 3.13 3.14) --tests $(or $(TESTS),--ignore tests/release)
 
-# Not what compares with the filter uncompiled, which an emulated processor runs for hours: `make wheels` compares.
-ON_ARM := --ignore tests/lcf_edge/filter/test_compiled.py $(addprefix tests/,lcf_edge/filter lcf_edge/test_cdr.py \
-	lcf_edge/test_scene_records.py lcf_edge/test_lcf_msgs.py lcf_edge/test_compilation.py lcf_edge/standard_messages \
-	lcf_edge/recording drivers lcf_edge/daemon)
+# Not what runs the filter uncompiled or over whole drives, hours of an emulated processor: `make wheels` compares one.
+ON_ARM := $(addprefix --ignore tests/lcf_edge/filter/,test_compiled.py test_replay.py) \
+	$(addprefix tests/,lcf_edge/filter lcf_edge/test_cdr.py lcf_edge/test_scene_records.py lcf_edge/test_lcf_msgs.py \
+	lcf_edge/test_compilation.py lcf_edge/standard_messages lcf_edge/recording drivers lcf_edge/daemon)
 test-arm64: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
 	$(ELSEWHERE) aarch64 3.13 --tests $(or $(TESTS),$(ON_ARM))

@@ -52,7 +52,7 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     busy: bool = False
     hangs: bool = False  # while it opens
     padding: int = 0  # bytes after each row
-    bad: int = -1  # the picture that is marked as bad
+    bad: bool = False  # every other picture is marked as bad
     skipped: int = -1  # the picture that is lost
     cancelled: int = -1  # the picture with which the camera is gone
     crash: int = -1  # the picture at which libcamera crashes
@@ -292,7 +292,7 @@ class Camera:
         buffer.metadata = SimpleNamespace(
             sequence=number,
             timestamp=stamp_ns,
-            status=Status.Error if number == self._world.bad else Status.Success,
+            status=Status.Error if self._world.bad and number % 2 else Status.Success,
             planes=[SimpleNamespace(bytes_used=len(data))],
         )
         request.metadata = {Control(SENSOR_TIMESTAMP): stamp_ns} if self._world.stamped else {}

@@ -98,11 +98,11 @@ def cache() -> Path:
     return Path(os.environ.get("LCF_EDGE_RELEASE_CACHE") or Path.home() / ".cache/lcf-edge/release")
 
 
-def unpacked(machine: Machine, suite: str, packages: Sequence[str]) -> Path:
-    """A folder with these packages and all that they need, as ``suite`` has them."""
+def unpacked(machine: Machine, suite: str, packages: Sequence[str], *options: str) -> Path:
+    """A folder with these packages and all that they need, as ``suite`` has them. ``options``: of ``mmdebstrap``."""
     named = hashlib.sha256(" ".join(packages).encode()).hexdigest()[:8]
     links = "; ".join(f'mkdir -p "$1/usr/{name}"; ln -s usr/{name} "$1/{name}"' for name in _FOLDERS)
-    return _kept(machine, suite, packages, named, "--variant=extract", f"--setup-hook={links}")
+    return _kept(machine, suite, packages, named, "--variant=extract", f"--setup-hook={links}", *options)
 
 
 def installed(machine: Machine, suite: str, packages: Sequence[str]) -> Path:

@@ -17,7 +17,9 @@ from lcf_edge.compilation import extension
 from lcf_edge.lens import Lens
 
 # A shared machine may be slow at any moment; what failed once is printed, not kept in the tree.
+# Emulated (make test-arm64), each example takes twenty times as long.
 settings.register_profile("lcf-edge", deadline=None, database=None, print_blob=True, derandomize=True)
+settings.register_profile("emulated", settings.get_profile("lcf-edge"), max_examples=20)
 settings.load_profile("lcf-edge")
 
 pytest_plugins = ("tests.lcf_edge.chromium",)

@@ -52,7 +52,6 @@ def test_every_module_with_declarations_is_in_the_extension_and_comes_from_it() 
 
 @needs_extension
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the size is that for x86-64")
-@pytest.mark.skipif(not (ROOT / ".git").exists(), reason="that of a wheel is larger, and measured by make wheels")
 def test_the_extension_is_so_small_that_the_one_for_64_bit_arm_stays_below_what_a_release_allows() -> None:
     larger_kb = 70.0  # its pages have 64 kB
     assert Path(str(extension().path)).stat().st_size / 1e3 + larger_kb < MAX_EXTENSION_KB
@@ -185,3 +184,20 @@ def test_make_installs_what_builds_it_as_the_project_asks_for() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
     makefile = (ROOT / "Makefile").read_text("utf-8")
     assert [need for need in project["build-system"]["requires"] if f'"{need}"' not in makefile] == []
+
+
+@pytest.mark.skipif(not (ROOT / "build/compiled").exists(), reason="translating all modules takes a minute")
+def test_where_cflags_replaces_pythons_own_flags_the_extension_is_compiled_as_elsewhere(tmp_path: Path) -> None:
+    compiler = tmp_path / "cc"
+    compiler.write_text(f'#!/bin/sh\necho "$*" >> {tmp_path}/told\nexit 1\n', encoding="ascii")
+    compiler.chmod(0o755)
+    environment = {name: value for name, value in os.environ.items() if name != "LCF_EDGE_COMPILED"}
+    subprocess.run(
+        (sys.executable, "setup.py", "--quiet", "build_ext", "--build-lib", tmp_path, "--build-temp", tmp_path),
+        env={**environment, "CC": str(compiler), "CFLAGS": "-Iheaders"},
+        cwd=ROOT,
+        check=True,
+        capture_output=True,
+    )
+    told = (tmp_path / "told").read_text(encoding="utf-8").splitlines()[0].split()
+    assert {"-Iheaders", "-DNDEBUG=1", "-fwrapv", "-O2"} <= set(told)

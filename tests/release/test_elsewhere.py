@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from hypothesis import settings
 
 from release import elsewhere
 from release.debian import MACHINES, Machine, ReleaseError
@@ -36,7 +37,7 @@ def test_another_processors_is_that_of_the_debian_that_has_it(
     other: Machine, version: str, suite: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(
-        elsewhere, "unpacked", lambda machine, suite, packages: Path(machine.debian, suite, packages[0])
+        elsewhere, "unpacked", lambda machine, suite, packages, *_: Path(machine.debian, suite, packages[0])
     )
     assert elsewhere.find(other, version).root == Path(other.debian, suite, "python3")
 
@@ -55,6 +56,18 @@ def test_what_is_tested_is_the_project_with_its_packages(
     (tmp_path / "test_it.py").write_text(f"import project\ndef test_it(): assert project.VALUE == {value}\n")
     packages = Path(pytest.__file__).parents[1]
     assert elsewhere.Python(THIS, sys.executable).test(here, packages, tmp_path, ("-q", "test_it.py")) == status
+
+
+def test_an_emulated_processor_is_asked_for_fewer_examples(other: Machine, tmp_path: Path) -> None:
+    (tmp_path / "conftest.py").write_text(
+        "from hypothesis import settings\nsettings.register_profile('emulated', max_examples=7)\n"
+    )
+    (tmp_path / "test_it.py").write_text(
+        "from hypothesis import settings\ndef test_it(): assert settings().max_examples == 7\n"
+    )
+    packages = Path(pytest.__file__).parents[1]
+    assert elsewhere.Python(THIS, sys.executable).test(other, packages, tmp_path, ("-q", "test_it.py")) == 0
+    assert settings.get_profile("emulated").max_examples < settings.get_profile("lcf-edge").max_examples
 
 
 def test_what_the_tests_need_is_what_the_project_says() -> None:
@@ -98,3 +111,13 @@ def test_an_unpacked_debian_has_the_users_groups_and_names_of_an_installed_one(t
 def test_without_root_it_says_what_to_do(capsys: pytest.CaptureFixture[str]) -> None:
     assert elsewhere.main(["aarch64", "3.13"]) == 1
     assert "(sudo make test-" in capsys.readouterr().err
+
+
+def test_byte_code_is_made_ahead_with_the_names_that_it_has_there_and_what_fails_is_left(tmp_path: Path) -> None:
+    (tmp_path / "whole.py").write_text("def where(): raise ValueError\n")
+    (tmp_path / "of_python_2.py").write_text("print 'old'\n")
+    elsewhere.compile_ahead(sys.executable, tmp_path, "/project")
+    (made,) = tmp_path.glob("__pycache__/*.pyc")
+    assert made.name == f"whole.{sys.implementation.cache_tag}.pyc"
+    assert b"/project/whole.py" in made.read_bytes()
+    assert str(tmp_path).encode() not in made.read_bytes()

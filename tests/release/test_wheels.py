@@ -35,6 +35,7 @@ def source(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_the_source_package_is_whole(source: Path) -> None:
     others = {"setup.py", "pyproject.toml", "Makefile", "README.md", "CHANGELOG.md", "LICENSE", "docs/install.md"}
+    others |= {"SECURITY.md", "Containerfile", ".containerignore"}
     others |= {"tests/conftest.py", "hil_mocks/serial_imu.py", "benchmarks/run.py", "release/wheels.py"}
     others |= {"systemd/lcf-edge.service"}
     packed = {str(path.relative_to(source)) for path in source.rglob("*")}

@@ -80,7 +80,9 @@ def recorded(machine: Machine, daemon: Daemon, fed: list[Grey]) -> Iterator[Path
     assert wanted, listed
     for device in (grabber, player):
         machine.run(f"v4l2-ctl --device {device} --set-dv-bt-timings index={wanted[1]}")
-    machine.run(f"v4l2-ctl --device {grabber} --set-ctrl loop_video=1,osd_text_mode=2")
+    controls = machine.run(f"v4l2-ctl --device {grabber} --list-ctrls")
+    cable = "loop_video=1" if "loop_video" in controls else "hdmi_001_0_is_connected_to=2"  # from Linux 6.12 on
+    machine.run(f"v4l2-ctl --device {grabber} --set-ctrl {cable},osd_text_mode=2")
     play = (
         f"v4l2-ctl --device {player} --set-fmt-video-out=width={WIDTH},height={HEIGHT},pixelformat=GREY "
         f"--stream-out-mmap --stream-from=/run/drive.raw --stream-count={len(shown)}"

@@ -54,7 +54,10 @@ def test_each_has_a_user_and_a_folder_of_its_own(both: Machine) -> None:
     assert len(set(users.values())) == len(NAMES)
     for name in NAMES:
         both.wait_until(f"ls /var/lib/lcf-edge-{name}/*.mcap*")
-        owners = both.run(f"stat -L -c %u /var/lib/lcf-edge-{name} /var/lib/private/lcf-edge-{name}/*.mcap*").split()
+        # As it sees them itself: from Debian 13 on, they are nobody's for the others.
+        inside = f"nsenter --target {shown(both, name, 'MainPID')} --mount sh -c"
+        folder = f"/var/lib/lcf-edge-{name}"
+        owners = both.run(f"{inside} 'stat -L -c %u {folder} {folder}/*.mcap*'").split()
         assert set(owners) == {users[name]}
 
 

@@ -143,9 +143,9 @@ class TestPictures:
         assert camera.counts["dropped"] == 1
 
     def test_a_picture_that_is_marked_as_bad_is_refused(self, open_camera: Open) -> None:
-        camera = open_camera(World(bad=1))
-        assert 1 not in [frame.seq for frame in take(camera, 3)]
-        assert camera.counts["corrupt"] == 1
+        camera = open_camera(World(bad=True))
+        while not camera.counts["corrupt"]:  # on a slow computer a newer one may overtake it unseen
+            assert not any(frame.seq % 2 for frame in camera.read())
 
     def test_everything_is_given_back(self, open_camera: Open, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(libcamera, "ENDING_S", 60.0)  # a busy computer may need longer than a vehicle has
