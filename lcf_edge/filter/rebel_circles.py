@@ -299,10 +299,10 @@ def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, aroun
             if one == other or groups.group[one] < support or groups.group[other] < support:
                 continue
             k = verdicts.row[groups.verdict[b]]
-            distance = flow.length(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
+            distance = lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
             if distance >= near_link_px(max(edges.y[i], edges.y[k]), around):
                 continue
-            difference = flow.length(groups.vx[a] - groups.vx[b], groups.vy[a] - groups.vy[b])
+            difference = lengths.of(groups.vx[a] - groups.vx[b], groups.vy[a] - groups.vy[b])
             noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
             if difference < noise + NEAR_LIKE_HZ * distance:
                 join(groups, a, b)
