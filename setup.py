@@ -46,7 +46,6 @@ MACROS = [
     ("NDEBUG", "1"),  # Python's own flags have it, unless CFLAGS replaces them: without, 20 kB of assertions
 ]
 FLAGS = ["-O2", "-fvect-cost-model=dynamic"]  # as fast as -O3, and a twelfth smaller
-FLAGS += ["-fwrapv"]  # as Python is compiled, also where CFLAGS replaces its flags
 FLAGS += ["-ffp-contract=off"]  # fused multiply-adds would make aarch64 differ from x86-64
 FLAGS += ["-DCYTHON_INLINE=CYTHON_UNUSED"]  # the compiler itself knows what is worth inlining: a sixth smaller, as fast
 FLAGS += ["-fno-align-functions", "-fno-align-jumps", "-fno-align-loops"]  # as fast, 4 % smaller
