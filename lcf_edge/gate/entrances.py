@@ -19,7 +19,7 @@ PIECE_BYTES = 2**16
 MAX_OF_ONE_NAME = 8  # connections of one common name
 MAX_OF_ONE_USER = 16
 MAX_PARTIES = 32  # connections in all
-CONNECTIONS = Path("/proc/net")
+CONNECTIONS = Path("/proc/self/net")  # the unit hides /proc/net
 
 Stream = tuple[asyncio.StreamReader, asyncio.StreamWriter]
 
