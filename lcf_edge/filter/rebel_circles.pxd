@@ -85,6 +85,7 @@ cdef double looming_rate(CircleColumns circles, Py_ssize_t c, double horizon_s) 
 cdef double velocity_x(CircleColumns circles, Py_ssize_t c, double x, double horizon_s) noexcept nogil
 cdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double horizon_s) noexcept nogil
 cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
+cdef double noise_between(RebelGroups groups, Py_ssize_t a, Py_ssize_t b) noexcept nogil
 cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
 cpdef int lowest_label(RebelGroups groups, int k) noexcept nogil
 cdef void join(RebelGroups groups, int a, int b) noexcept nogil

@@ -225,6 +225,11 @@ def take_rebels(
         groups.vy[k] = (edges.y[i] - verdicts.y[j]) / elapsed_s
 
 
+def noise_between(groups: RebelGroups, a: int, b: int) -> float:
+    """1 sigma of each rebel's velocity, px/s, together."""
+    return VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+
+
 def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings) -> bool:
     """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
 
@@ -240,7 +245,7 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     if distance >= max(near, far):  # most are
         return False
     difference = lengths.of(ax - bx, ay - by)
-    noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+    noise = noise_between(groups, a, b)
     if distance >= near:
         return max(difference, noise) < FAR_LIKE_SPEED * faster
     if difference < noise + FASTEST_EXPANSION / around.horizon_s * distance:
@@ -303,7 +308,7 @@ def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, aroun
             if distance >= near_link_px(max(edges.y[i], edges.y[k]), around):
                 continue
             difference = lengths.of(groups.vx[a] - groups.vx[b], groups.vy[a] - groups.vy[b])
-            noise = VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
+            noise = noise_between(groups, a, b)
             if difference < noise + NEAR_LIKE_HZ * distance:
                 join(groups, a, b)
                 groups.group[min(one, other)] += groups.group[max(one, other)]

@@ -337,3 +337,19 @@ def test_who_was_lost_right_before_a_vehicle_that_stands_is_there_until_it_sees_
     behind = drive(box((0.0, -1.0, 30.0), (34.0, 10.0, 0.2), landmarks=far_things, seed=3))
     way = replace(drive(clutter(150)) + walker + behind, frames=60, speed_mps=1.5)
     assert remembered_s(way, slice(150, 210), 0.1) == pytest.approx(about_s, abs=0.4)
+
+
+@pytest.mark.parametrize(("range_m", "about_s"), [(1.3, 1.05), (3.5, 0.4)], ids=["near", "farther off"])
+def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
+    drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, about_s: float
+) -> None:
+    walker = drive(box((-0.38 * range_m, -0.35, range_m), (0.4, 1.2, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
+    way = replace(drive(clutter(150)) + walker, frames=60, speed_mps=0.6)
+    mine, lost_s, last_s = {looks.tobytes() for looks in way.looks[150:]}, 24 / FPS, 0.0
+    tables = LineCircleFilter(Config(), way.lens)
+    for seq, (corners, motion) in enumerate(way):
+        keep = np.array([seq / FPS < lost_s or looks.tobytes() not in mine for looks in corners.appearance])
+        tables.step(Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep]), motion)
+        if published(tables.objects):
+            last_s = (seq + 1) / FPS
+    assert last_s - lost_s == pytest.approx(about_s, abs=0.11)
