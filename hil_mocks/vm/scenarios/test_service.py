@@ -6,7 +6,7 @@ from hil_mocks.vm.daemon import DEFAULT_SETTINGS, PATIENCE_S, UNIT, Daemon, Subs
 from hil_mocks.vm.machine import Machine
 
 STOPS_S = 2.0
-MAX_EXPOSURE = 1.5  # of systemd-analyze
+MAX_EXPOSURE = 1.6  # of systemd-analyze; 0.4 of it are the gate, which tells users apart and lowers its priority
 
 
 @pytest.fixture
