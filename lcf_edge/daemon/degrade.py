@@ -17,6 +17,7 @@ _WORDS = {
     "rotation from odometry": "rotation is taken from odometry",
     "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
     "speed drifts": "speed comes from the accelerometer alone and drifts",
+    "speed from ground": "nothing measures the speed: the ground in the pictures tells it, as camera.height_m has it",
 }
 
 _WORDS_OF_A_RECORDING = {  # without mentioning a cable

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 from drivers.samples import ImuSample, SpeedSample
 from lcf_edge.config import Imu, Vehicle
+from lcf_edge.ego_motion.ground_belief import GroundBelief
 from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.ego_motion.inertial_speed import GRAVITY_MPS2, MAX_SPEED_MPS, InertialSpeed
 from lcf_edge.ego_motion.sample_ring import Ring, Span, Track, Window
@@ -112,6 +113,7 @@ class EgoMotionEstimator:
         self._imu = Ring("imu", IMU_CAPACITY, 7, self.refused)  # gyro, specific force, whether saturated
         self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
+        self._ground = GroundBelief()
         self._path_yaw_radps = 0.0
         self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
         self._noisy = False  # as a real gyro; synthetic samples have no noise
@@ -193,6 +195,9 @@ class EgoMotionEstimator:
             self._inertial.advance(span.dt_s, force_mps2, rotation, gap_s)
         if interval.measured and not self.bias.known:
             interval.notes.append("gyro bias unknown")
+        self._ground.advance(span.dt_s)
+        if still:
+            self._ground.stand()
         self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
         return self._answer(rotation)
 
@@ -292,8 +297,10 @@ class EgoMotionEstimator:
         interval = self._interval
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
             return
-        again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
-        self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
+        self._ground.see(ground, interval.span.dt_s)
+        if isfinite(ground.measured_mps):
+            again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
+            self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
 
     def _rotation(self) -> Floats:
         """Return the rotation of directions over the interval, (3, 3)."""
@@ -411,6 +418,9 @@ class EgoMotionEstimator:
             if self._inertial.sigma_mps > 0:
                 notes.append("speed drifts")
             return self._inertial.mean_mps
+        if source in ("auto", "imu") and isfinite(self._ground.speed_mps):
+            notes.append("speed from ground")
+            return self._ground.speed_mps
         notes.append("no speed")
         return nan
 

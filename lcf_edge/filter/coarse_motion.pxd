@@ -15,6 +15,7 @@ cdef int STEP
 cdef double REACH_SHARE
 cdef double DOWN_SHARE
 cdef double NEAREST_M
+cdef double ANY_WAY_M
 cdef double OFF_FLOW
 cdef double ROTATION_SIGMAS
 cdef double TURN_SIGMAS

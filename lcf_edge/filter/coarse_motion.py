@@ -26,6 +26,7 @@ STEP = 4  # small px from piece to piece
 REACH_SHARE = 0.16  # of the picture's width, by which a piece may have moved across,
 DOWN_SHARE = 0.5  # and down, as a share of that
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
+ANY_WAY_M = 1e3  # driven, where the speed is unknown: what stands may have come any way from O
 OFF_FLOW = 1.5  # small px beside the flow line, within which a piece may stand, and more
 ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
 TURN_SIGMAS = 2.0  # or the lens, in a turn
@@ -156,7 +157,7 @@ def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
         coarse.words_then[k] = coarse.words_last[k]
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
     coarse.then_s = around.dt_s
-    coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else 0.0
+    coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else ANY_WAY_M
     coarse.focus_x, coarse.focus_y = around.focus_x, around.focus_y
     sigma_px = keys.rate_sigma_radps * around.dt_s * around.pinhole.focal
     coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * sigma_px / coarse.side
@@ -168,7 +169,8 @@ def look_farther_back(
     """Pieces are sought in the picture of the key frame in ``slot``."""
     lay_out(coarse, coarse.kept, slot * coarse.width * coarse.height, coarse.words_then)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
-    coarse.then_s, coarse.ahead_m = baselines.elapsed_s[slot], baselines.depth_m[slot]
+    coarse.then_s = baselines.elapsed_s[slot]
+    coarse.ahead_m = baselines.depth_m[slot] if math.isfinite(around.speed_mps) else ANY_WAY_M
     coarse.focus_x, coarse.focus_y = baselines.focus_x[slot], baselines.focus_y[slot]
     coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * baselines.sigma_px[slot] / coarse.side
 

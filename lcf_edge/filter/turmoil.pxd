@@ -14,6 +14,11 @@ cdef double MIN_LOST
 cdef double FOUND_SHARE
 cdef double FOUND_NOW_SHARE
 cdef double FOUND_ELSEWHERE
+cdef double LOST_STILL_SHARE
+cdef double MIN_HIDDEN
+cdef double HIDDEN_FOUND_SHARE
+cdef int MIN_HIDDEN_CELLS
+cdef double MIN_HIDDEN_S
 cdef int MIN_CELLS
 cdef double MIN_S
 cdef double MET_S
@@ -25,21 +30,23 @@ cdef class Turmoil:
     cdef readonly double side_px
     cdef double per_px
     cdef readonly double[::1] found, lost, longest_s
-    cdef double[::1] found_now, lost_now, lasts_s, weight
-    cdef unsigned char[::1] unruly
-    cdef readonly int[::1] place, size
+    cdef double[::1] found_now, lost_now, trusted_now, hidden_now, lasts_s, weight
+    cdef unsigned char[::1] unruly, hidden
+    cdef readonly int[::1] place, size, hidden_size
     cdef readonly Members members
 
 cdef int cell_at(Turmoil turmoil, double x, double y) noexcept nogil
 cdef double middle_x(Turmoil turmoil, int k) noexcept nogil
 cdef double middle_y(Turmoil turmoil, int k) noexcept nogil
-@cython.locals(k=int)
+@cython.locals(k=int, trusted=int)
 cpdef void count(Turmoil turmoil, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef bint is_inner(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(total=double, row=int, middle=int)
 cdef double with_those_around(double[::1] values, Turmoil turmoil, int k) noexcept nogil
 cdef double stays_px(Turmoil turmoil, int k, Situation around) noexcept nogil
 cdef bint is_unruly(Turmoil turmoil, int k, Situation around, Settings settings) noexcept nogil
+@cython.locals(hidden=double)
+cdef bint is_hidden(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(row=int, column=int)
 cdef void mark(Turmoil turmoil, int k) noexcept nogil
 cdef bint is_found_elsewhere(Turmoil turmoil) noexcept nogil
@@ -49,7 +56,10 @@ cdef bint see(Turmoil turmoil, Situation around, Settings settings) noexcept nog
 cdef void join_cells(Turmoil turmoil) noexcept nogil
 @cython.locals(k=int, g=int)
 cdef void gather(Turmoil turmoil) noexcept nogil
+cdef bint is_believed(Turmoil turmoil, int g) noexcept nogil
 cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
-@cython.locals(evicted=int, c=int)
+@cython.locals(k=int, found=double, lost=double)
+cdef bint rages_on(Turmoil turmoil, CircleColumns circles, Py_ssize_t c) noexcept nogil
+@cython.locals(evicted=int, c=int, seen=bint)
 cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -24,6 +24,11 @@ MIN_LOST = 6.0  # and of these lost in this frame: one bad picture is no turmoil
 FOUND_SHARE = 0.1  # of them, that are found at most lately,
 FOUND_NOW_SHARE = 0.2  # and in this frame; more than that elsewhere,
 FOUND_ELSEWHERE = 0.35  # and lately this share, where edges are found at all
+LOST_STILL_SHARE = 0.3  # of them, that are found at most where a circle goes on
+MIN_HIDDEN = 6.0  # trusted edges of a place, that are lost in this frame
+HIDDEN_FOUND_SHARE = 0.05  # of these, that are found all the same, where something is in front of them
+MIN_HIDDEN_CELLS = 6  # of a place, that are hidden: smaller ones show what passes far off
+MIN_HIDDEN_S = 0.09  # that it lasts before it is believed; what is lost is soon trusted no more
 MIN_CELLS = 3  # of a place, that are in turmoil
 MIN_S = 0.15  # that it lasts before it is believed
 MET_S = 1.0  # what is met later than this is found again
@@ -48,11 +53,12 @@ class Turmoil:
         self.down = (height * ACROSS + width - 1) // width
         cells = self.across * self.down
         self.found, self.lost, self.found_now, self.lost_now = [doubles(cells) for _ in range(4)]
-        self.unruly = octets(cells)
+        self.trusted_now, self.hidden_now = doubles(cells), doubles(cells)
+        self.unruly, self.hidden = octets(cells), octets(cells)
         self.lasts_s = doubles(cells)
         self.place = integers(cells)
         self.members = Members(cells)
-        self.size = integers(cells)
+        self.size, self.hidden_size = integers(cells), integers(cells)
         self.weight, self.longest_s = doubles(cells), doubles(cells)
 
 
@@ -83,17 +89,20 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
     for k in range(turmoil.across * turmoil.down):
         turmoil.found[k] *= kept
         turmoil.lost[k] *= kept
-        turmoil.found_now[k] = turmoil.lost_now[k] = 0.0
+        turmoil.found_now[k] = turmoil.lost_now[k] = turmoil.trusted_now[k] = turmoil.hidden_now[k] = 0.0
     if math.fabs(around.yaw_rate_radps) * around.dt_s * around.pinhole.focal > settings.bl0_px:
         return
     for i in range(edges.count):
         k = cell_at(turmoil, edges.predicted_x[i], edges.predicted_y[i])
         if k < 0 or edges.held[i]:
             continue
+        trusted = 1 if edges.trust[i] >= settings.tr_s else 0
         if edges.corner[i] >= 0:
             turmoil.found_now[k] += 1
+            turmoil.trusted_now[k] += trusted
         else:
             turmoil.lost_now[k] += 1
+            turmoil.hidden_now[k] += trusted
     for k in range(turmoil.across * turmoil.down):
         turmoil.found[k] += turmoil.found_now[k]
         turmoil.lost[k] += turmoil.lost_now[k]
@@ -136,6 +145,14 @@ def is_unruly(turmoil: Turmoil, k: int, around: Situation, settings: Settings) -
     return stays_px(turmoil, k, around) <= settings.bl0_px
 
 
+def is_hidden(turmoil: Turmoil, k: int) -> bool:
+    """Whether something came in front of a cell and those around it: no edge there is found that was trusted."""
+    if not turmoil.hidden_now[k] > 0 or not is_inner(turmoil, k):
+        return False
+    hidden = with_those_around(turmoil.hidden_now, turmoil, k)
+    return hidden >= MIN_HIDDEN and with_those_around(turmoil.trusted_now, turmoil, k) <= HIDDEN_FOUND_SHARE * hidden
+
+
 def mark(turmoil: Turmoil, k: int) -> None:
     """An unruly cell and those around it are of its place."""
     for row in range(-1, 2):
@@ -165,7 +182,8 @@ def see(turmoil: Turmoil, around: Situation, settings: Settings) -> bool:
         turmoil.place[k] = -1
     for k in range(turmoil.across * turmoil.down):
         turmoil.unruly[k] = is_unruly(turmoil, k, around, settings)
-        if turmoil.unruly[k]:
+        turmoil.hidden[k] = is_hidden(turmoil, k)
+        if turmoil.unruly[k] or turmoil.hidden[k]:
             mark(turmoil, k)
             is_any = True
     is_any = is_any and is_found_elsewhere(turmoil)
@@ -201,13 +219,14 @@ def gather(turmoil: Turmoil) -> None:
     for g in range(cells):
         shared.clear(turmoil.members, g)
         turmoil.weight[g] = turmoil.longest_s[g] = 0.0
-        turmoil.size[g] = 0
+        turmoil.size[g] = turmoil.hidden_size[g] = 0
     for k in range(cells):
         g = turmoil.place[k]
         if g >= 0:
             weight = turmoil.found[k] + turmoil.lost[k]
             turmoil.weight[g] += weight
             turmoil.size[g] += turmoil.unruly[k]
+            turmoil.hidden_size[g] += turmoil.hidden[k]
             turmoil.longest_s[g] = max(turmoil.longest_s[g], turmoil.lasts_s[k])
             turmoil.members.size[g] += rounding.whole(turmoil.found_now[k] + turmoil.lost_now[k])
             turmoil.members.x[g] += weight * middle_x(turmoil, k)
@@ -226,6 +245,13 @@ def gather(turmoil: Turmoil) -> None:
             turmoil.members.variance_y[g] += share * dy * dy
 
 
+def is_believed(turmoil: Turmoil, g: int) -> bool:
+    """Whether a place is large enough and lasts."""
+    if turmoil.hidden_size[g] >= MIN_HIDDEN_CELLS and turmoil.longest_s[g] >= MIN_HIDDEN_S:
+        return True
+    return turmoil.size[g] >= MIN_CELLS and turmoil.longest_s[g] >= MIN_S
+
+
 def is_shown_by(circles: CircleColumns, c: int) -> bool:
     """Whether a circle shows where turmoil is, and not how it moves."""
     return circles.active[c] != 0 and circles.cause[c] == NONE
@@ -236,6 +262,15 @@ def tell(circles: CircleColumns, c: int, around: Situation) -> None:
     circles.cause[c] = NONE
     circles.beta[c] = circles.speed[c] = 0.0
     circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
+
+
+def rages_on(turmoil: Turmoil, circles: CircleColumns, c: int) -> bool:
+    """Whether most edges are still lost in the middle of a circle in turmoil, if not as many as make one."""
+    k = cell_at(turmoil, circles.x[c], circles.y[c])
+    if k < 0 or not is_inner(turmoil, k):
+        return False
+    found, lost = with_those_around(turmoil.found, turmoil, k), with_those_around(turmoil.lost, turmoil, k)
+    return found + lost >= MIN_EDGES and found <= LOST_STILL_SHARE * (found + lost)
 
 
 def update(
@@ -252,12 +287,16 @@ def update(
     ``updated``: which circles others have updated, to which a place is left; those of turmoil are marked too.
     """
     evicted = 0
-    if not see(turmoil, around, settings):
+    seen = see(turmoil, around, settings)
+    for c in range(circles.capacity):
+        if is_shown_by(circles, c) and not updated[c]:
+            updated[c] = rages_on(turmoil, circles, c)
+    if not seen:
         return evicted
     join_cells(turmoil)
     gather(turmoil)
     for g in range(turmoil.across * turmoil.down):
-        if turmoil.place[g] != g or turmoil.size[g] < MIN_CELLS or turmoil.longest_s[g] < MIN_S:
+        if turmoil.place[g] != g or not is_believed(turmoil, g):
             continue
         c = shared.nearest_circle(turmoil.members, g, circles, settings)
         if c < 0:
@@ -266,7 +305,7 @@ def update(
             if c < 0:
                 continue
             shared.give_birth(circles, c, turmoil.members, g, settings, ids)
-        elif updated[c]:
+        elif updated[c] and not is_shown_by(circles, c):
             continue
         elif is_shown_by(circles, c):
             shared.blend(circles, c, turmoil.members, g, settings)

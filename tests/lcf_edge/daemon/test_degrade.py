@@ -73,6 +73,7 @@ def test_without_a_speed_nothing_is_said_of_the_rate() -> None:
         "rotation from odometry",
         "no speed",
         "speed drifts",
+        "speed from ground",
     ],
 )
 def test_what_ego_motion_lacks_is_reported(note: str) -> None:

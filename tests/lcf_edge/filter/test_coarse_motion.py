@@ -118,6 +118,10 @@ def test_what_crosses_without_a_corner_is_found_with_its_motion(turn_rad: float)
     assert max(found) == 7
 
 
+def test_at_a_speed_that_is_not_known_what_moves_past_o_crosses_all_the_same() -> None:
+    assert rebels(Passing(speed_mps=math.nan))[-1] == 1
+
+
 def test_it_becomes_an_object() -> None:
     objects = [bool((tables.objects.active & (tables.objects.trust >= 3)).any()) for _, tables in driven(Passing())]
     assert objects[-1]
@@ -144,10 +148,13 @@ def test_what_stands_still_in_the_world_is_nothing_however_the_camera_turns() ->
     assert not any(rebels(Passing(pxps=(0.0, 0.0), turn_rad=0.015)))
 
 
+@pytest.mark.parametrize("speed_mps", [3.0, math.nan], ids=["", "at a speed that is not known"])
 @pytest.mark.parametrize(("left", "grows"), [(340.0, 1.1), (430.0, 1.1), (500.0, 1.05)])
-def test_what_stands_beside_the_way_and_grows_as_it_is_passed_is_nothing(left: float, grows: float) -> None:
+def test_what_stands_beside_the_way_and_grows_as_it_is_passed_is_nothing(
+    left: float, grows: float, speed_mps: float
+) -> None:
     # from 3 or 6 m, 0.3 m nearer in each frame
-    near = Passing(left=left, top=230.0, width=40.0, height=60.0, pxps=(0.0, 0.0), grows=grows, speed_mps=3.0)
+    near = Passing(left=left, top=230.0, width=40.0, height=60.0, pxps=(0.0, 0.0), grows=grows, speed_mps=speed_mps)
     assert not any(rebels(near))
 
 

@@ -28,8 +28,9 @@ FLUTTERING = 250  # about somebody with few corners: hardly one of all is found 
 class Storm:
     """A drive among landmarks, with corners about ``place`` that are other ones in each frame; iterating gives a step.
 
-    ``half_px``: half its side. ``from_seq``, ``until_seq``: only from there on, and no more then.
-    ``all_of_it``: of the landmarks none is found again either, as in a picture that shakes.
+    ``half_px``: half its side. ``stay``: corners that it keeps from ``stay_from`` on. ``from_seq``, ``until_seq``: only
+    from there on, and no more then. ``all_of_it``: of the landmarks none is found again either, as in a picture that
+    shakes.
     """
 
     drive: Any
@@ -37,10 +38,16 @@ class Storm:
     half_px: float = HALF_PX
     from_seq: int = 4
     until_seq: int = 1000
+    stay: int = 0
+    stay_from: int = 0
     all_of_it: bool = False
 
     def __iter__(self) -> Iterator[tuple[Corners, Any]]:
-        random = np.random.default_rng(0)
+        random, others = np.random.default_rng(0), np.random.default_rng(1)
+        kept = (
+            np.rint(self.place + others.uniform(-self.half_px, self.half_px - 1, (self.stay, 2))).astype(np.int32),
+            others.integers(0, 256, (self.stay, APPEARANCE_SAMPLES), np.uint8),
+        )
         for seq, (corners, motion) in enumerate(self.drive):
             there = np.abs(corners.position - self.place).max(axis=1) < self.half_px
             shown = Corners(corners.pixel[~there], corners.position[~there], corners.appearance[~there])
@@ -50,6 +57,8 @@ class Storm:
                     np.int32
                 )
                 looks = random.integers(0, 256, (CORNERS, APPEARANCE_SAMPLES), np.uint8)
+                if seq >= self.stay_from:
+                    pixel[: self.stay], looks[: self.stay] = kept
                 shown = _with(shown, Corners(pixel, pixel.astype(np.float32), looks))
             if raging and self.all_of_it:
                 looks = random.integers(0, 256, shown.appearance.shape, np.uint8)
@@ -177,6 +186,72 @@ def test_where_rebels_tell_more_it_is_left_to_them(drive: Drive, clutter: Landma
     assert raging > 5
     assert Cause.CROSSING in causes
     assert Cause.NONE not in causes
+
+
+@pytest.mark.parametrize(("stay", "goes_on"), [(9, True), (40, False)], ids=["one in seven found", "two in three"])
+def test_a_circle_goes_on_while_most_edges_are_still_lost(calm: Any, stay: int, goes_on: bool) -> None:
+    """As many as that make no circle, and end none."""
+    resting = replace(calm, speed_mps=0.0, frames=40)
+    assert not after(Storm(resting, stay=stay))[1]
+    tables, _ = after(Storm(resting, stay=stay, stay_from=16))
+    assert bool(reported(tables)) == goes_on
+
+
+@dataclass(frozen=True)
+class Cover:
+    """A drive among landmarks, and from ``from_seq`` on something plain before a part of the picture.
+
+    ``step_px``: by which it comes in from the left in a frame, until it hides all left of ``right_px``. ``leaves``:
+    every so-many landmark behind it is seen all the same.
+    """
+
+    drive: Any
+    right_px: float = 260.0
+    step_px: float = 60.0
+    from_seq: int = 12
+    leaves: int = 1000
+
+    def __iter__(self) -> Iterator[tuple[Corners, Any]]:
+        for seq, (corners, motion) in enumerate(self.drive):
+            seen = np.ones(len(corners.pixel), bool)
+            if seq >= self.from_seq:
+                edge_px = min(self.right_px, (seq - self.from_seq + 1) * self.step_px)
+                seen = (corners.position[:, 0] > edge_px) | (np.arange(len(seen)) % self.leaves == 0)
+            yield Corners(corners.pixel[seen], corners.position[seen], corners.appearance[seen]), motion
+
+
+def covered(cover: Cover) -> list[bool]:
+    """For each frame whether a rebel circle without a cause is reported."""
+    tables, told = LineCircleFilter(CONFIG, cover.drive.lens), []
+    for corners, motion in cover:
+        tables.step(corners, motion)
+        told.append(bool(reported(tables)))
+    return told
+
+
+@pytest.fixture(scope="module")
+def slow(drive: Drive, clutter: Landmarks) -> Any:
+    """A rover at 0.3 m/s among what stands."""
+    return drive(clutter(700), sigma_rad=1e-4, speed_mps=0.3, frames=20)
+
+
+def test_what_comes_before_the_camera_without_a_corner_is_told_by_what_it_hides(slow: Any) -> None:
+    told = covered(Cover(slow))
+    assert not any(told[:12])
+    assert any(told[12:18])
+
+
+@pytest.mark.parametrize(
+    "changes",
+    [
+        pytest.param({"from_seq": 100}, id="nothing comes"),
+        pytest.param({"right_px": 700.0, "step_px": 700.0}, id="all the picture is hidden: it may be the lens"),
+        pytest.param({"right_px": 60.0}, id="a narrow thing, far off"),
+        pytest.param({"leaves": 3}, id="one in three is seen through it: leaves, or glare"),
+    ],
+)
+def test_other_reasons_to_lose_what_was_trusted_are_none(slow: Any, changes: dict[str, Any]) -> None:
+    assert not any(covered(replace(Cover(slow), **changes)))
 
 
 def test_a_full_table_counts_it(calm: Any) -> None:
