@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+from hil_mocks.closed_loop.exact import REMEMBERED_S
 from hil_mocks.closed_loop.loop import Contact, Log
 
 _BRAKES, _DONE = 0.85, 0.95  # a braking: below this share of the cruise speed, until above that
+_STOPS_MPS2, _DELAY_S = 1.5, 0.35  # as the planner brakes
 _BEFORE_S, _AFTER_S = 1.0, 0.5  # the truth's own braking is looked for so long before it, and after its end
 
 
@@ -24,6 +26,7 @@ class Outcome:
 
     threats: int = 0  # that a blind vehicle runs into, and the one with the truth does not
     collisions: tuple[Contact, ...] = ()  # those that the vehicle with the truth avoids
+    unseen: int = 0  # of these, with what was out of view while braking would have helped
     brakings: int = 0
     for_nothing: int = 0
     speed_shares: tuple[float, ...] = field(default=())  # of the mean speed with the truth, one a drive
@@ -68,14 +71,28 @@ def brakes(target_mps: float, cruise_mps: float) -> bool:
     return target_mps < _DONE * cruise_mps
 
 
+def was_in_view(log: Log, contact: Contact, fps: float) -> bool:
+    """Whether a picture showed what was run into early enough to stop, and late enough to be remembered then.
+
+    Where none did, the planner with the truth, in this drive, would have run into it as well.
+    """
+    at = round(contact.time_s * fps)
+    fastest_mps = max(log.speed_mps[max(at - round(fps), 0) : at + 1], default=contact.speed_mps)
+    last = at - round((_DELAY_S + fastest_mps / _STOPS_MPS2) * fps)
+    first = last - round(REMEMBERED_S * fps)
+    return any(contact.number in shown for shown in log.in_view[max(first, 0) : max(last, 0)])
+
+
 def judge(log: Log, right: Sequence[bool], fps: float, truth: Log, blind: Log) -> Outcome:
     """Compare a drive with those of the planner with the truth and of nobody in the same world."""
     unavoidable = {contact.number for contact in truth.contacts}
     threats = {contact.number for contact in blind.contacts} - unavoidable
     found = brakings(log, right, fps)
+    collisions = tuple(contact for contact in log.contacts if contact.number not in unavoidable)
     return Outcome(
         len(threats),
-        tuple(contact for contact in log.contacts if contact.number not in unavoidable),
+        collisions,
+        sum(not was_in_view(log, contact, fps) for contact in collisions),
         len(found),
         sum(braking.for_nothing for braking in found),
         ((log.distance_m / log.seconds) / (truth.distance_m / truth.seconds),),
@@ -87,6 +104,7 @@ def pool(outcomes: Sequence[Outcome]) -> Outcome:
     return Outcome(
         sum(each.threats for each in outcomes),
         tuple(contact for each in outcomes for contact in each.collisions),
+        sum(each.unseen for each in outcomes),
         sum(each.brakings for each in outcomes),
         sum(each.for_nothing for each in outcomes),
         tuple(share for each in outcomes for share in each.speed_shares),

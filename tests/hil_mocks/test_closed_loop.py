@@ -230,7 +230,9 @@ def test_worlds_refuse_a_negative_seed() -> None:
 
 
 def log_of(*targets_mps: float, contacts: tuple[Contact, ...] = ()) -> Log:
-    return Log([1.0] * len(targets_mps), list(targets_mps), list(targets_mps), list(contacts), 10.0, 10.0)
+    count = len(targets_mps)
+    in_view: list[frozenset[int]] = [frozenset()] * count
+    return Log([1.0] * count, list(targets_mps), list(targets_mps), in_view, list(contacts), 10.0, 10.0)
 
 
 def test_a_braking_is_one_until_it_is_over() -> None:
@@ -253,6 +255,25 @@ def test_what_the_truth_hits_too_counts_for_nobody() -> None:
     assert (found.threats, found.collisions, found.contact_mps) == (1, (two,), 3.0)
     assert pool([found, found]).threats == 2
     assert pool([found, found]).mean_speed_share == 1.0
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "unseen"),
+    [
+        pytest.param(3.8, 4.0, 1, id="too late to stop"),
+        pytest.param(2.5, 2.7, 0, id="in time"),
+        pytest.param(0.5, 1.0, 1, id="so long before that it is forgotten"),
+        pytest.param(0.5, 4.0, 0, id="all the time"),
+    ],
+)
+def test_who_came_from_out_of_view_is_told(first: float, last: float, unseen: int) -> None:
+    """At 1 m/s it takes a second to stop; the contact is after four."""
+    log = log_of(*[1.0] * 100, contacts=(Contact(7, "walker_7", 4.0, 1.0),))
+    for seq in range(round(first * 20), round(last * 20)):
+        log.in_view[seq] = frozenset({7})
+    found = judge(log, [True] * 100, 20.0, log_of(1.0), log_of(1.0, contacts=tuple(log.contacts)))
+    assert (len(found.collisions), found.unseen) == (1, unseen)
+    assert pool([found, found]).unseen == 2 * unseen
 
 
 # In real time.
