@@ -1,11 +1,14 @@
 """``python -m lcf_edge.gate.own``: the gate that a daemon starts before its own loopback ports.
 
-It ends with the daemon, whose end of standard input is closed then.
+It ends with the daemon, whose end of standard input is closed then, and puts away the folder of the daemon's socket,
+which one that was killed has left.
 """
 
 import argparse
 import asyncio
 import os
+import select
+import shutil
 import socket
 from collections.abc import Sequence
 from contextlib import suppress
@@ -25,7 +28,7 @@ def main(argv: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(prog="python -m lcf_edge.gate.own", allow_abbrev=False)
     parser.add_argument("--listening", type=int, nargs="+", required=True, help="descriptors of sockets")
     parser.add_argument("--tallies", type=int, required=True, help="descriptor")
-    parser.add_argument("--to", type=Path, required=True, help="Unix socket of the daemon")
+    parser.add_argument("--to", type=Path, required=True, help="Unix socket of the daemon, in a folder of its own")
     parser.add_argument("--own-keys", nargs="*", default=[], help="that everybody may use")
     arguments = parser.parse_args(argv)
     _step_back()
@@ -33,6 +36,8 @@ def main(argv: Sequence[str] | None = None) -> None:
     tallies = Tallies(arguments.tallies)
     gate = Gate(ByUser(arguments.to, tallies), [key.encode() for key in arguments.own_keys], tallies)
     asyncio.run(serve([socket.socket(fileno=number) for number in arguments.listening], gate, STANDARD_INPUT))
+    if select.select([STANDARD_INPUT], [], [], 0)[0]:  # closed
+        shutil.rmtree(arguments.to.parent, ignore_errors=True)
 
 
 def _step_back() -> None:

@@ -29,7 +29,7 @@ def distortion(name: str, coefficients: tuple[float, ...]) -> tuple[Model, tuple
     """
     model = MODELS.get(name.lower())
     if model is None:
-        raise ValueError(f"{printable(name, 60)} is none of {', '.join(filter(None, MODELS))}")
+        raise ValueError(f"{printable(name, 60)} is not one of {', '.join(filter(None, MODELS))}")
     if model == "none" or not any(coefficients):
         return "none", ()
     counts = (4,) if model == "equidistant" else (4, 5)

@@ -123,17 +123,20 @@ def test_a_gate_that_is_killed_comes_again(daemon: Daemon, local: Callable[[], A
     assert local().get("lcf/query/schema")
 
 
-def test_the_gate_ends_with_the_daemon_however_it_ends(endpoint: str) -> None:
+def test_the_gate_ends_with_the_daemon_however_it_ends_and_leaves_no_folder(endpoint: str, tmp_path: Path) -> None:
     command = ("-m", "lcf_edge", "run", "--set", f'zenoh.listen=["{endpoint}"]', "--set", "camera.device=/dev/none")
-    with subprocess.Popen((sys.executable, *command), stderr=subprocess.PIPE, text=True) as daemon:
+    environment = os.environ | {"TMPDIR": str(tmp_path)}
+    with subprocess.Popen((sys.executable, *command), stderr=subprocess.PIPE, text=True, env=environment) as daemon:
         assert daemon.stderr
         assert next(line for line in daemon.stderr if "ready" in line)
         gate = gate_of(daemon)
         end = os.pidfd_open(gate)
+        assert list(tmp_path.glob("lcf-edge-*/zenoh"))
         daemon.kill()
     ended, _, _ = select.select([end], [], [], PATIENCE_S)
     os.close(end)
     assert ended
+    assert not list(tmp_path.glob("lcf-edge-*"))
 
 
 def test_programs_that_only_say_hello_keep_nobody_out(daemon: Daemon, local: Callable[[], Any], endpoint: str) -> None:
