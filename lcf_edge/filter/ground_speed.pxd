@@ -14,6 +14,7 @@ cdef int MIN_EDGES
 cdef double MIN_SHARE
 cdef double MIN_BELOW
 cdef double OUTWARD_SIGMAS
+cdef double MIN_ROWS
 cdef double SLOPE_SIGMA_RAD
 cdef double MIN_SIGMA
 cdef double NAN
@@ -22,7 +23,7 @@ cdef class GroundSpeed:
     cdef public double speed_mps, sigma_mps, measured_mps, elapsed_s
     cdef int[::1] votes
     cdef int count
-    cdef double below, sum, measured, elapsed
+    cdef double below, rows, squares, sum, measured, elapsed
 
 @cython.locals(outward=double)
 cdef double says_mps(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
@@ -30,5 +31,5 @@ cdef double says_mps(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselin
 cdef int bin_of(double speed_mps) noexcept nogil
 @cython.locals(most=int, best=int, votes=int, k=int)
 cdef int fullest(GroundSpeed ground) noexcept nogil
-@cython.locals(k=int, n=int, says=double)
+@cython.locals(k=int, n=int, says=double, below=double)
 cpdef void measure(GroundSpeed ground, EdgeColumns edges, Verdicts verdicts, Baselines baselines, Situation around) noexcept nogil

@@ -2,7 +2,8 @@
 
 The ground at a row b px below the horizon lies at Z = h·f/b. A point of it that has gone outwards by μ of its distance
 from O over a time T says V = μ·Z/T. What stands above the ground is nearer than the ground in its row and says more;
-what is farther, or moves along, says less. The ground is one plane: most of what is below the horizon agrees.
+what is farther, or moves along, says less. The ground is one plane: most of what is below the horizon agrees, in rows
+near and far; of a wall, only those of some rows do.
 """
 
 import math
@@ -22,6 +23,7 @@ MIN_EDGES = 12
 MIN_SHARE = 0.3  # of the edges below the horizon, that agree
 MIN_BELOW = 0.06  # px below the horizon for each px of the focal length; farther off a row has no range
 OUTWARD_SIGMAS = 3.0  # by which a way outwards is above its noise
+MIN_ROWS = 0.15  # 1 sigma of the logarithm of b, of those that agree: a wall's differ by less than the speeds that agree
 SLOPE_SIGMA_RAD = 0.02  # 1 sigma of the ground against the horizon, with the camera's pitch
 MIN_SIGMA = 0.06  # of the logarithm
 NAN = float("nan")
@@ -39,7 +41,7 @@ class GroundSpeed:
         self.elapsed_s = 0.0
         self.votes = integers(BINS)
         self.count = 0
-        self.below = self.sum = self.measured = self.elapsed = 0.0
+        self.below = self.rows = self.squares = self.sum = self.measured = self.elapsed = 0.0
 
 
 def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> float:
@@ -93,17 +95,20 @@ def measure(
         return
     middle = math.log(SLOWEST_MPS) + (best + 0.5) * BIN_RATIO
     n = 0
-    ground.below = ground.sum = ground.measured = ground.elapsed = 0.0
+    ground.below = ground.rows = ground.squares = ground.sum = ground.measured = ground.elapsed = 0.0
     for j in range(verdicts.count):
         says = says_mps(verdicts, j, edges, baselines, around)
         if says > SLOWEST_MPS and math.fabs(math.log(says) - middle) < SPREAD:
             slot = verdicts.slot[j]
             n += 1
             ground.sum += math.log(says)
-            ground.below += edges.y[verdicts.row[j]] - around.horizon_y
+            below = edges.y[verdicts.row[j]] - around.horizon_y
+            ground.below += below
+            ground.rows += math.log(below)
+            ground.squares += math.log(below) * math.log(below)
             ground.measured += baselines.depth_m[slot] / baselines.elapsed_s[slot]
             ground.elapsed += baselines.elapsed_s[slot]
-    if n < MIN_EDGES:
+    if n < MIN_EDGES or ground.squares / n - (ground.rows / n) * (ground.rows / n) < MIN_ROWS * MIN_ROWS:
         return
     ground.speed_mps = math.exp(ground.sum / n)
     tilt = SLOPE_SIGMA_RAD * around.pinhole.focal / (ground.below / n)

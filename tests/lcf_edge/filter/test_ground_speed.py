@@ -47,6 +47,14 @@ def test_where_no_ground_is_seen_nothing_is_reported(drive: Drive, clutter: Land
     assert math.isnan(ground_speed(replace(drive(above), frames=16), 2.0).speed_mps)
 
 
+@pytest.mark.parametrize("away_m", [4.0, 6.0])
+def test_a_wall_ahead_is_no_ground(drive: Drive, away_m: float) -> None:
+    """Some of its rows agree on a speed, by which the ground would be as near there."""
+    random = np.random.default_rng(5)
+    wall = np.stack([*random.uniform(-2, 2, (2, 600)), np.full(600, away_m)], axis=1)
+    assert math.isnan(ground_speed(replace(drive(wall), frames=16), math.nan).speed_mps)
+
+
 def test_without_a_height_of_the_camera_nothing_is_reported(drive: Drive) -> None:
     config = Config(camera=Camera(height_m=0))
     assert math.isnan(ground_speed(replace(drive(ground()), frames=16), 2.0, config).speed_mps)
