@@ -66,7 +66,8 @@ def exact(stage: Stage, view: View, motion: Motion, footprints: Floats, velociti
     drive = stage.drive
     corners = (footprints[numbers] - motion.position) @ motion.axes.T
     moving = velocities[numbers] @ motion.axes.T
-    ways = passages_of(corners, moving, motion.speed_mps, motion.yaw_rate_radps, drive.half_width_m, drive.horizon_s)
+    size = drive.half_width_m, drive.camera_ahead_m
+    ways = passages_of(corners, moving, motion.speed_mps, motion.yaw_rate_radps, *size, drive.horizon_s)
     found = []
     shares = visible_shares(view, stage.optics)
     for row, (placed, way, (visible, box)) in enumerate(zip(view.placed, ways, shares, strict=True)):

@@ -88,8 +88,8 @@ class Camera(Table, frozen=True):
     height_m: Annotated[float, msgspec.Meta(ge=0, le=10_000)] = 0.3  # above the ground; 0: unknown, no ground test
     pitch_rad: Tilt = 0.0  # positive: looks up
     yaw_rad: Tilt = 0.0  # positive: looks to the right of the direction of travel
-    ahead_m: Offset = 0.0  # of the vehicle's base frame; for publish.transform alone
-    left_m: Offset = 0.0
+    ahead_m: Offset = 0.0  # of the vehicle's base frame, at the axle that does not steer; in turns it is learnt
+    left_m: Offset = 0.0  # of the base frame; for publish.transform alone
     mask: list[
         list[list[Annotated[float, msgspec.Meta(ge=-20_000, le=40_000)]]]
     ] = []  # own parts in view: polygons of x, y in px of an image of width x height

@@ -7,8 +7,8 @@ from lcf_edge.doctor.finding import Context, Finding, edit, ok, warn
 
 _MOUNTING = ("camera.height_m", "camera.pitch_rad")
 _MOUNTED = "camera_{}"  # values of the diagnostics
-_MOUNTING_SIGMAS = 3.0  # and
-_MOUNTING_RAD = math.radians(1)  # by which the mounting may differ from what is configured
+_MOUNTING_SIGMAS = 3.0  # of what is learnt, and
+_MAY_DIFFER = {"pitch_rad": math.radians(1), "yaw_rad": math.radians(1), "ahead_m": 0.2}  # from what is configured
 
 
 def check(context: Context) -> Iterator[Finding]:
@@ -62,19 +62,19 @@ def _mounting(context: Context) -> Iterator[Finding]:
 def _learnt_mounting(context: Context) -> Iterator[Finding]:
     """Compare the configured mounting with what a running daemon has learnt while driving."""
     status = context.daemon.statuses.get("pipeline") if context.daemon else None
-    for key in ("pitch_rad", "yaw_rad"):
-        angle, sigma = _MOUNTED.format(key), _MOUNTED.format(key.replace("_rad", "_sigma_rad"))
-        if status is None or angle not in status.values or sigma not in status.values:
+    for key, may_differ in _MAY_DIFFER.items():
+        what, unit = key.split("_")
+        learnt, with_sigma = _MOUNTED.format(key), _MOUNTED.format(f"{what}_sigma_{unit}")
+        if status is None or learnt not in status.values or with_sigma not in status.values:
             continue
         try:
-            estimated_rad, sigma_rad = float(status.values[angle]), float(status.values[sigma])
+            estimated, sigma = float(status.values[learnt]), float(status.values[with_sigma])
         except ValueError:
             continue  # a daemon of another version
-        configured_rad: float = getattr(context.config.camera, key)
-        off_rad = abs(estimated_rad - configured_rad)
-        text = f"camera.{key} is {configured_rad:g}, driving shows {estimated_rad:.3f} ± {sigma_rad:.3f}"
-        if off_rad > max(_MOUNTING_SIGMAS * sigma_rad, _MOUNTING_RAD):
-            yield warn("calibration", text, edit(context.path, f"[camera] {key} = {estimated_rad:.3f}"))
+        configured: float = getattr(context.config.camera, key)
+        text = f"camera.{key} is {configured:g}, driving shows {estimated:.3f} ± {sigma:.3f}"
+        if abs(estimated - configured) > max(_MOUNTING_SIGMAS * sigma, may_differ):
+            yield warn("calibration", text, edit(context.path, f"[camera] {key} = {estimated:.3f}"))
         else:
             yield ok("calibration", text)
 

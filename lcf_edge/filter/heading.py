@@ -1,4 +1,8 @@
-"""Where the vehicle heads in the camera's axes: how the camera is mounted, and how it shakes."""
+"""Where the camera goes in its own axes: how it is mounted, how it shakes, and what turns add.
+
+A camera that sits L before the axle that does not steer goes sideways by ω·L in a turn, so that O lies L·ω/V beside
+the heading. L, the lever arm, is learnt together with the yaw of the mounting.
+"""
 
 import math
 
@@ -14,22 +18,31 @@ SHAKE_SIGMA_RAD = 0.004  # and by which the heading differs from it from frame t
 MOUNTING_DRIFT_RAD = 0.0005  # in a second
 FIT_WINDOW_S = 0.7  # fits nearer to each other in time tell the same
 MAX_MOUNTING_SIGMAS = 3.0  # that one fit may ask for
-LEVER_WIDTHS = 2.0  # half widths of the vehicle by which the camera may sit before the axle
+LEVER_WIDTHS = 1.0  # half widths of the vehicle by which the camera may sit before the axle, 1 sigma
+LEVER_DRIFT = 0.1  # half widths by which that may be more in a second of turning, as wheels slip
 MIN_SPEED_MPS = 0.1
+MAX_CURVATURE = 2.0  # 1/m; a path with more is a turn on the spot, where O is of no use
 MIN_VARIANCE = 1e-12
+STRAIGHT_RADPS = 0.03  # a slower turn is as good as none, whatever the speed
+INFINITY = float("inf")
 
 
 class Heading:
-    """The direction of travel in the camera's axes: the mounting, and on top of it how the camera shakes.
+    """The direction in which the camera goes, in its axes: the mounting, how it shakes, and what turns add.
 
-    ``ray_x``, ``ray_y``: x/z and y/z of it, now; ``mounted_x``, ``mounted_y``: at rest, with 1 sigma of that,
-    ``sigma_x``, ``sigma_y``, rad.
+    ``ray_x``, ``ray_y``: x/z and y/z of the vehicle's heading, now; ``aside_x``: what a turn adds to ``ray_x``;
+    ``mounted_x``, ``mounted_y``: the heading at rest, with 1 sigma of that, ``sigma_x``, ``sigma_y``, rad; ``lever_m``:
+    how far the camera sits before the axle, with ``lever_sigma_m``; ``shared``: covariance of both with each other,
+    rad m. ``curvature``: ω/V of a turn that shows, 1/m.
     """
 
-    def __init__(self, camera: Camera) -> None:
+    def __init__(self, camera: Camera, half_width_m: float) -> None:
         self.mounted_x = self.ray_x = -math.tan(camera.yaw_rad)
         self.mounted_y = self.ray_y = math.tan(camera.pitch_rad)
         self.sigma_x = self.sigma_y = MOUNTING_SIGMA_RAD
+        self.lever_m, self.shared, self.curvature, self.aside_x = camera.ahead_m, 0.0, 0.0, 0.0
+        self.half_width_m = half_width_m
+        self.lever_sigma_m = LEVER_WIDTHS * half_width_m
 
 
 def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_s: float) -> None:
@@ -43,31 +56,68 @@ def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_
     heading.ray_y = heading.mounted_y + math.exp(-dt_s / PITCH_MEMORY_S) * (shaken_y - heading.mounted_y)
 
 
+def turn_aside(heading: Heading, speed_mps: float, yaw_rate_radps: float) -> None:
+    """O lies L·ω/V beside the heading, to the left in a left turn; not in one on the spot, or at an unknown speed."""
+    heading.curvature = 0.0
+    if math.fabs(speed_mps) > MIN_SPEED_MPS:
+        curvature = min(max(yaw_rate_radps / speed_mps, -MAX_CURVATURE), MAX_CURVATURE)
+        least = SHAKE_SIGMA_RAD / heading.half_width_m
+        heading.curvature = curvature - min(max(curvature, -least), least)
+    heading.aside_x = -heading.lever_m * heading.curvature
+
+
 def focus_sigma_rad(mounting_sigma_rad: float) -> float:
     """1 sigma of O before the flow tells, rad: of the mounting, and of how the heading shakes."""
     return math.sqrt(mounting_sigma_rad * mounting_sigma_rad + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD)
 
 
-def learn_mounting(heading: Heading, around: Situation, fit: FlowFit) -> None:
-    """Kalman filter over the mounting: what a frame's fit tells of O, slowly.
+def sideways_sigma_rad(heading: Heading) -> float:
+    """1 sigma of the way O lies to the side, rad: of the mounting's yaw and of the lever arm in this turn."""
+    lever_rad = heading.lever_sigma_m * heading.curvature
+    variance = heading.sigma_x * heading.sigma_x + lever_rad * lever_rad - 2 * heading.curvature * heading.shared
+    return math.sqrt(max(variance, MIN_VARIANCE))
 
-    In a turn O lies ω·L/V beside the heading, the camera sitting L before the axle, which nobody has measured.
-    """
-    turning = math.fabs(around.yaw_rate_radps) / max(math.fabs(around.speed_mps), MIN_SPEED_MPS)
-    if not math.isfinite(turning):
-        turning = math.fabs(around.yaw_rate_radps)
-    aside = LEVER_WIDTHS * around.half_width_m * turning
+
+def learn_mounting(heading: Heading, around: Situation, fit: FlowFit) -> None:
+    """Kalman filter over mounting and lever arm: what a frame's fit tells of O, slowly."""
     fx, fy, dt_s = around.pinhole.fx, around.pinhole.fy, around.dt_s
-    gain = mounting_gain(heading.sigma_x, fit.prior_x / fx, fit.focus_sigma_x / fx, aside, dt_s)
-    step = gain * unpulled(fit.focus_x / fx, fit.prior_x / fx, fit.focus_sigma_x / fx)
-    heading.mounted_x += step
-    heading.ray_x += step
-    heading.sigma_x = drifted(heading.sigma_x, gain, dt_s)
-    gain = mounting_gain(heading.sigma_y, fit.prior_y / fy, fit.focus_sigma_y / fy, 0.0, dt_s)
+    shift_rad = unpulled(fit.focus_x / fx, fit.prior_x / fx, fit.focus_sigma_x / fx)
+    noise = fit_noise(fit.prior_x / fx, fit.focus_sigma_x / fx, dt_s)
+    learn_sideways(heading, shift_rad, noise if knows_curvature(around) else INFINITY, dt_s)
+    gain = mounting_gain(heading.sigma_y, fit_noise(fit.prior_y / fy, fit.focus_sigma_y / fy, dt_s))
     step = gain * unpulled(fit.focus_y / fy, fit.prior_y / fy, fit.focus_sigma_y / fy)
     heading.mounted_y += step
     heading.ray_y += step
     heading.sigma_y = drifted(heading.sigma_y, gain, dt_s)
+
+
+def knows_curvature(around: Situation) -> bool:
+    """Whether ω/V is what ``turn_aside`` takes it for; not at an unknown speed, but straight ahead."""
+    turning = math.fabs(around.yaw_rate_radps)
+    if math.fabs(around.speed_mps) > MIN_SPEED_MPS:
+        return turning <= MAX_CURVATURE * math.fabs(around.speed_mps)
+    return turning <= STRAIGHT_RADPS
+
+
+def learn_sideways(heading: Heading, shift_rad: float, noise: float, dt_s: float) -> None:
+    """One step for the mounting's yaw x and the lever arm L, of O beside where it was taken to be: Δx - ΔL·ω/V.
+
+    ``noise``: variance of that shift, rad².
+    """
+    lever_variance = heading.lever_sigma_m * heading.lever_sigma_m
+    of_x = heading.sigma_x * heading.sigma_x - heading.curvature * heading.shared
+    of_lever = heading.shared - heading.curvature * lever_variance
+    total = of_x - heading.curvature * of_lever + noise
+    gain_x, gain_lever = of_x / total, of_lever / total
+    heading.mounted_x += gain_x * shift_rad
+    heading.ray_x += gain_x * shift_rad
+    heading.lever_m += gain_lever * shift_rad
+    variance = heading.sigma_x * heading.sigma_x - gain_x * of_x + MOUNTING_DRIFT_RAD * MOUNTING_DRIFT_RAD * dt_s
+    heading.sigma_x = math.sqrt(max(variance, MIN_VARIANCE))
+    drift_m = LEVER_DRIFT * heading.half_width_m if heading.curvature != 0 else 0.0
+    lever_variance += drift_m * drift_m * dt_s - gain_lever * of_lever
+    heading.lever_sigma_m = math.sqrt(max(lever_variance, MIN_VARIANCE))
+    heading.shared -= gain_x * of_lever
 
 
 def unpulled(shift_rad: float, prior_rad: float, sigma_rad: float) -> float:
@@ -77,13 +127,19 @@ def unpulled(shift_rad: float, prior_rad: float, sigma_rad: float) -> float:
     return min(max(alone, -most), most)
 
 
-def mounting_gain(mounting_rad: float, prior_rad: float, sigma_rad: float, aside_rad: float, dt_s: float) -> float:
-    """Kalman gain of one fit. All 1 sigma: of the mounting, of O before and after the fit, of O aside in a turn."""
+def fit_noise(prior_rad: float, sigma_rad: float, dt_s: float) -> float:
+    """Variance of what one fit tells of the mounting, rad²; infinite: nothing. 1 sigma of O before and after the fit.
+
+    The heading shakes besides, and fits close in time tell the same.
+    """
     information = 1 / max(sigma_rad * sigma_rad, MIN_VARIANCE) - 1 / (prior_rad * prior_rad)  # by the flow alone
     if information <= 0:
-        return 0.0
-    noise = 1 / information + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD + aside_rad * aside_rad
-    noise *= max(1.0, FIT_WINDOW_S / dt_s)
+        return INFINITY
+    return (1 / information + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD) * max(1.0, FIT_WINDOW_S / dt_s)
+
+
+def mounting_gain(mounting_rad: float, noise: float) -> float:
+    """Kalman gain of one fit for a mounting with this sigma; ``noise``: ``fit_noise``."""
     return mounting_rad * mounting_rad / (mounting_rad * mounting_rad + noise)
 
 

@@ -87,13 +87,15 @@ class Residual:
 class Mounting:
     """How the camera is mounted, as the flow tells it while the vehicle drives; signs as in ``camera.*_rad``.
 
-    ``pitch_sigma_rad``, ``yaw_sigma_rad``: 1 sigma.
+    ``ahead_m``: of the axle that does not steer. ``pitch_sigma_rad``, ``yaw_sigma_rad``, ``ahead_sigma_m``: 1 sigma.
     """
 
     pitch_rad: float
     yaw_rad: float
+    ahead_m: float
     pitch_sigma_rad: float
     yaw_sigma_rad: float
+    ahead_sigma_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -129,7 +131,7 @@ class LineCircleFilter:
         self._settings = Settings(config.filter, self._pinhole)
         self._plane = ImagePlane(lens)
         self._index = CornerIndex(lens.width, lens.height, memory.corners)
-        self._heading = Heading(config.camera)
+        self._heading = Heading(config.camera, config.vehicle.half_width_m)
         self._around = Situation(config, self._pinhole)
         follow(self._around, self._heading.ray_x, self._heading.ray_y, math.nan, 0.0, 1.0)
         self._keys = KeyFrames()
@@ -183,7 +185,14 @@ class LineCircleFilter:
     def mounting(self) -> Mounting:
         """How the camera is mounted, as far as it is learnt."""
         heading = self._heading
-        return Mounting(math.atan(heading.mounted_y), -math.atan(heading.mounted_x), heading.sigma_y, heading.sigma_x)
+        return Mounting(
+            math.atan(heading.mounted_y),
+            -math.atan(heading.mounted_x),
+            heading.lever_m,
+            heading.sigma_y,
+            heading.sigma_x,
+            heading.lever_sigma_m,
+        )
 
     @property
     def stands(self) -> bool:
@@ -247,7 +256,9 @@ class LineCircleFilter:
         """Step 0, and the predictions of circles and ψ."""
         rotation = _memory(motion.rotation)
         headings.turn_heading(self._heading, rotation, motion.path_yaw_rate_radps, motion.dt_s)
-        ray_x, ray_y = self._heading.ray_x, self._heading.ray_y
+        headings.turn_aside(self._heading, motion.speed_mps, motion.path_yaw_rate_radps)
+        ray_x, ray_y = self._heading.ray_x + self._heading.aside_x, self._heading.ray_y
+        self._around.lever_m = self._heading.lever_m
         follow(self._around, ray_x, ray_y, motion.speed_mps, motion.path_yaw_rate_radps, motion.dt_s)
         self._advance_keys(rotation, motion)
         self._warp(rotation)
@@ -270,7 +281,7 @@ class LineCircleFilter:
         elif math.fabs(before) > SLOWEST_MPS and not math.isfinite(motion.speed_mps):
             key_frames.scale(self._keys, 1 / before)
         speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0
-        x, y = self._heading.ray_x, self._heading.ray_y
+        x, y = self._heading.ray_x + self._heading.aside_x, self._heading.ray_y
         scale = 1 / math.sqrt(x * x + y * y + 1)
         key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, speed * motion.dt_s, motion.dt_s)
 
@@ -400,7 +411,7 @@ class LineCircleFilter:
     def _fit_flow(self) -> None:
         """What the whole picture tells of rotation, O and noise; the mounting learns from it; whether it stands."""
         fit, around, heading, pinhole = self._fit, self._around, self._heading, self._pinhole
-        fit.prior_x = headings.focus_sigma_rad(heading.sigma_x) * pinhole.fx
+        fit.prior_x = headings.focus_sigma_rad(headings.sideways_sigma_rad(heading)) * pinhole.fx
         fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy
         edges, settings = self.edges.columns, self._settings
         flow_fit.measure(fit, edges, self._keys, self._baselines, pinhole, around.dt_s, settings)

@@ -1,4 +1,7 @@
-"""The vehicle's path over the ground: an arc by speed and yaw rate, or a straight line."""
+"""The vehicle's path over the ground: an arc by speed and yaw rate, or a straight line.
+
+Points are given as the camera sees them, right and ahead of it; the arc is that of the axle behind it.
+"""
 
 import math
 
@@ -24,7 +27,8 @@ def miss(right_m: float, ahead_m: float, around: Situation) -> float:
     radius = arc_radius_m(around)
     if not math.isfinite(radius):
         return right_m
-    distance = math.sqrt((right_m + radius) * (right_m + radius) + ahead_m * ahead_m) - math.fabs(radius)
+    before_axle_m = ahead_m + around.lever_m
+    distance = math.sqrt((right_m + radius) * (right_m + radius) + before_axle_m * before_axle_m) - math.fabs(radius)
     return -distance if radius < 0 else (distance if radius > 0 else 0.0)
 
 
@@ -47,4 +51,5 @@ def way_to(right_m: float, ahead_m: float, around: Situation) -> float:
     if not math.isfinite(radius):
         return ahead_m
     outside = right_m + radius if radius > 0 else (-right_m - radius if radius < 0 else 0.0)
-    return math.fabs(radius) * math.atan2(ahead_m, outside)
+    to_axle, already = math.atan2(ahead_m + around.lever_m, outside), math.atan2(around.lever_m, math.fabs(radius))
+    return math.fabs(radius) * (to_axle - already)

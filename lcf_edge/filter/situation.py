@@ -17,8 +17,8 @@ class Situation:
     length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``:
     t_f. ``noise_px``: 1 sigma of an edge's place. ``delta_px``: δ over a chain of key frames. Both as configured, or
     as the picture shows it (``flow_fit``). ``turn_share``: 1 sigma of where a turn moves an edge, as a share of that
-    way. ``ground_is_still``: though by V_ν it must flow (``rest``). ``flow_is_seen``: enough of what stands is in
-    sight to tell its flow.
+    way. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
+    (``rest``). ``flow_is_seen``: enough of what stands is in sight to tell its flow.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -32,7 +32,7 @@ class Situation:
         self.ground_is_still = False
         self.flow_is_seen = True
         self.ground_mps = NAN
-        self.turn_share = 0.0
+        self.turn_share = self.lever_m = 0.0
         self.least_noise_px = self.noise_px = config.filter.edge_noise_px
         self.least_delta_px = self.delta_px = config.filter.delta_rebel_px
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY

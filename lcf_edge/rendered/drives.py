@@ -198,6 +198,7 @@ class Drive:
     shadows: tuple[Shadow, ...] = ()
     sharpening: float = 0.0  # by the camera: this times what a smoother image lacks is added
     camera_height_m: float = 0.5
+    camera_ahead_m: float = 0.0  # of the axle, which moves along the heading
     camera_pitch_rad: float = 0.0  # positive: looks up
     ground: Paint = Paint(0)
     sky: Paint = Paint(1)

@@ -70,6 +70,11 @@ def _turn(plan: Plan) -> None:
     obstacle_ahead(plan)
 
 
+def _turn_ahead_of_axle(plan: Plan) -> None:
+    plan.change(camera_ahead_m=plan.between(0.2, 0.6))
+    _turn(plan)
+
+
 def _crowd(plan: Plan) -> None:
     plan.cruise(1.0, 2.0)
     crossing_walker(plan, "walker_0", pass_s=plan.end_s * 0.75)
@@ -167,6 +172,7 @@ _KINDS: dict[str, Callable[[Plan], None]] = {
     "leader": _leader,
     "vibration": _vibration,
     "turn": _turn,
+    "turn_ahead_of_axle": _turn_ahead_of_axle,
     "crowd": _crowd,
     "slow_rover": _slow_rover,
     "dusk": _dusk,

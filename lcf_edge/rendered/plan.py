@@ -127,7 +127,7 @@ def _gap(box: Box, time_s: float, points: Floats) -> float:
 
 def _clear_of_camera(drive: Drive, box: Box) -> bool:
     time = np.arange(0.0, drive.seconds + 0.1, 0.1)
-    camera = Trajectory(drive).ground_position(time)
+    camera = Trajectory(drive).position(time)[:, [0, 2]]
     clear = min(_CAMERA_CLEAR_M, drive.half_width_m / 2)
     if len(box.path) == 1:
         return _gap(box, 0.0, camera) > clear

@@ -58,12 +58,12 @@ class Trajectory:
         return np.stack([-np.sin(heading), np.cos(heading)], axis=1)
 
     def ground_position(self, time_s: Floats) -> Floats:
-        """(n, 2) x, z in m."""
+        """(n, 2) x, z in m, of the axle."""
         return np.stack([np.interp(time_s, self._grid, column) for column in self._path.T], axis=1)
 
     def position(self, time_s: Floats) -> Floats:
         """(n, 3) of the camera in m."""
-        x, z = self.ground_position(time_s).T
+        x, z = (self.ground_position(time_s) + self._drive.camera_ahead_m * self.forward(time_s)).T
         return np.stack([x, -self._drive.camera_height_m - self._shake("heave", time_s, 0), z], axis=1)
 
     def attitude(self, time_s: Floats) -> Floats:

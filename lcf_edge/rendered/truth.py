@@ -107,13 +107,20 @@ def passages(stage: Stage, time_s: float, numbers: Sequence[int]) -> list[Passag
     corners = stage.footprints(time_s)[list(numbers)] - stage.trajectory.ground_position(now)[0]
     corners = corners @ to_vehicle  # (n, 4, 2)
     velocity = np.array([drive.boxes[number].velocity(time_s) for number in numbers]) @ to_vehicle
-    return passages_of(corners, velocity, speed, yaw_rate, drive.half_width_m, drive.horizon_s)
+    size = drive.half_width_m, drive.camera_ahead_m
+    return passages_of(corners, velocity, speed, yaw_rate, *size, drive.horizon_s)
 
 
 def passages_of(
-    corners: Floats, velocity: Floats, speed: float, yaw_rate: float, half_width_m: float, horizon_s: float
+    corners: Floats,
+    velocity: Floats,
+    speed: float,
+    yaw_rate: float,
+    half_width_m: float,
+    camera_ahead_m: float,
+    horizon_s: float,
 ) -> list[Passage]:
-    """How footprints `corners` (n, 4, 2) with `velocity` (n, 2) over ground, (right, ahead) of the camera, are passed.
+    """How footprints `corners` (n, 4, 2) with `velocity` (n, 2) over ground, (right, ahead) of the axle, are passed.
 
     The corners move on straight lines, the vehicle on its arc; the passing is the moment when the box's
     foremost corner reaches the camera plane. What has reached it already is no threat.
@@ -126,7 +133,7 @@ def passages_of(
     relative = corners[:, None] + moved[:, :, None]  # (n, time, 4, 2)
     sine, cosine = np.sin(turned)[:, None], np.cos(turned)[:, None]
     beside = relative[..., 0] * cosine + relative[..., 1] * sine
-    before = (relative[..., 1] * cosine - relative[..., 0] * sine).min(axis=2)
+    before = (relative[..., 1] * cosine - relative[..., 0] * sine).min(axis=2) - camera_ahead_m
 
     found = []
     for row, (depth, closing) in enumerate(zip(before[:, 0], speed - velocity[:, 1], strict=True)):

@@ -73,6 +73,18 @@ def test_a_mounting_that_may_be_right_is_good(
     assert found.level is Severity.OK
 
 
+def test_a_camera_that_turns_show_elsewhere_than_configured_is_warned_of(machine: Machine) -> None:
+    """In metres before the axle; 0.2 m more or less are good."""
+    for ahead_m, sigma_m, level in (("0.45", "0.05", Severity.WARN), ("0.15", "0.01", Severity.OK)):
+        context = machine(path=Path("/etc/lcf-edge/config.toml"))
+        values = {"camera_ahead_m": ahead_m, "camera_ahead_sigma_m": sigma_m}
+        status = DeviceStatus("pipeline", Level.OK, "runs", values)
+        context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"pipeline": status}, "")
+        (found,) = [finding for finding in calibration.check(context) if "driving shows" in finding.text]
+        assert found.level is level
+        assert found.text == f"camera.ahead_m is 0, driving shows {float(ahead_m):.3f} ± {float(sigma_m):.3f}"
+
+
 def test_what_a_daemon_of_another_version_tells_is_left_alone(machine: Machine) -> None:
     assert learnt(machine, "unknown", "0.0030") == []
 

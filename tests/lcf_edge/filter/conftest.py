@@ -29,7 +29,8 @@ class Drive:
     """A vehicle at constant speed and yaw rate among landmarks; iterating gives what each step takes.
 
     ``points_m``: (n, 3), where the landmarks are at the start, camera axes. ``velocity_mps``: (n, 3) or (3,), of each
-    over ground. ``from_s``, ``until_s``: the landmarks move only between these times.
+    over ground. ``camera_ahead_m``: of the axle, which moves along the heading. ``from_s``, ``until_s``: the landmarks
+    move only between these times.
     """
 
     points_m: Metres
@@ -39,6 +40,7 @@ class Drive:
     speed_mps: float = 2.0
     yaw_rate_radps: float = 0.0
     sigma_rad: float = 0.0
+    camera_ahead_m: float = 0.0
     lens: Lens = LENS
     from_s: float = 0.0
     until_s: float = np.inf
@@ -78,7 +80,8 @@ class Drive:
         rotation = np.array([[np.cos(turn), 0, np.sin(turn)], [0, 1, 0], [-np.sin(turn), 0, np.cos(turn)]])
         reach = self.speed_mps * time_s
         along, aside = (np.sin(turn) / turn, (1 - np.cos(turn)) / turn) if turn else (1.0, 0.0)
-        return rotation, np.array([-reach * aside, 0, reach * along])
+        swing = self.camera_ahead_m * np.array([-np.sin(turn), 0, np.cos(turn) - 1])
+        return rotation, np.array([-reach * aside, 0, reach * along]) + swing
 
     def in_camera(self, seq: int) -> Metres:
         """(n, 3) landmarks in the camera's axes."""
@@ -135,7 +138,7 @@ def _situation(*, speed_mps: float = 2.0, yaw_rate_radps: float = 0.0, **changes
     """A rover on its way that looks straight ahead; ``changes``: fields of ``Situation``."""
     config = Config()
     around = Situation(config, Pinhole(LENS.fx, LENS.fy, LENS.cx, LENS.cy))
-    heading = Heading(config.camera)
+    heading = Heading(config.camera, config.vehicle.half_width_m)
     follow(around, heading.ray_x, heading.ray_y, speed_mps, yaw_rate_radps, 0.05)
     for name, value in changes.items():
         setattr(around, name, value)

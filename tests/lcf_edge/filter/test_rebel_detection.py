@@ -231,6 +231,18 @@ def test_the_miss_of_a_straight_drive_is_the_offset(situation: Around) -> None:
         assert (miss(-2.0, 3.0, around), miss(0.5, 9.0, around)) == (-2.0, 0.5)
 
 
+@pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5])
+def test_a_camera_before_the_axle_sees_the_arc_of_the_axle(situation: Around, yaw_rate_radps: float) -> None:
+    """The camera itself is swung out of the arc, by what its distance from the centre is more."""
+    around = situation(speed_mps=1.0, yaw_rate_radps=yaw_rate_radps, lever_m=0.5)
+    out_m = math.hypot(2.0, 0.5) - 2.0
+    assert miss(0.0, 0.0, around) == pytest.approx(math.copysign(out_m, yaw_rate_radps))
+    assert way_to(0.0, 0.0, around) == pytest.approx(0.0)
+    arc_m, turn = 1.0 / yaw_rate_radps, 0.7
+    right, ahead = arc_m * math.cos(turn) - arc_m, abs(arc_m) * math.sin(turn) - 0.5
+    assert miss(right, ahead, around) == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5, 0.0])
 def test_the_way_to_a_point_is_as_long_as_the_arc_that_ends_beside_it(situation: Around, yaw_rate_radps: float) -> None:
     around = situation(speed_mps=2.0, yaw_rate_radps=yaw_rate_radps)

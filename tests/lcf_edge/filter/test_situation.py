@@ -21,7 +21,7 @@ class Ahead:
     """A heading, and the focus that it implies."""
 
     def __init__(self, **camera: float) -> None:
-        self.heading = Heading(Camera(**camera))  # type: ignore[arg-type]
+        self.heading = Heading(Camera(**camera), 0.3)  # type: ignore[arg-type]
         self._around = Situation(Config(), PINHOLE)
 
     def turn(self, moved: Motion) -> None:

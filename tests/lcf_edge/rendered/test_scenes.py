@@ -16,6 +16,7 @@ from lcf_edge.rendered.drives import START_NS, Shadow
 from lcf_edge.rendered.projection import Stage
 from lcf_edge.rendered.rendering import Renderer
 from lcf_edge.rendered.scenes import Box, Drive, Lamp, Lens, Paint, Profile, SensorNoise, Shake
+from lcf_edge.rendered.trajectory import Trajectory
 from lcf_edge.rendered.truth import passages, truth
 
 SILENT = SensorNoise(gyro_radps=0, accel_mps2=0, speed_mps=0, yaw_rate_radps=0, image=0)
@@ -152,6 +153,16 @@ def test_straight_drive_past_a_standing_box(x, z, speed):
         assert way.lateral_m == pytest.approx(x, abs=1e-6)
     close = abs(abs(x) - 0.85) < 1e-6 or abs(way.ttc_s - 4.0) < 1e-6
     assert close or way.threat == (abs(x) < 0.85 and way.ttc_s < 4.0)
+
+
+def test_a_camera_before_the_axle_is_nearer_to_what_lies_ahead_and_swings_out_in_a_turn():
+    spec = drive(standing(0.0, 5.0))
+    before = replace(spec, camera_ahead_m=0.5)
+    assert passages(Stage(before), 0.0, [0])[0].depth_m == passages(Stage(spec), 0.0, [0])[0].depth_m - 0.5
+    turning = replace(before, yaw_rate=Profile(((0.0, 0.4),)))
+    quarter_s = np.array([math.pi / 2 / 0.4])
+    camera, axle = Trajectory(turning).position(quarter_s)[0], Trajectory(turning).ground_position(quarter_s)[0]
+    assert camera[[0, 2]] == pytest.approx(axle - np.array([0.5, 0.0]), abs=1e-6)  # it heads to the left by then
 
 
 def test_arc_leads_to_what_lies_on_it_and_past_what_lies_ahead():
