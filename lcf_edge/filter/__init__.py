@@ -38,6 +38,7 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``turmoil``          C_r where corners come and go and none can be followed
 ``range_belief``     what an object's motion says about its range and its motion over ground
 ``square_expert``    S: circles that belong to one thing are an object
+``object_circles``   what S knows back to C_r
 ``feedback``         trusted normal circles become ψ, and ψ gives way
 """
 

@@ -26,6 +26,7 @@ cdef double radius_of(Members members, Py_ssize_t g, double most_px) noexcept no
 cdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
 cdef void describe(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g) noexcept nogil
 cdef void give_birth(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings, Ids ids) noexcept nogil
+cdef void begin(CircleColumns circles, Py_ssize_t c, Ids ids) noexcept nogil
 @cython.locals(nearest=int, least=double, away=double)
 cdef int nearest_circle(Members members, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef int free_row(CircleColumns circles) noexcept nogil

@@ -72,11 +72,16 @@ def describe(circles: CircleColumns, c: int, members: Members, g: int) -> None:
 
 def give_birth(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings, ids: Ids) -> None:
     """A newborn circle from its members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
-    circles.active[c] = 1
+    begin(circles, c, ids)
     circles.x[c], circles.y[c] = members.x[g], members.y[g]
     circles.radius[c] = radius_of(members, g, settings.bs_px)
     describe(circles, c, members, g)
     circles.trust[c] = settings.tr_new
+
+
+def begin(circles: CircleColumns, c: int, ids: Ids) -> None:
+    """A new circle that nothing is known of yet."""
+    circles.active[c] = 1
     circles.id[c] = new_id(ids)
     circles.corr[c] = 1.0
     circles.cause[c] = 0

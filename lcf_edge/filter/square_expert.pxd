@@ -83,9 +83,6 @@ cdef int CROSSING
 cdef int ONCOMING
 cdef int LEADING
 cdef int CUTTING_IN
-cdef int CROSSES
-cdef int COMES
-cdef int LEADS
 cdef int SEEN
 cdef int HIDDEN
 cdef int COASTING
@@ -170,7 +167,4 @@ cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns ci
 cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
-cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-@cython.locals(o=Py_ssize_t)
-cdef void tell_circles(ObjectColumns objects, CircleColumns circles, Settings settings) noexcept nogil
 cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -22,7 +22,7 @@ from lcf_edge.filter.range_belief import Belief, Evidence
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.messages import Cause, ObjectClass, ObjectState
+from lcf_edge.messages import ObjectClass, ObjectState
 
 MIN_EDGES = 2  # whose motion a circle tells
 SIDE_GAP = 0.25  # of the larger extent, by which circles of one object may lie apart to the side,
@@ -88,7 +88,6 @@ MAX_RANGE_M = 1000.0  # farther off nothing is known
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
-CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -961,35 +960,6 @@ def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situat
     return 1.0 if wholes.count[o] >= SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
 
 
-# What it tells its circles
-
-
-def cause_of(objects: ObjectColumns, o: int) -> int:
-    """The cause of the circles of an object that moves."""
-    if objects.probability[o] > EVEN:
-        return COMES
-    return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
-
-
-def tell_circles(objects: ObjectColumns, circles: CircleColumns, settings: Settings) -> None:
-    """Circles of what moves take cause, range and miss from their object, which knows more than each of them.
-
-    The time to contact stays their own, for their prediction rests on it. What stands they measure better themselves;
-    one that takes itself for something to be met is contradicted only where the object goes to the side.
-    """
-    for c in range(circles.capacity):
-        o = circles.square[c]
-        if o < 0 or not circles.active[c] or turmoil.is_shown_by(circles, c):
-            continue
-        if objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
-            continue
-        if circles.cause[c] == COMES and objects.class_id[o] != CROSSING:
-            continue
-        if objects.trust[o] >= settings.tr_s and objects.unseen_s[o] == 0:
-            circles.cause[c] = cause_of(objects, o)
-            circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
-
-
 def update(
     squares: Squares,
     objects: ObjectColumns,
@@ -1005,7 +975,7 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """S from C_r, and what S knows back to them; return evictions."""
+    """S from C_r; return evictions."""
     for i in range(edges.count):
         if edges.square[i] >= 0 and not objects.active[edges.square[i]]:
             edges.square[i] = -1  # before its row is used again
@@ -1044,5 +1014,4 @@ def update(
             believe(objects, o, squares.belief, squares.evidence, around)
         else:
             believe_without_speed(objects, o, squares.evidence, around)
-    tell_circles(objects, circles, settings)
     return evicted

@@ -117,41 +117,36 @@ EDGE_COLUMNS = (
 )
 """E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
-CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "coarse_circles", "square_expert")
+CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "coarse_circles", "object_circles")
 PLACE_WRITERS = (*CONTACT_WRITERS, "turmoil")
+CENTRE_WRITERS = ("derotation", "circles", "normal_circles", "rebel_circles", "object_circles")
+SPEED_WRITERS = ("normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "object_circles", "turmoil")
 CIRCLE_COLUMNS = (
     Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles"), np.bool_),
     Column("id", "identity, never 0", "1", ("circles",), np.uint32),
-    Column("x", "centre, to the right", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
-    Column("y", "centre, down", "px", ("derotation", "circles", "normal_circles", "rebel_circles")),
-    Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles")),
+    Column("x", "centre, to the right", "px", CENTRE_WRITERS),
+    Column("y", "centre, down", "px", CENTRE_WRITERS),
+    Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles", "object_circles")),
     Column(
         "beta",
         "β of its motion in the picture",
         "rad",
-        ("derotation", "normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil"),
+        ("derotation", *SPEED_WRITERS),
     ),
-    Column(
-        "speed",
-        "V along β",
-        "px/s",
-        ("normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil"),
-    ),
+    Column("speed", "V along β", "px/s", SPEED_WRITERS),
     Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
     Column(
         "trust",
         "Tr",
         "1",
-        ("circles", "normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "turmoil", "feedback"),
+        ("circles", *SPEED_WRITERS, "feedback"),
     ),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
-    Column("support", "edges behind it", "1", ("circles",), np.int32),
-    Column("width", "extent of its edges", "px", ("circles", "rebel_circles")),
-    Column("height", "extent of its edges", "px", ("circles", "rebel_circles")),
+    Column("support", "edges behind it", "1", ("circles", "object_circles"), np.int32),
+    Column("width", "extent of its edges", "px", ("circles", "rebel_circles", "object_circles")),
+    Column("height", "extent of its edges", "px", ("circles", "rebel_circles", "object_circles")),
     Column("cause", "`messages.Cause` of C_r", "", PLACE_WRITERS, np.uint8),
-    Column(
-        "ttc", "time to contact of C_r, inf: none", "s", ("circles", "rebel_circles", "patch_circles", "coarse_circles")
-    ),
+    Column("ttc", "time to contact of C_r, inf: none", "s", CONTACT_WRITERS),
     Column("range", "of C_r, NaN: unknown", "m", PLACE_WRITERS),
     Column(
         "lateral",
@@ -164,7 +159,7 @@ CIRCLE_COLUMNS = (
         "square",
         "row of the object that a C_r belongs to, -1: none",
         "row",
-        ("circles", "square_expert"),
+        ("circles", "square_expert", "object_circles"),
         np.int32,
         empty=NO_OBJECT,
     ),

@@ -12,7 +12,7 @@ import pytest
 from lcf_edge.config import Config, Filter, Memory
 from lcf_edge.filter import Corners, LineCircleFilter, Motion
 from lcf_edge.filter.tables import ObjectTable
-from lcf_edge.messages import Cause, ObjectClass, ObjectState
+from lcf_edge.messages import ObjectClass, ObjectState
 
 TR_S = Config().filter.tr_s
 SPEED_MPS, FPS = 2.0, 20.0
@@ -191,25 +191,6 @@ def test_of_few_edges_it_is_reported_three_frames_later(drive: Drive, box: Landm
     for tables in steps(replace(drive(clutter(150)) + walker, frames=30), few):
         reported_after_s += tables.objects.age_s[published(tables.objects)].tolist()
     assert min(reported_after_s) == pytest.approx(5 / FPS)
-
-
-def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
-    drive: Drive, box: Landmarks, clutter: Landmarks
-) -> None:
-    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
-    circles_reported = 0
-    for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
-        objects, circles = tables.objects, tables.rebel
-        for o in published(objects):
-            if objects.class_id[o] != ObjectClass.CROSSING or objects.probability[o] > 0.5:
-                continue
-            for c in np.flatnonzero(circles.active & (circles.square == o)):
-                circles_reported += 1
-                assert circles.cause[c] == Cause.CROSSING
-                for number in ("range", "lateral"):
-                    of_both = getattr(circles, number)[c], getattr(objects, number)[o]
-                    assert of_both[0] == pytest.approx(of_both[1], nan_ok=True)
-    assert circles_reported > 5
 
 
 def test_where_nothing_breaks_the_flow_there_is_no_object(drive: Drive, clutter: Landmarks) -> None:

@@ -1,0 +1,35 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport circles as shared
+from lcf_edge.filter cimport lengths, square_expert, turmoil
+from lcf_edge.filter.circles cimport Ids
+from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef double EVEN
+cdef int UNKNOWN
+cdef int STANDING
+cdef int CROSSING
+cdef int LEADING
+cdef int CUTTING_IN
+cdef int CROSSES
+cdef int COMES
+cdef int LEADS
+cdef int SEEN
+cdef double INFINITY
+
+cdef bint is_sure(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(o=Py_ssize_t)
+cdef void correct(ObjectColumns objects, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint is_inside(CircleColumns circles, Py_ssize_t c, ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(is_trusted=bint)
+cdef bint is_shown(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Settings settings) noexcept nogil
+@cython.locals(c=int, own=int)
+cdef int own_circle(CircleColumns circles, Py_ssize_t o) noexcept nogil
+@cython.locals(x=double, y=double, looming=double, vx=double, vy=double, reach=double)
+cdef void show(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
+@cython.locals(evicted=int, o=Py_ssize_t, c=int)
+cdef int keep(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef int update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil

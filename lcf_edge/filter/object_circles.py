@@ -1,0 +1,130 @@
+"""What an object tells its circles, for it knows more than each of them, and that it keeps one."""
+
+import math
+
+from lcf_edge.filter import circles as shared
+from lcf_edge.filter import lengths, square_expert, turmoil
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause, ObjectClass, ObjectState
+
+EVEN = 0.5
+UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
+LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
+CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
+SEEN = int(ObjectState.SEEN)
+INFINITY = float("inf")
+
+
+def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+    """Whether an object is published, and seen in this frame."""
+    return objects.active[o] != 0 and objects.trust[o] >= settings.tr_s and objects.state[o] == SEEN
+
+
+def cause_of(objects: ObjectColumns, o: int) -> int:
+    """The cause of the circles of an object that moves."""
+    if objects.probability[o] > EVEN:
+        return COMES
+    return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
+
+
+def correct(objects: ObjectColumns, circles: CircleColumns, settings: Settings) -> None:
+    """Circles of what moves take cause, range and miss from their object.
+
+    The time to contact stays their own, for their prediction rests on it. What stands they measure better themselves;
+    one that takes itself for something to be met is contradicted only where the object goes to the side.
+    """
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if o < 0 or not circles.active[c] or turmoil.is_shown_by(circles, c) or not is_sure(objects, o, settings):
+            continue
+        if objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
+            continue
+        if circles.cause[c] != COMES or objects.class_id[o] == CROSSING:
+            circles.cause[c] = cause_of(objects, o)
+            circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
+
+
+def is_inside(circles: CircleColumns, c: int, objects: ObjectColumns, o: int) -> bool:
+    """Whether the middle of a circle is in the box of an object."""
+    if 2 * math.fabs(circles.x[c] - objects.x[o]) > objects.width[o]:
+        return False
+    return 2 * math.fabs(circles.y[c] - objects.y[o]) <= objects.height[o]
+
+
+def is_shown(objects: ObjectColumns, o: int, circles: CircleColumns, settings: Settings) -> bool:
+    """Whether a trusted circle shows an object."""
+    for c in range(circles.capacity):
+        is_trusted = circles.active[c] and circles.trust[c] >= settings.tr_s
+        if is_trusted and (circles.square[c] == o or is_inside(circles, c, objects, o)):
+            return True
+    return False
+
+
+def own_circle(circles: CircleColumns, o: int) -> int:
+    """The circle of an object that is trusted most, -1: it has none."""
+    own = -1
+    for c in range(circles.capacity):
+        if circles.active[c] and circles.square[c] == o and (own < 0 or circles.trust[c] > circles.trust[own]):
+            own = c
+    return own
+
+
+def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
+    """A circle is what its object is, just trusted."""
+    x, y = objects.x[o], objects.y[o]
+    looming = square_expert.looming_at(objects, o, around.speed_mps)
+    vx = square_expert.velocity_x(objects, o, x, looming, around)
+    vy = square_expert.velocity_y(y, looming, around)
+    circles.x[c], circles.y[c], circles.beta[c], circles.speed[c] = x, y, math.atan2(vy, vx), lengths.of(vx, vy)
+    circles.width[c], circles.height[c] = objects.width[o], objects.height[o]
+    reach = 0.5 * max(objects.width[o], objects.height[o])
+    circles.radius[c] = min(max(reach, shared.MIN_RADIUS_PX), settings.bs_px)
+    circles.trust[c], circles.support[c], circles.cause[c] = settings.tr_s, objects.support[o], COMES
+    circles.ttc[c] = objects.ttc[o] if objects.ttc[o] > 0 else INFINITY
+    circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
+
+
+def keep(
+    objects: ObjectColumns,
+    circles: CircleColumns,
+    edges: EdgeColumns,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """What is seen, and met sooner than not, keeps a circle, though its edges hardly break the flow.
+
+    Return evictions.
+    """
+    evicted = 0
+    for o in range(objects.capacity):
+        if not is_sure(objects, o, settings) or not objects.probability[o] > EVEN:
+            continue
+        if is_shown(objects, o, circles, settings):
+            continue
+        c = own_circle(circles, o)
+        if c < 0:
+            evicted += shared.free_row(circles) < 0
+            c = shared.row_for_newborn(edges, circles, True, settings)
+            if c < 0:
+                continue
+            shared.begin(circles, c, ids)
+            circles.square[c] = o
+        show(objects, o, circles, c, around, settings)
+    return evicted
+
+
+def update(
+    objects: ObjectColumns,
+    circles: CircleColumns,
+    edges: EdgeColumns,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> int:
+    """C_r from S; return evictions."""
+    correct(objects, circles, settings)
+    return keep(objects, circles, edges, around, settings, ids)

@@ -1,0 +1,182 @@
+"""C_r from S: what an object tells its circles, and that what will be met keeps one."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+
+from lcf_edge.config import Config, Filter
+from lcf_edge.filter import LineCircleFilter, object_circles
+from lcf_edge.filter.circles import Ids
+from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.tables import CircleTable, EdgeTable, ObjectTable
+from lcf_edge.messages import Cause, ObjectClass, ObjectState
+
+SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
+TR_S = Filter().tr_s
+
+Drive = Callable[..., Any]
+Landmarks = Callable[..., npt.NDArray[np.float64]]
+Situation = Callable[..., Any]
+
+
+def steps(way: Any) -> Iterator[LineCircleFilter]:
+    """The filter after each frame."""
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+        yield tables
+
+
+def published(objects: ObjectTable) -> list[int]:
+    """Rows of what is told."""
+    return np.flatnonzero(objects.active & (objects.trust >= TR_S)).tolist()
+
+
+class Known:
+    """One object 60 px wide and 80 px tall that stands ahead, trusted and seen, and two circles that are not in use."""
+
+    def __init__(self, around: Any, probability: float = 0.9, state: ObjectState = ObjectState.SEEN) -> None:
+        self.around, self.edges, self.ids = around, EdgeTable(10, 2, 2), Ids()
+        self.objects, self.circles = ObjectTable(1), CircleTable(2)
+        objects = self.objects
+        objects.active[0], objects.trust[0], objects.state[0], objects.support[0] = True, TR_S, state, 9
+        objects.x[0], objects.y[0], objects.width[0], objects.height[0] = 350.0, 260.0, 60.0, 80.0
+        objects.class_id[0], objects.probability[0] = ObjectClass.STANDING, probability
+        objects.ttc[0], objects.range[0], objects.lateral[0] = 2.0, 3.0, 0.1
+        objects.looming[0], objects.middle[0], objects.reference[0] = 0.5, 3.0, around.speed_mps
+
+    def add_circle(self, c: int, x: float, trust: float, square: int = -1) -> None:
+        circles = self.circles
+        circles.active[c], circles.trust[c], circles.square[c], circles.id[c] = True, trust, square, 70 + c
+        circles.x[c], circles.y[c] = x, 260.0
+
+    def update(self) -> int:
+        """Return evictions."""
+        rows = self.objects.columns, self.circles.columns, self.edges.columns
+        return int(object_circles.update(*rows, self.around, SETTINGS, self.ids))
+
+    def trusted(self) -> list[int]:
+        """Rows of circles that are published."""
+        return np.flatnonzero(self.circles.active & (self.circles.trust >= TR_S)).tolist()
+
+
+# What will be met keeps a circle
+
+
+def test_what_will_be_met_has_a_circle_though_no_edge_breaks_the_flow(situation: Situation) -> None:
+    known = Known(situation())
+    assert known.update() == 0
+    (c,) = known.trusted()
+    circles = known.circles
+    assert (circles.x[c], circles.y[c], circles.radius[c]) == (350.0, 260.0, 40.0)
+    assert (circles.width[c], circles.height[c], circles.support[c]) == (60.0, 80.0, 9)
+    assert (circles.ttc[c], circles.range[c], circles.lateral[c]) == (2.0, 3.0, pytest.approx(0.1))
+    assert (circles.cause[c], circles.square[c]) == (Cause.INCOMING, 0)
+    assert circles.id[c] > 0
+
+
+def test_it_keeps_the_one_that_it_has(situation: Situation) -> None:
+    known = Known(situation())
+    known.update()
+    (c,) = known.trusted()
+    identity = int(known.circles.id[c])
+    known.circles.trust[c] -= 1  # as of a circle that no rebel shows
+    known.update()
+    assert known.trusted() == [c]
+    assert known.circles.id[c] == identity
+
+
+def test_a_circle_of_its_own_that_was_not_trusted_is(situation: Situation) -> None:
+    known = Known(situation())
+    known.add_circle(1, 300.0, TR_S - 1, square=0)
+    known.update()
+    assert known.trusted() == [1]
+    assert known.circles.id[1] == 71
+
+
+@pytest.mark.parametrize(("x", "square"), [(375.0, -1), (400.0, 0)], ids=["inside", "own"])
+def test_a_trusted_circle_is_enough(situation: Situation, x: float, square: int) -> None:
+    known = Known(situation())
+    known.add_circle(0, x, TR_S, square)
+    known.update()
+    assert known.trusted() == [0]
+    assert known.circles.x[0] == x
+
+
+def test_a_circle_beside_it_shows_something_else(situation: Situation) -> None:
+    known = Known(situation())
+    known.add_circle(0, 400.0, TR_S)
+    known.update()
+    assert known.trusted() == [0, 1]
+
+
+@pytest.mark.parametrize("state", [ObjectState.HIDDEN, ObjectState.COASTING])
+def test_what_is_not_seen_gets_none(situation: Situation, state: ObjectState) -> None:
+    known = Known(situation(), state=state)
+    known.update()
+    assert known.trusted() == []
+
+
+def test_what_is_not_met_more_likely_than_not_gets_none(situation: Situation) -> None:
+    known = Known(situation(), probability=0.5)
+    known.update()
+    assert known.trusted() == []
+
+
+def test_an_object_that_is_not_published_gets_none(situation: Situation) -> None:
+    known = Known(situation())
+    known.objects.trust[0] = TR_S - 0.5
+    known.update()
+    assert known.trusted() == []
+
+
+def test_a_full_table_is_counted(situation: Situation) -> None:
+    known = Known(situation())
+    for c in (0, 1):
+        known.add_circle(c, 100.0, TR_S)
+    assert known.update() == 1
+    assert known.trusted() == [0, 1]
+
+
+def test_after_every_frame_what_is_seen_and_will_be_met_has_a_circle(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    way = drive(clutter(150)) + drive(box((0.0, -0.4, 7.0), (0.5, 0.9, 0.0), landmarks=8))
+    due = 0
+    for tables in steps(replace(way, frames=40)):
+        objects, circles = tables.objects, tables.rebel
+        for o in published(objects):
+            if objects.state[o] != ObjectState.SEEN or not objects.probability[o] > 0.5:
+                continue
+            due += 1
+            aside, below = np.abs(circles.x - objects.x[o]), np.abs(circles.y - objects.y[o])
+            inside = (aside <= 0.5 * objects.width[o]) & (below <= 0.5 * objects.height[o])
+            assert (circles.active & (circles.trust >= TR_S) & (inside | (circles.square == o))).any()
+    assert due > 5
+
+
+# What circles take from their object
+
+
+def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    walker = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=60), np.array([1.2, 0, 0]))
+    circles_reported = 0
+    for tables in steps(replace(drive(clutter(150)) + walker, frames=24)):
+        objects, circles = tables.objects, tables.rebel
+        for o in published(objects):
+            if objects.class_id[o] != ObjectClass.CROSSING or objects.probability[o] > 0.5:
+                continue
+            for c in np.flatnonzero(circles.active & (circles.square == o)):
+                circles_reported += 1
+                assert circles.cause[c] == Cause.CROSSING
+                for number in ("range", "lateral"):
+                    of_both = getattr(circles, number)[c], getattr(objects, number)[o]
+                    assert of_both[0] == pytest.approx(of_both[1], nan_ok=True)
+    assert circles_reported > 5
