@@ -69,6 +69,7 @@ SURPRISES = 3.0  # and by so many times what the gyro lately missed
 GYRO_SIGMAS = 3.0  # within which a rotation is looked for
 NOISE_SHARE = 0.7  # of what stays off the flow lines, which is of two places, is the noise of one
 DELTA_SIGMAS = 4.0  # of it, within which an edge of the flow stays
+GROUND_SLOPE_RAD = 0.002  # 1 sigma by which the ground ahead slopes otherwise than the way of the vehicle
 SLOWEST_MPS = 0.05  # that tells a direction
 FORGET = 0.3  # share of what the gyro missed that the latest frame tells
 
@@ -417,6 +418,8 @@ class LineCircleFilter:
         edges, settings = self.edges.columns, self._settings
         flow_fit.measure(fit, edges, self._keys, self._baselines, pinhole, around.dt_s, settings)
         around.turn_share = fit.turn_share
+        of_flow_rad = math.hypot(fit.focus_sigma_y / pinhole.fy, GROUND_SLOPE_RAD)
+        around.horizon_sigma_rad = min(settings.pitch_sigma_rad, of_flow_rad)
         around.flow_is_seen = fit.count > 0
         if fit.count:
             around.focus_x += fit.focus_x

@@ -155,7 +155,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situa
     ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
     """
     i = verdicts.row[verdicts.near[a]]
-    lowest_y = around.horizon_y - around.pinhole.focal * around.pitch_sigma_rad
+    lowest_y = around.horizon_y - around.pinhole.focal * around.horizon_sigma_rad
     verdicts.total = verdicts.shared = verdicts.ground = 0.0
     for b in range(verdicts.near_count):
         k = verdicts.row[verdicts.near[b]]

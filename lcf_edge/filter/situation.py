@@ -17,7 +17,8 @@ class Situation:
     length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``:
     t_f. ``noise_px``: 1 sigma of an edge's place. ``delta_px``: δ over a chain of key frames. Both as configured, or
     as the picture shows it (``flow_fit``). ``turn_share``: 1 sigma of where a turn moves an edge, as a share of that
-    way. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
+    way. ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: as the flow tells it, where
+    that is less. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
     (``rest``). ``flow_is_seen``: enough of what stands is in sight to tell its flow.
     """
 
@@ -27,7 +28,7 @@ class Situation:
         self.camera_height_m = config.camera.height_m
         self.half_width_m, self.height_m = config.vehicle.half_width_m, config.vehicle.height_m
         self.horizon_s = config.vehicle.horizon_s
-        self.pitch_sigma_rad = config.filter.pitch_sigma_rad
+        self.pitch_sigma_rad = self.horizon_sigma_rad = config.filter.pitch_sigma_rad
         self.focus_x, self.focus_y, self.horizon_y = pinhole.cx, pinhole.cy, pinhole.cy
         self.ground_is_still = False
         self.flow_is_seen = True

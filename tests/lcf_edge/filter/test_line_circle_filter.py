@@ -17,7 +17,7 @@ from hypothesis import strategies as st
 from lcf_edge.config import Config, Memory, load
 from lcf_edge.filter import Corners, LineCircleFilter, Motion, line_expert
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
-from lcf_edge.filter.line_circle_filter import Step
+from lcf_edge.filter.line_circle_filter import GROUND_SLOPE_RAD, Step
 from lcf_edge.lens import Lens
 
 SMALL = Config(
@@ -265,6 +265,16 @@ def test_what_a_table_takes_is_said(lens: Lens) -> None:
     for name in small:
         assert 0 < small[name] <= large[name], name
     assert sum(small.values()) < sum(large.values())
+
+
+def test_the_horizon_is_the_surer_the_better_the_flow_tells_it(street: Any, lens: Lens) -> None:
+    """As sure as configured without any; on a street that flows surer, but no surer than the ground is flat."""
+    tables = LineCircleFilter(Config(), lens)
+    configured = Config().filter.pitch_sigma_rad
+    assert tables._around.horizon_sigma_rad == configured
+    for corners, way in street:
+        tables.step(corners, way)
+    assert GROUND_SLOPE_RAD < tables._around.horizon_sigma_rad < configured
 
 
 def test_no_table_is_ever_allocated_again(street: Any, lens: Lens) -> None:

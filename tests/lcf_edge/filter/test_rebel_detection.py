@@ -287,6 +287,14 @@ def test_a_threat_begins_a_little_inside_the_horizon_and_ends_at_it(watch: Watch
     assert watch(wall, horizon_s=2.0).verdict(known=True).incoming.all()
 
 
+@pytest.mark.parametrize(("horizon_sigma_rad", "is_met"), [(0.002, True), (0.05, False)])
+def test_what_may_as_well_be_the_ground_is_not_met(watch: Watch, horizon_sigma_rad: float, is_met: bool) -> None:
+    """A box 15 cm high, 6 m ahead: where the horizon is not known well, the ground may lie as high."""
+    low = [(x, y, 6.0) for x in (-0.1, 0.0, 0.1) for y in (0.15, 0.18, 0.21)]
+    seen = watch(low, horizon_sigma_rad=horizon_sigma_rad).verdict()
+    assert seen.incoming.all() if is_met else not seen.incoming.any()
+
+
 # Movers
 
 
