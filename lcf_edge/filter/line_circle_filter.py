@@ -482,7 +482,7 @@ class LineCircleFilter:
             settings,
             self._object_ids,
         )
-        evicted += object_circles.update(self.objects.columns, rebel, edges, around, settings, self._ids)
+        evicted += object_circles.update(self.objects.columns, rebel, edges, self._plane, around, settings, self._ids)
         evicted += feedback.write(psi, normal, edges, candidates, self._keys, around, settings, self._psi_ids)
         feedback.give_way(psi, candidates, edges, rebel, self._plane, settings.psi_margin_px)
         return int(evicted)

@@ -1,13 +1,14 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport lengths, square_expert, turmoil
+from lcf_edge.filter cimport image_plane, lengths, square_expert, turmoil
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
-cdef double EVEN
+cdef double LEFT_SHARE
 cdef int UNKNOWN
 cdef int STANDING
 cdef int CROSSING
@@ -30,6 +31,9 @@ cdef bint is_shown(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, S
 cdef int own_circle(CircleColumns circles, Py_ssize_t o) noexcept nogil
 @cython.locals(x=double, y=double, looming=double, vx=double, vy=double, reach=double)
 cdef void show(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
-@cython.locals(evicted=int, o=Py_ssize_t, c=int)
-cdef int keep(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
-cpdef int update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(inward=double, inmost_x=double)
+cdef bint has_left(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
+@cython.locals(ended=int, o=int)
+cdef void end_outside(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around) noexcept nogil
+@cython.locals(evicted=int, o=Py_ssize_t, c=int, is_due=bint)
+cpdef int update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -3,14 +3,15 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import lengths, square_expert, turmoil
+from lcf_edge.filter import image_plane, lengths, square_expert, turmoil
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
+from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
-EVEN = 0.5
+LEFT_SHARE = 0.25  # of an object's width: with no more of it in the picture it has left
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
@@ -25,7 +26,7 @@ def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
 
 def cause_of(objects: ObjectColumns, o: int) -> int:
     """The cause of the circles of an object that moves."""
-    if objects.probability[o] > EVEN:
+    if objects.probability[o] > square_expert.EVEN:
         return COMES
     return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
 
@@ -87,23 +88,51 @@ def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around:
     circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
 
 
-def keep(
+def has_left(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
+    """Whether hardly a part of an object that is not seen is in the picture."""
+    inward = (0.5 - LEFT_SHARE) * objects.width[o]
+    inmost_x = objects.x[o] + inward if objects.x[o] < 0.5 * plane.width else objects.x[o] - inward
+    return objects.state[o] != SEEN and not image_plane.project(plane, inmost_x, objects.y[o])
+
+
+def end_outside(
+    objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, plane: ImagePlane, around: Situation
+) -> None:
+    """Circles of what has left the picture end: there only the object goes on.
+
+    Not where nothing is seen to flow: that is what fills the picture.
+    """
+    if not around.flow_is_seen:
+        return
+    ended = 0
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if o >= 0 and circles.active[c] and has_left(objects, o, plane):
+            circles.active[c] = 0
+            ended += 1
+    if ended > 0:
+        shared.release(edges, circles, True)
+
+
+def update(
     objects: ObjectColumns,
     circles: CircleColumns,
     edges: EdgeColumns,
+    plane: ImagePlane,
     around: Situation,
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """What is seen, and met sooner than not, keeps a circle, though its edges hardly break the flow.
+    """C_r from S: what is seen, and met sooner than not, keeps a circle, though its edges hardly break the flow.
 
     Return evictions.
     """
     evicted = 0
+    correct(objects, circles, settings)
+    end_outside(objects, circles, edges, plane, around)
     for o in range(objects.capacity):
-        if not is_sure(objects, o, settings) or not objects.probability[o] > EVEN:
-            continue
-        if is_shown(objects, o, circles, settings):
+        is_due = is_sure(objects, o, settings) and objects.probability[o] > square_expert.EVEN
+        if not is_due or is_shown(objects, o, circles, settings):
             continue
         c = own_circle(circles, o)
         if c < 0:
@@ -115,16 +144,3 @@ def keep(
             circles.square[c] = o
         show(objects, o, circles, c, around, settings)
     return evicted
-
-
-def update(
-    objects: ObjectColumns,
-    circles: CircleColumns,
-    edges: EdgeColumns,
-    around: Situation,
-    settings: Settings,
-    ids: Ids,
-) -> int:
-    """C_r from S; return evictions."""
-    correct(objects, circles, settings)
-    return keep(objects, circles, edges, around, settings, ids)

@@ -122,25 +122,15 @@ PLACE_WRITERS = (*CONTACT_WRITERS, "turmoil")
 CENTRE_WRITERS = ("derotation", "circles", "normal_circles", "rebel_circles", "object_circles")
 SPEED_WRITERS = ("normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "object_circles", "turmoil")
 CIRCLE_COLUMNS = (
-    Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles"), np.bool_),
+    Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles", "object_circles"), np.bool_),
     Column("id", "identity, never 0", "1", ("circles",), np.uint32),
     Column("x", "centre, to the right", "px", CENTRE_WRITERS),
     Column("y", "centre, down", "px", CENTRE_WRITERS),
     Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles", "object_circles")),
-    Column(
-        "beta",
-        "β of its motion in the picture",
-        "rad",
-        ("derotation", *SPEED_WRITERS),
-    ),
+    Column("beta", "β of its motion in the picture", "rad", ("derotation", *SPEED_WRITERS)),
     Column("speed", "V along β", "px/s", SPEED_WRITERS),
     Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
-    Column(
-        "trust",
-        "Tr",
-        "1",
-        ("circles", *SPEED_WRITERS, "feedback"),
-    ),
+    Column("trust", "Tr", "1", ("circles", *SPEED_WRITERS, "feedback")),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles", "object_circles"), np.int32),
     Column("width", "extent of its edges", "px", ("circles", "rebel_circles", "object_circles")),

@@ -46,8 +46,7 @@ def test_every_picture_of_it_has_truth_and_the_filter_sees_what_threatens(sample
     assert numbers.scored == numbers.pictures
     assert (numbers.due > 0) == (sample.stem == "walkers")
     assert numbers.found >= numbers.due / 2
-    # Who crosses 30 cm ahead may be told for a picture more than he is in sight.
-    assert numbers.contacts <= (1 if numbers.due else 0)
+    assert numbers.contacts == 0
 
 
 def test_another_reader_finds_sensors_and_what_was_reported(sample: Path) -> None:

@@ -12,10 +12,13 @@ from lcf_edge.config import Config, Filter
 from lcf_edge.filter import LineCircleFilter, object_circles
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable, ObjectTable
+from lcf_edge.lens import Lens
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
+LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
 SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
 TR_S = Filter().tr_s
 
@@ -58,7 +61,7 @@ class Known:
     def update(self) -> int:
         """Return evictions."""
         rows = self.objects.columns, self.circles.columns, self.edges.columns
-        return int(object_circles.update(*rows, self.around, SETTINGS, self.ids))
+        return int(object_circles.update(*rows, ImagePlane(LENS), self.around, SETTINGS, self.ids))
 
     def trusted(self) -> list[int]:
         """Rows of circles that are published."""
@@ -158,6 +161,34 @@ def test_after_every_frame_what_is_seen_and_will_be_met_has_a_circle(
             inside = (aside <= 0.5 * objects.width[o]) & (below <= 0.5 * objects.height[o])
             assert (circles.active & (circles.trust >= TR_S) & (inside | (circles.square == o))).any()
     assert due > 5
+
+
+# What has left the picture
+
+
+@pytest.mark.parametrize("side", [-1, 1])
+@pytest.mark.parametrize(("in_sight_px", "ends"), [(14.0, True), (16.0, False)])
+def test_circles_end_with_a_quarter_of_what_is_seen_no_more_in_the_picture(
+    situation: Situation, side: int, in_sight_px: float, ends: bool
+) -> None:
+    """Of an object 60 px wide, which itself goes on."""
+    known = Known(situation(), state=ObjectState.COASTING)
+    border_x, inward = (0.0, 1) if side < 0 else (LENS.width - 1.0, -1)
+    known.objects.x[0] = border_x + inward * (in_sight_px - 30.0)
+    known.add_circle(0, border_x, 5.0, square=0)
+    known.update()
+    assert known.circles.active[0] != ends
+    assert known.objects.active[0]
+
+
+@pytest.mark.parametrize("why", ["seen", "nothing flows", "of another"])
+def test_other_circles_at_the_border_go_on(situation: Situation, why: str) -> None:
+    state = ObjectState.SEEN if why == "seen" else ObjectState.COASTING
+    known = Known(situation(flow_is_seen=why != "nothing flows"), state=state)
+    known.objects.x[0] = -20.0
+    known.add_circle(0, 0.0, 5.0, square=-1 if why == "of another" else 0)
+    known.update()
+    assert known.circles.active[0]
 
 
 # What circles take from their object
