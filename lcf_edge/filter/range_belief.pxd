@@ -26,6 +26,7 @@ cdef double SPEED_SHARE
 cdef double MIN_SIGMA_HZ
 cdef double MAX_HORIZONS
 cdef double FRONT_SHARE
+cdef double MAX_HALF_WIDTH
 cdef double DEPTH_SHARE
 cdef double MIN_DEPTH
 cdef double MIN_WEIGHT
@@ -69,5 +70,6 @@ cdef void take(Belief belief, int quantity, double weight, double value, double 
 @cython.locals(time_s=double)
 cdef void suppose(Belief belief, double weight, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef void conclude(Belief belief) noexcept nogil
+@cython.locals(half_width=double)
 cdef void tell_front(Belief belief, Evidence evidence) noexcept nogil
 cpdef void consider(Belief belief, Evidence evidence, Situation around) noexcept nogil

@@ -38,6 +38,7 @@ SPEED_SHARE = 0.05  # 1 sigma of the vehicle's speed
 MIN_SIGMA_HZ = 0.003  # of a looming or a sideways rate: what no model of noise has
 MAX_HORIZONS = 3.0  # later contacts do not count in a mean
 FRONT_SHARE = 0.3  # of half an object's width, by which its front is nearer than the mean of its edges,
+MAX_HALF_WIDTH = 1.0  # of an object, as a share of its range, that counts there: a wider box holds more than one thing
 DEPTH_SHARE = 0.4  # and 1 sigma of that,
 MIN_DEPTH = 0.03  # more by this share of its range
 MIN_WEIGHT = 0.2  # of all pairs of case and range, that a mean needs
@@ -268,8 +269,9 @@ def tell_front(belief: Belief, evidence: Evidence) -> None:
 
     Of the range the mean of the logarithm was taken.
     """
-    nearer = 1 - FRONT_SHARE * evidence.half_width
-    deep = DEPTH_SHARE * evidence.half_width + MIN_DEPTH
+    half_width = min(evidence.half_width, MAX_HALF_WIDTH)
+    nearer = 1 - FRONT_SHARE * half_width
+    deep = DEPTH_SHARE * half_width + MIN_DEPTH
     belief.middle, belief.middle_sigma = math.exp(belief.mean[RANGE]), belief.sigma[RANGE]
     range_m = belief.middle * nearer
     belief.sigma[RANGE] = range_m * lengths.of(belief.sigma[RANGE], deep)

@@ -152,6 +152,7 @@ cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence ev
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
 cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef void take_place(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef bint obeys(ObjectColumns objects, Py_ssize_t o, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, double share, Situation around) noexcept nogil
 cdef void set_reach(MotionSums bounds, MotionSums wholes, Py_ssize_t o) noexcept nogil

@@ -399,11 +399,17 @@ def found(
 def found_in_turmoil(
     objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings, ids: Ids
 ) -> None:
-    """A new object from a circle in turmoil: only its place is known."""
+    """A new object from a circle in turmoil."""
     give_birth(objects, o, settings, ids)
+    circles.square[c] = o
+    take_place(objects, o, circles, c, around)
+
+
+def take_place(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation) -> None:
+    """Of an object in turmoil only the place is known."""
     objects.x[o], objects.y[o] = circles.x[c], circles.y[c]
     objects.width[o], objects.height[o] = circles.width[c], circles.height[c]
-    circles.square[c] = o
+    objects.middle[o] = objects.middle_sigma[o] = objects.foot[o] = NAN
     objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
     objects.mm[o] = objects.qq[o] = TURMOIL_HZ * TURMOIL_HZ
     objects.reference[o] = around.speed_mps
@@ -790,7 +796,11 @@ def go_on(
 def go_on_in_turmoil(
     objects: ObjectColumns, o: int, circles: CircleColumns, around: Situation, settings: Settings
 ) -> bool:
-    """An object of which a circle in turmoil tells that it is still there, and no edge more; False: none does."""
+    """An object of which a circle in turmoil tells that it is still there, and no edge more; False: none does.
+
+    It goes on as it moved when edges still showed it, until it would be met: what is there then moves otherwise, and
+    a looming has no bound.
+    """
     for c in range(circles.capacity):
         if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
             objects.unseen_s[o], objects.state[o], objects.support[o] = 0.0, SEEN, circles.support[c]
@@ -798,6 +808,8 @@ def go_on_in_turmoil(
             half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
             left, right = circles.x[c] - half_width, circles.x[c] + half_width
             fit(objects, o, left, right, circles.y[c] - half_height, circles.y[c] + half_height, around)
+            if objects.looming[o] * around.dt_s > MAX_LAG:
+                take_place(objects, o, circles, c, around)
             return True
     return False
 

@@ -43,6 +43,7 @@ cpdef void count(Turmoil turmoil, EdgeColumns edges, Situation around, Settings 
 cdef bint is_inner(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(total=double, row=int, middle=int)
 cdef double with_those_around(double[::1] values, Turmoil turmoil, int k) noexcept nogil
+@cython.locals(ground_m=double)
 cdef double stays_px(Turmoil turmoil, int k, Situation around) noexcept nogil
 cdef bint is_unruly(Turmoil turmoil, int k, Situation around, Settings settings) noexcept nogil
 @cython.locals(hidden=double)

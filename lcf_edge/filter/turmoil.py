@@ -124,11 +124,14 @@ def with_those_around(values: Doubles, turmoil: Turmoil, k: int) -> float:
 
 
 def stays_px(turmoil: Turmoil, k: int, around: Situation) -> float:
-    """How far what stands still, and is met in a second or later, moves there in a frame at most, px."""
+    """How far what stands still, and is met in a second or later, or is the ground, moves there in a frame, px."""
     x, y = middle_x(turmoil, k), middle_y(turmoil, k)
     rate = 1 / MET_S
     if math.fabs(around.speed_mps) < SLOW_MPS:
         rate *= math.fabs(around.speed_mps) / SLOW_MPS
+    ground_m = situation.ground_range_m(around, y)
+    if math.fabs(around.speed_mps) > rate * ground_m:
+        rate = math.fabs(around.speed_mps) / ground_m
     return rate * around.dt_s * lengths.of(x - around.focus_x, y - around.focus_y)
 
 

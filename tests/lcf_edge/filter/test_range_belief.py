@@ -122,6 +122,15 @@ def test_looming_tells_of_the_speed_at_which_it_was_measured(situation: Situatio
     assert after.mean[RATE] == pytest.approx(before.mean[RATE] / 2, rel=0.05)
 
 
+@given(st.floats(0, 12), st.floats(0.5, 20))
+def test_however_wide_a_box_is_its_front_is_ahead(situation: Situation, half_width: float, range_m: float) -> None:
+    """Through a fisheye a box may reach from side to side, 85 degrees off the axis."""
+    belief = belief_of(evidence_of(range_m, 0, 0, 0.0, 2.0, half_width=half_width), situation(speed_mps=2.0))
+    assert 0 < belief.mean[RANGE] <= belief.middle
+    assert belief.sigma[RANGE] > 0
+    assert belief.mean[RATE] > 0
+
+
 def test_a_thing_is_passed_when_its_contact_comes(situation: Situation) -> None:
     belief = belief_of(evidence_of(5.0, 0, 0, 0.3, 2.0), situation(speed_mps=2.0))
     assert belief.mean[CLOSEST] == pytest.approx(1 / belief.mean[RATE], rel=0.05)

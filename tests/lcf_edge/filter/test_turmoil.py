@@ -135,6 +135,27 @@ def test_it_is_an_object_of_which_hardly_more_than_its_place_is_known(calm: Any)
     assert objects.range_sigma[o] > 0.1 * objects.range[o]
 
 
+def test_what_was_to_be_met_and_is_still_in_turmoil_moves_otherwise(
+    drive: Drive, clutter: Landmarks, box: Landmarks
+) -> None:
+    """It looms without bound as its contact comes; then only its place is known."""
+    comes = drive(box((0.3, 0.0, 6.0), (0.5, 0.8, 0.2), 30, seed=3), np.array([0.0, 0.0, -0.5]))
+    way = replace(drive(clutter(400), sigma_rad=1e-4) + comes, frames=90)
+    tables = LineCircleFilter(CONFIG, way.lens)
+    objects, ids = tables.objects, set()
+    for seq, (plain, stormy) in enumerate(zip(way, Storm(way, half_px=80.0), strict=True)):
+        tables.step(*(plain if seq < 26 else stormy))
+        for o in np.flatnonzero(objects.active & (objects.trust >= CONFIG.filter.tr_s)):
+            ids.add(int(objects.id[o]))
+            assert max(objects.width[o], objects.height[o]) < 2 * way.lens.width
+            assert objects.range[o] > 0
+            assert objects.range_sigma[o] > 0
+            assert not objects.closest[o] < 0
+    assert ids == {1}
+    (o,) = np.flatnonzero(objects.active & (objects.trust >= CONFIG.filter.tr_s))
+    assert np.hypot(objects.x[o] - AHEAD[0], objects.y[o] - AHEAD[1]) < HALF_PX / 2
+
+
 def test_corners_inside_it_expect_no_motion_of_it(calm: Any) -> None:
     """Else the next ones would not be looked for where they are, and it would never end."""
     tables, _ = after(Storm(replace(calm, frames=20)))
@@ -163,6 +184,13 @@ def test_beside_a_fast_vehicle_what_stands_is_lost_too_and_beside_one_that_rests
     assert after(Storm(fast, place=ASIDE))[1] == 0
     resting = replace(calm, speed_mps=0.0, fps=8.0)
     assert after(Storm(resting, place=ASIDE))[1] > 0
+
+
+def test_the_ground_before_a_fast_vehicle_is_lost_as_well(calm: Any) -> None:
+    """A picture that shakes has many corners there, and finds few of them again, however far all else is."""
+    near = Storm(replace(calm, speed_mps=3.0), place=(320.0, 420.0), half_px=40.0)
+    assert after(near)[1] == 0
+    assert after(near, Config(camera=Camera(height_m=3.0)))[1] > 0
 
 
 def test_in_a_quick_turn_it_is_not_looked_for(calm: Any) -> None:
