@@ -421,6 +421,7 @@ class LineCircleFilter:
         of_flow_rad = math.hypot(fit.focus_sigma_y / pinhole.fy, GROUND_SLOPE_RAD)
         around.horizon_sigma_rad = min(settings.pitch_sigma_rad, of_flow_rad)
         around.flow_is_seen = fit.count > 0
+        around.is_blind = not around.flow_is_seen and bool(turmoil.is_all_lost(self._turmoil, around.is_blind))
         if fit.count:
             around.focus_x += fit.focus_x
             around.focus_y += fit.focus_y

@@ -52,6 +52,7 @@ cdef double FAR_LIKE_SPEED
 cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
 cdef double MIN_TTC_SHARE
+cdef double BLIND_S
 cdef double MAX_TURN_RAD
 cdef int CROSSING
 cdef int INCOMING

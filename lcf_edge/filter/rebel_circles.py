@@ -67,6 +67,7 @@ FAR_LIKE_SPEED = 0.3  # share of the faster one's speed, by which they then diff
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
+BLIND_S = 1.0  # for so long circles stay where they are when the whole picture is covered
 MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
 CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
@@ -117,11 +118,11 @@ class RebelGroups:
 def predict(circles: CircleColumns, around: Situation) -> None:
     """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
 
-    Without a time to contact, the centre goes on as it went.
+    Without a time to contact, the centre goes on as it went. What covers the picture stays there.
     """
     least_s = MIN_TTC_SHARE * around.horizon_s
     for c in range(circles.capacity):
-        if not circles.active[c]:
+        if not circles.active[c] or around.is_blind:
             continue
         grow = 1.0
         if math.isfinite(circles.ttc[c]) and circles.ttc[c] > least_s:
@@ -727,7 +728,8 @@ def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
 def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
     """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it.
 
-    What is about to be met may hide all that flows: then it goes on until contact.
+    What is about to be met may hide all that flows: then it goes on until contact. Nothing is known of any of them
+    while something covers the picture.
     """
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
@@ -735,6 +737,7 @@ def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, s
         waits = near or is_hidden(circles, c, settings)
         waits = waits and circles.unseen_s[c] < COAST_TIME_SHARE * around.horizon_s
         waits = waits or (near and not around.flow_is_seen)
+        waits = waits or (around.is_blind and circles.unseen_s[c] < BLIND_S)
         groups.missed[c] = 1 if circles.active[c] and not groups.updated[c] and not waits else 0
     for c in range(circles.capacity):
         if groups.missed[c]:

@@ -20,6 +20,7 @@ class Situation:
     way. ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: as the flow tells it, where
     that is less. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
     (``rest``). ``flow_is_seen``: enough of what stands is in sight to tell its flow.
+    ``is_blind``: it is not, and hardly an edge of the picture is found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -31,7 +32,7 @@ class Situation:
         self.pitch_sigma_rad = self.horizon_sigma_rad = config.filter.pitch_sigma_rad
         self.focus_x, self.focus_y, self.horizon_y = pinhole.cx, pinhole.cy, pinhole.cy
         self.ground_is_still = False
-        self.flow_is_seen = True
+        self.flow_is_seen, self.is_blind = True, False
         self.ground_mps = NAN
         self.turn_share = self.lever_m = 0.0
         self.least_noise_px = self.noise_px = config.filter.edge_noise_px

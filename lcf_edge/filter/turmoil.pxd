@@ -16,6 +16,7 @@ cdef double FOUND_NOW_SHARE
 cdef double FOUND_ELSEWHERE
 cdef double LOST_STILL_SHARE
 cdef double MIN_HIDDEN
+cdef double BLIND_SHARE
 cdef double HIDDEN_FOUND_SHARE
 cdef int MIN_HIDDEN_CELLS
 cdef double MIN_HIDDEN_S
@@ -40,6 +41,7 @@ cdef double middle_x(Turmoil turmoil, int k) noexcept nogil
 cdef double middle_y(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(k=int, trusted=int)
 cpdef void count(Turmoil turmoil, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+cpdef bint is_all_lost(Turmoil turmoil, bint before) noexcept nogil
 cdef bint is_inner(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(total=double, row=int, middle=int)
 cdef double with_those_around(double[::1] values, Turmoil turmoil, int k) noexcept nogil

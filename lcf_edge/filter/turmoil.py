@@ -17,6 +17,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
+BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the picture
 ACROSS = 20  # cells in a row; a place is judged with those around it
 HALF_LIFE_S = 0.15  # of what was counted
 MIN_EDGES = 25.0  # counted in a place lately,
@@ -106,6 +107,15 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
     for k in range(turmoil.across * turmoil.down):
         turmoil.found[k] += turmoil.found_now[k]
         turmoil.lost[k] += turmoil.lost_now[k]
+
+
+def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
+    """Whether hardly an edge of the whole picture is found in this frame; of few, only if it was so ``before``."""
+    found = lost = 0.0
+    for k in range(turmoil.across * turmoil.down):
+        found += turmoil.found_now[k]
+        lost += turmoil.lost_now[k]
+    return found <= BLIND_SHARE * (found + lost) and (before or lost >= MIN_EDGES)
 
 
 def is_inner(turmoil: Turmoil, k: int) -> bool:

@@ -344,6 +344,25 @@ def test_what_is_about_to_be_met_and_hides_all_that_flows_stays_until_contact(si
     assert scene.trust == []
 
 
+def test_circles_stay_while_something_covers_the_picture_for_up_to_a_second(situation: Situation) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
+    circles, around = scene.circles, scene.around
+    (row,) = np.flatnonzero(circles.active)
+    circles.speed[row] = 500.0
+    around.is_blind = True
+    before = scene.trust, circles.x[row], circles.ttc[row]
+    for _ in range(round(0.9 / around.dt_s)):
+        rebel_circles.predict(circles.columns, around)
+        scene.update()
+        assert (scene.trust, circles.x[row], circles.ttc[row]) == before
+    circles.unseen_s[row] = 1.0
+    assert scene.update().trust == [before[0][0] - 1]
+    around.is_blind = False
+    rebel_circles.predict(circles.columns, around)
+    assert circles.x[row] != before[1]
+
+
 def test_what_is_unseen_ends_at_its_contact_whatever_it_hides(situation: Situation) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))

@@ -282,6 +282,12 @@ def test_other_reasons_to_lose_what_was_trusted_are_none(slow: Any, changes: dic
     assert not any(covered(replace(Cover(slow), **changes)))
 
 
+@pytest.mark.parametrize("all_of_it", [True, False])
+def test_a_picture_in_which_hardly_an_edge_is_found_is_covered(calm: Any, all_of_it: bool) -> None:
+    tables, _ = after(Storm(calm, all_of_it=all_of_it))
+    assert tables._around.is_blind == all_of_it
+
+
 def test_a_full_table_counts_it(calm: Any) -> None:
     config = Config(camera=Camera(height_m=CAMERA_M), memory=Memory(circles_rebel=1))
     tables = LineCircleFilter(config, calm.lens)
