@@ -7,6 +7,7 @@ from lcf_edge.filter.settings cimport Settings
 cdef double RADIUS_SIGMAS
 cdef double MIN_RADIUS_PX
 cdef double EXTENT_SIGMAS
+cdef double TRUST_A_FRAME
 cdef unsigned long long LAST_ID
 cdef double INFINITY
 cdef double NAN
@@ -24,6 +25,8 @@ cdef unsigned int new_id(Ids ids) noexcept nogil
 cdef void clear(Members members, Py_ssize_t g) noexcept nogil
 cdef double radius_of(Members members, Py_ssize_t g, double most_px) noexcept nogil
 cdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
+@cython.locals(left_s=double, trust=double)
+cdef double contact_rate(CircleColumns circles, Py_ssize_t c, double rate, double dt_s, Settings settings) noexcept nogil
 cdef void describe(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g) noexcept nogil
 cdef void give_birth(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings, Ids ids) noexcept nogil
 cdef void begin(CircleColumns circles, Py_ssize_t c, Ids ids) noexcept nogil

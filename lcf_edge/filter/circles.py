@@ -10,6 +10,7 @@ from lcf_edge.filter.settings import Settings
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members
 MIN_RADIUS_PX = 6.0
 EXTENT_SIGMAS = 3.6  # full width of the members, in standard deviations
+TRUST_A_FRAME = 0.25  # above Tr_cr, that a predicted contact has for each frame that it is ahead
 LAST_ID = 0xFFFFFFFF
 INFINITY = float("inf")
 NAN = float("nan")
@@ -61,6 +62,19 @@ def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Se
     circles.y[c] = edge_equations.update_position(trust, tr_cr, circles.y[c], members.y[g])
     circles.radius[c] = edge_equations.update_position(trust, tr_cr, circles.radius[c], radius)
     describe(circles, c, members, g)
+
+
+def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, settings: Settings) -> float:
+    """1/TTC from what was predicted and what is seen, by the equation of L, 1/s.
+
+    The fewer frames a contact is ahead, the less surely it was predicted: else one that does not come would always be
+    about to come.
+    """
+    if not math.isfinite(circles.ttc[c]):
+        return rate
+    left_s = max(circles.ttc[c], dt_s)
+    trust = min(circles.trust[c], settings.tr_cr + TRUST_A_FRAME * left_s / dt_s)
+    return edge_equations.update_position(trust, settings.tr_cr, 1 / left_s, rate)
 
 
 def describe(circles: CircleColumns, c: int, members: Members, g: int) -> None:

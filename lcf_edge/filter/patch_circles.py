@@ -205,8 +205,7 @@ def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Si
     range_m = 1 / groups.inverse
     right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
     rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
-    if math.isfinite(circles.ttc[c]) and circles.ttc[c] > around.dt_s:
-        rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, 1 / circles.ttc[c], rate)
+    rate = shared.contact_rate(circles, c, rate, around.dt_s, settings)
     circles.cause[c] = INCOMING
     circles.ttc[c], circles.range[c] = 1 / rate, range_m
     circles.lateral[c] = path.least_miss(right_m, range_m, around)

@@ -671,10 +671,7 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     stands = 2 * groups.standing[g] >= groups.members.size[g]
     range_m = groups.closing_mps[g] / max(groups.expansion[g], MIN_RATE)
     rate = expansion_of(groups, g, stands, range_m, around)
-    before = rate
-    if math.isfinite(circles.ttc[c]):
-        before = 1 / max(circles.ttc[c], MIN_TTC_SHARE * around.horizon_s)
-    rate = edge_equations.update_position(circles.trust[c], settings.tr_cr, before, rate)
+    rate = shared.contact_rate(circles, c, rate, around.dt_s, settings)
     circles.ttc[c] = 1 / rate if rate * MAX_TTC_HORIZONS * around.horizon_s > 1 else INFINITY
 
     on_ground_m = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])

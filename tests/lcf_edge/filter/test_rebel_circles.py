@@ -282,6 +282,19 @@ def test_a_circle_without_rebels_loses_one_a_frame_until_it_goes(situation: Situ
     assert scene.update().trust == []
 
 
+@pytest.mark.parametrize("fps", [5.0, 20.0, 60.0])
+def test_a_contact_that_does_not_come_is_not_always_about_to_come(situation: Situation, fps: float) -> None:
+    """A circle that was taken for near, and whose edges do not loom."""
+    scene = Scene(situation(dt_s=1 / fps)).update(CROSSING)
+    (row,) = np.flatnonzero(scene.circles.active)
+    scene.circles.ttc[row] = 3 / fps
+    for _ in range(12):
+        rebel_circles.predict(scene.circles.columns, scene.around)
+        scene.circles.trust[row], scene.circles.x[row] = TR_MAX, CROSSING[0]
+        scene.update(CROSSING)
+    assert scene.circles.ttc[row] > 15 / fps
+
+
 def test_what_is_about_to_be_met_coasts_when_it_is_large(situation: Situation) -> None:
     for extent_px, keeps in ((80.0, True), (20.0, False)):
         scene = Scene(situation())
