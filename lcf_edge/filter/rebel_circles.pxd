@@ -97,12 +97,13 @@ cdef void measure_sizes(RebelGroups groups) noexcept nogil
 cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef bint is_paint(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
 cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint ground_would_flow(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
-@cython.locals(few=bint, stands=bint, inside=bint)
+@cython.locals(few=bint, flat=bint, stands=bint, inside=bint)
 cdef void find_odd(RebelGroups groups, Members members, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 @cython.locals(inside=bint)
 cdef void vote(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, CircleColumns circles, Settings settings) noexcept nogil

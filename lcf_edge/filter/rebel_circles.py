@@ -444,7 +444,7 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
 
 
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
-    """Whether a group lies on a plane under the ground: lamps, as a glossy floor shows them.
+    """Whether a group lies on a level plane: paint on the ground, or lamps under it, as a glossy floor shows them.
 
     There μ/t grows with the height h under the horizon, on what stands upright it is the same everywhere: which of
     μ/t = k·h and μ/t = c leaves less, by least squares in px/s.
@@ -471,6 +471,11 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
     foot = max(members.y[g] + half - around.horizon_y, 0.0)
     return members.y[g] - half > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
+
+
+def is_paint(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
+    """Whether a group that is said to stand in the way lies below the horizon, and as one plane."""
+    return groups.top[g] > around.horizon_y and is_mirrored(groups, g, members)
 
 
 def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
@@ -503,7 +508,8 @@ def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: 
         stands = 2 * groups.standing[g] >= members.size[g]
         least = settings.rebel_share if stands else max(settings.rebel_share, MOVER_SHARE)
         few = members.size[g] < least * (members.size[g] + groups.flowing[g]) or own_parts > OWN_SHARE * members.size[g]
-        groups.odd[g] = 1 if few or is_flat(groups, g, members, around) or is_shifted(groups, g, members) else 0
+        flat = is_flat(groups, g, members, around) or (stands and is_paint(groups, g, members, around))
+        groups.odd[g] = 1 if few or flat or is_shifted(groups, g, members) else 0
 
 
 # Groups and circles
@@ -726,7 +732,7 @@ def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, s
     """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it.
 
     What is about to be met may hide all that flows: then it goes on until contact. Nothing is known of any of them
-    while something covers the picture.
+    while something covers the picture: they stay, and must be seen as soon as the picture is.
     """
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
@@ -734,7 +740,9 @@ def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, s
         waits = near or is_hidden(circles, c, settings)
         waits = waits and circles.unseen_s[c] < COAST_TIME_SHARE * around.horizon_s
         waits = waits or (near and not around.flow_is_seen)
-        waits = waits or (around.is_blind and circles.unseen_s[c] < BLIND_S)
+        if around.is_blind and circles.unseen_s[c] < BLIND_S:
+            circles.trust[c] = min(circles.trust[c], settings.tr_s)
+            waits = True
         groups.missed[c] = 1 if circles.active[c] and not groups.updated[c] and not waits else 0
     for c in range(circles.capacity):
         if groups.missed[c]:

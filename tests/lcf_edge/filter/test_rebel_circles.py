@@ -146,6 +146,18 @@ def thing(number: int) -> tuple[Floats, Floats]:
     return (190 + off[0]).astype(np.float32), (180 + off[1]).astype(np.float32)
 
 
+@pytest.mark.parametrize(("level", "makes"), [(False, 1), (True, 0)], ids=["upright", "on the ground"])
+def test_paint_on_the_ground_does_not_stand_in_the_way(situation: Situation, level: bool, makes: int) -> None:
+    """What is upright looms alike everywhere, the ground the more the farther it is below the horizon."""
+    around = situation()
+    random = np.random.default_rng(2)
+    x, below = random.uniform(300, 340, 12).astype(np.float32), random.uniform(30, 130, 12).astype(np.float32)
+    looming_hz = 0.6 * below / 80 if level else np.full(12, 0.6)
+    vx, vy = looming_hz * (x - around.focus_x), looming_hz * below
+    circles = standing(around, x, (around.horizon_y + below).astype(np.float32), vx, vy)
+    assert int(circles.active.sum()) == makes
+
+
 # Grouping
 
 CROSSING = (300.0, 150.0, 0.0, 120.0)
@@ -364,16 +376,22 @@ def test_circles_stay_while_something_covers_the_picture_for_up_to_a_second(situ
     (row,) = np.flatnonzero(circles.active)
     circles.speed[row] = 500.0
     around.is_blind = True
-    before = scene.trust, circles.x[row], circles.ttc[row]
+    before = circles.x[row], circles.ttc[row]
     for _ in range(round(0.9 / around.dt_s)):
         rebel_circles.predict(circles.columns, around)
-        scene.update()
-        assert (scene.trust, circles.x[row], circles.ttc[row]) == before
+        assert scene.update().trust == [TR_S]
+        assert (circles.x[row], circles.ttc[row]) == before
     circles.unseen_s[row] = 1.0
-    assert scene.update().trust == [before[0][0] - 1]
-    around.is_blind = False
-    rebel_circles.predict(circles.columns, around)
-    assert circles.x[row] != before[1]
+    assert scene.update().trust == [TR_S - 1]
+
+
+def test_a_circle_that_is_not_seen_again_with_the_picture_is_told_no_more(situation: Situation) -> None:
+    scene = Scene(situation())
+    scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
+    scene.around.is_blind = True
+    assert scene.update().trust == [TR_S]
+    scene.around.is_blind = False
+    assert scene.update().trust == [TR_S - 1]
 
 
 def test_what_is_unseen_ends_at_its_contact_whatever_it_hides(situation: Situation) -> None:
