@@ -10,14 +10,14 @@ from collections.abc import Callable, Collection
 
 from lcf_edge.gate.zenoh_batches import Key, keys
 
-MOST_LEVELS = 20
-MOST_BRANCHES = 2  # ``**`` and ``$*`` in one key
-MOST_WILD = 16  # different keys with wildcards that Zenoh keeps of one name, ever
+MAX_LEVELS = 20
+MAX_BRANCHES = 2  # ``**`` and ``$*`` in one key
+MAX_WILD = 16  # different keys with wildcards that Zenoh keeps of one name, ever
 MOST_KEY_BYTES = 512
 MOST_DECLARED_BYTES = 2**17  # of all keys and numbers of one connection
 MOST_NEW_LEVELS = 2000  # of different keys of one name, at first
 NEW_LEVELS_PER_S = 20  # later: Zenoh keeps some of each, about 1 kB, after its session has ended
-MOST_KNOWN = 2048  # keys of one name
+MAX_KNOWN = 2048  # keys of one name
 _DECLARATION_BYTES = 64
 
 
@@ -40,7 +40,7 @@ class NameKeys:
         if whole in self._own or whole in self._known:
             return
         if b"*" in whole and whole not in self._wild:
-            if len(self._wild) >= MOST_WILD:
+            if len(self._wild) >= MAX_WILD:
                 raise RefusedKeyError("too many keys with wildcards")
             self._wild.add(whole)
         now_s = self._now_s()
@@ -50,7 +50,7 @@ class NameKeys:
         if levels > self._levels:
             raise RefusedKeyError("too many new keys")
         self._levels -= levels
-        if len(self._known) >= MOST_KNOWN:
+        if len(self._known) >= MAX_KNOWN:
             del self._known[next(iter(self._known))]
         self._known[whole] = None
 
@@ -76,9 +76,9 @@ class KeyLimits:
 
     def _check(self, key: Key) -> None:
         whole = self._declared.get(key.scope, b"") + key.suffix
-        if len(whole) > MOST_KEY_BYTES or whole.count(b"/") >= MOST_LEVELS:
+        if len(whole) > MOST_KEY_BYTES or whole.count(b"/") >= MAX_LEVELS:
             raise RefusedKeyError("a key too long")
-        if whole.count(b"**") + whole.count(b"$*") > MOST_BRANCHES:
+        if whole.count(b"**") + whole.count(b"$*") > MAX_BRANCHES:
             raise RefusedKeyError("a key with too many wildcards")
         if key.declared_as and key.declared_as not in self._declared:
             self._declared[key.declared_as] = whole

@@ -3,12 +3,12 @@
 import pytest
 
 from lcf_edge.gate.key_limits import (
-    MOST_BRANCHES,
+    MAX_BRANCHES,
+    MAX_LEVELS,
+    MAX_WILD,
     MOST_DECLARED_BYTES,
     MOST_KEY_BYTES,
-    MOST_LEVELS,
     MOST_NEW_LEVELS,
-    MOST_WILD,
     NEW_LEVELS_PER_S,
     KeyLimits,
     NameKeys,
@@ -59,9 +59,9 @@ def test_the_keys_of_a_planner_pass(limits: KeyLimits) -> None:
 @pytest.mark.parametrize(
     "key",
     [
-        "/".join(["**", "a"] * (MOST_BRANCHES + 1)),
-        "$*".join("a" * (MOST_BRANCHES + 2)),
-        "/".join("a" * (MOST_LEVELS + 1)),
+        "/".join(["**", "a"] * (MAX_BRANCHES + 1)),
+        "$*".join("a" * (MAX_BRANCHES + 2)),
+        "/".join("a" * (MAX_LEVELS + 1)),
         "a" * (MOST_KEY_BYTES + 1),
     ],
     ids=["levels", "parts", "deep", "long"],
@@ -83,7 +83,7 @@ def test_a_key_is_judged_with_what_it_begins_with(limits: KeyLimits) -> None:
 def test_so_many_different_keys_with_wildcards_are_kept_of_one_name_and_no_more() -> None:
     wild = NameKeys()
     KeyLimits(wild).check(FRAME + declared(1, "**"))
-    for number in range(MOST_WILD - 1):  # each of another connection
+    for number in range(MAX_WILD - 1):  # each of another connection
         KeyLimits(wild).check(FRAME + declared(1, "**") + subscribed(f"/{number}", 1))
     KeyLimits(wild).check(FRAME + subscribed("**/0") + asked("lcf/*") + sent("lcf/*", b""))
     with pytest.raises(RefusedKeyError, match="too many keys with wildcards"):
