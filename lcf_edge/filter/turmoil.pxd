@@ -25,6 +25,7 @@ cdef double MIN_S
 cdef double MET_S
 cdef double SLOW_MPS
 cdef int NONE
+cdef double INFINITY
 
 cdef class Turmoil:
     cdef readonly int across, down
@@ -60,6 +61,8 @@ cdef void join_cells(Turmoil turmoil) noexcept nogil
 @cython.locals(k=int, g=int)
 cdef void gather(Turmoil turmoil) noexcept nogil
 cdef bint is_believed(Turmoil turmoil, int g) noexcept nogil
+@cython.locals(nearest=int, least=double, meets=bint)
+cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(k=int, found=double, lost=double)

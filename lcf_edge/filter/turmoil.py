@@ -35,6 +35,7 @@ MIN_S = 0.15  # that it lasts before it is believed
 MET_S = 1.0  # what is met later than this is found again
 SLOW_MPS = 0.5  # and by a slower vehicle, all that is farther off than it drives in that time
 NONE = int(Cause.NONE)
+INFINITY = float("inf")
 
 
 class Turmoil:
@@ -270,6 +271,22 @@ def is_shown_by(circles: CircleColumns, c: int) -> bool:
     return circles.active[c] != 0 and circles.cause[c] == NONE
 
 
+def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settings) -> int:
+    """The circle that shows a place, -1: none. One in turmoil shows it if their boxes meet: what hides others comes in
+    so fast that the middle of what it hides leaps.
+    """
+    width = shared.EXTENT_SIGMAS * math.sqrt(turmoil.members.variance_x[g])
+    height = shared.EXTENT_SIGMAS * math.sqrt(turmoil.members.variance_y[g])
+    nearest, least = -1, INFINITY
+    for c in range(circles.capacity):
+        if is_shown_by(circles, c):
+            dx, dy = circles.x[c] - turmoil.members.x[g], circles.y[c] - turmoil.members.y[g]
+            meets = 2 * math.fabs(dx) < circles.width[c] + width and 2 * math.fabs(dy) < circles.height[c] + height
+            if meets and lengths.of(dx, dy) < least:
+                nearest, least = c, lengths.of(dx, dy)
+    return nearest if nearest >= 0 else shared.nearest_circle(turmoil.members, g, circles, settings)
+
+
 def tell(circles: CircleColumns, c: int, around: Situation) -> None:
     """Nothing is known of how a circle in turmoil moves; it is no farther than the ground that is seen under it."""
     circles.cause[c] = NONE
@@ -311,7 +328,7 @@ def update(
     for g in range(turmoil.across * turmoil.down):
         if turmoil.place[g] != g or not is_believed(turmoil, g):
             continue
-        c = shared.nearest_circle(turmoil.members, g, circles, settings)
+        c = circle_of(turmoil, g, circles, settings)
         if c < 0:
             evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)

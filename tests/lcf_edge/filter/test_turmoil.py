@@ -282,6 +282,17 @@ def test_other_reasons_to_lose_what_was_trusted_are_none(slow: Any, changes: dic
     assert not any(covered(replace(Cover(slow), **changes)))
 
 
+def test_what_sweeps_over_the_whole_picture_is_one_circle_until_it_covers_it_and_then(slow: Any) -> None:
+    """A car that crosses right before the camera leaps a quarter of the picture in each frame."""
+    sweeps = Cover(slow, right_px=700.0, step_px=150.0)
+    tables, told = LineCircleFilter(CONFIG, slow.lens), []
+    for corners, motion in sweeps:
+        tables.step(corners, motion)
+        told.append([int(tables.rebel.id[c]) for c in reported(tables)])
+    assert told[17]
+    assert told[19] == told[17]
+
+
 @pytest.mark.parametrize("all_of_it", [True, False])
 def test_a_picture_in_which_hardly_an_edge_is_found_is_covered(calm: Any, all_of_it: bool) -> None:
     tables, _ = after(Storm(calm, all_of_it=all_of_it))
