@@ -450,7 +450,7 @@ def test_an_interrupt_is_quiet_and_leaves_whole_lines(recording: Path, tmp_path:
     results = tmp_path / "results.fifo"
     os.mkfifo(results)
     with subprocess.Popen(
-        [*COMMAND, "replay", str(recording), "--realtime", "-o", str(results)],
+        [*COMMAND, "replay", str(recording), "--speed", "0.1", "-o", str(results)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
     ) as replay:
