@@ -120,9 +120,11 @@ def predict(circles: CircleColumns, around: Situation) -> None:
 
     Without a time to contact, the centre goes on as it went. What covers the picture stays there.
     """
+    if around.is_blind:
+        return
     least_s = MIN_TTC_SHARE * around.horizon_s
     for c in range(circles.capacity):
-        if not circles.active[c] or around.is_blind:
+        if not circles.active[c]:
             continue
         grow = 1.0
         if math.isfinite(circles.ttc[c]) and circles.ttc[c] > least_s:

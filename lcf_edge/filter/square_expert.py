@@ -805,11 +805,12 @@ def go_on_in_turmoil(
         if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
             objects.unseen_s[o], objects.state[o], objects.support[o] = 0.0, SEEN, circles.support[c]
             objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
+            if objects.looming[o] * around.dt_s > MAX_LAG:
+                take_place(objects, o, circles, c, around)
+                return True
             half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
             left, right = circles.x[c] - half_width, circles.x[c] + half_width
             fit(objects, o, left, right, circles.y[c] - half_height, circles.y[c] + half_height, around)
-            if objects.looming[o] * around.dt_s > MAX_LAG:
-                take_place(objects, o, circles, c, around)
             return True
     return False
 

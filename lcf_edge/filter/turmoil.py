@@ -17,7 +17,6 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the picture
 ACROSS = 20  # cells in a row; a place is judged with those around it
 HALF_LIFE_S = 0.15  # of what was counted
 MIN_EDGES = 25.0  # counted in a place lately,
@@ -26,6 +25,7 @@ FOUND_SHARE = 0.1  # of them, that are found at most lately,
 FOUND_NOW_SHARE = 0.2  # and in this frame; more than that elsewhere,
 FOUND_ELSEWHERE = 0.35  # and lately this share, where edges are found at all
 LOST_STILL_SHARE = 0.3  # of them, that are found at most where a circle goes on
+BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the picture
 MIN_HIDDEN = 6.0  # trusted edges of a place, that are lost in this frame
 HIDDEN_FOUND_SHARE = 0.05  # of these, that are found all the same, where something is in front of them
 MIN_HIDDEN_CELLS = 6  # of a place, that are hidden: smaller ones show what passes far off

@@ -13,9 +13,9 @@ from lcf_edge.gate.zenoh_batches import Key, keys
 MAX_LEVELS = 20
 MAX_BRANCHES = 2  # ``**`` and ``$*`` in one key
 MAX_WILD = 16  # different keys with wildcards that Zenoh keeps of one name, ever
-MOST_KEY_BYTES = 512
-MOST_DECLARED_BYTES = 2**17  # of all keys and numbers of one connection
-MOST_NEW_LEVELS = 2000  # of different keys of one name, at first
+MAX_KEY_BYTES = 512
+MAX_DECLARED_BYTES = 2**17  # of all keys and numbers of one connection
+MAX_NEW_LEVELS = 2000  # of different keys of one name, at first
 NEW_LEVELS_PER_S = 20  # later: Zenoh keeps some of each, about 1 kB, after its session has ended
 MAX_KNOWN = 2048  # keys of one name
 _DECLARATION_BYTES = 64
@@ -33,7 +33,7 @@ class NameKeys:
         self._now_s = now_s
         self._wild: set[bytes] = set()
         self._known: dict[bytes, None] = {}  # the oldest first
-        self._levels, self._since_s = float(MOST_NEW_LEVELS), now_s()
+        self._levels, self._since_s = float(MAX_NEW_LEVELS), now_s()
 
     def keep(self, whole: bytes) -> None:
         """Zenoh will keep a key. Raises ``RefusedKeyError`` if it is one too many."""
@@ -44,7 +44,7 @@ class NameKeys:
                 raise RefusedKeyError("too many keys with wildcards")
             self._wild.add(whole)
         now_s = self._now_s()
-        self._levels = min(self._levels + (now_s - self._since_s) * NEW_LEVELS_PER_S, MOST_NEW_LEVELS)
+        self._levels = min(self._levels + (now_s - self._since_s) * NEW_LEVELS_PER_S, MAX_NEW_LEVELS)
         self._since_s = now_s
         levels = whole.count(b"/") + 1
         if levels > self._levels:
@@ -76,7 +76,7 @@ class KeyLimits:
 
     def _check(self, key: Key) -> None:
         whole = self._declared.get(key.scope, b"") + key.suffix
-        if len(whole) > MOST_KEY_BYTES or whole.count(b"/") >= MAX_LEVELS:
+        if len(whole) > MAX_KEY_BYTES or whole.count(b"/") >= MAX_LEVELS:
             raise RefusedKeyError("a key too long")
         if whole.count(b"**") + whole.count(b"$*") > MAX_BRANCHES:
             raise RefusedKeyError("a key with too many wildcards")
@@ -92,5 +92,5 @@ class KeyLimits:
 
     def _count(self, whole: bytes) -> None:
         self._declared_bytes += len(whole) + _DECLARATION_BYTES
-        if self._declared_bytes > MOST_DECLARED_BYTES:
+        if self._declared_bytes > MAX_DECLARED_BYTES:
             raise RefusedKeyError("too many keys")

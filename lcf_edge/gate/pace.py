@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-MOST_PER_S = 2000  # messages of one connection; a speed comes a hundred times a second
+MAX_PER_S = 2000  # messages of one connection; a speed comes a hundred times a second
 AT_ONCE = 200
 
 
@@ -16,5 +16,5 @@ class Pace:
     def wait_s(self, messages: int) -> float:
         """Return how long to wait before more is read, after so many messages."""
         now_s = self._now_s()
-        self._due_s = max(self._due_s, now_s - AT_ONCE / MOST_PER_S) + messages / MOST_PER_S
+        self._due_s = max(self._due_s, now_s - AT_ONCE / MAX_PER_S) + messages / MAX_PER_S
         return max(self._due_s - now_s, 0.0)

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 LENGTH_BYTES = 2  # before each batch, little endian
 GREETINGS = 2  # batches of one message each, in which Zenoh looks for nothing else
 
-MOST_NUMBER_BYTES = 9  # of 7 bits
+MAX_NUMBER_BYTES = 9  # of 7 bits
 
 _KIND = 0x1F  # of a message's first byte; the rest are flags
 _Z = 0x80  # extensions follow
@@ -78,7 +78,7 @@ class _Reading:
 
     def _number(self, most: int = 2**63 - 1) -> int:
         value = 0
-        for shift in range(0, 7 * MOST_NUMBER_BYTES, 7):
+        for shift in range(0, 7 * MAX_NUMBER_BYTES, 7):
             byte = self._byte()
             value |= (byte & 0x7F) << shift
             if byte < 0x80:
@@ -134,7 +134,7 @@ class _Reading:
 
     def _long_number(self) -> None:
         """Of up to ten bytes: 64 bits."""
-        for _ in range(MOST_NUMBER_BYTES + 1):
+        for _ in range(MAX_NUMBER_BYTES + 1):
             if self._byte() < 0x80:
                 return
         raise NotUnderstoodError

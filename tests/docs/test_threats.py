@@ -29,15 +29,15 @@ def test_the_bounds_of_the_gate() -> None:
 
 
 def test_what_a_party_may_say() -> None:
-    levels, most_bytes = key_limits.MAX_LEVELS, key_limits.MOST_KEY_BYTES
+    levels, most_bytes = key_limits.MAX_LEVELS, key_limits.MAX_KEY_BYTES
     assert key_limits.MAX_BRANCHES == 2
     assert f"a key of more than {levels} levels, {most_bytes} bytes or two of `**` and `$*`" in DOCUMENT
     assert f"more than {key_limits.MAX_WILD} different keys with wildcards of one name" in DOCUMENT
-    assert f"more than {key_limits.MOST_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
-    most, per_s = key_limits.MOST_NEW_LEVELS, key_limits.NEW_LEVELS_PER_S
+    assert f"more than {key_limits.MAX_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
+    most, per_s = key_limits.MAX_NEW_LEVELS, key_limits.NEW_LEVELS_PER_S
     assert f"different keys of one name may have {most} levels in all, and {per_s} more a second" in DOCUMENT
     assert f"hears of it after {'a second' if gate.PENALTY_S == 1 else gate.PENALTY_S}" in DOCUMENT
-    assert f"the gate reads {pace.MOST_PER_S} messages a second" in DOCUMENT
+    assert f"the gate reads {pace.MAX_PER_S} messages a second" in DOCUMENT
 
 
 def test_the_bounds_of_the_daemon() -> None:

@@ -4,11 +4,11 @@ import pytest
 
 from lcf_edge.gate.key_limits import (
     MAX_BRANCHES,
+    MAX_DECLARED_BYTES,
+    MAX_KEY_BYTES,
     MAX_LEVELS,
+    MAX_NEW_LEVELS,
     MAX_WILD,
-    MOST_DECLARED_BYTES,
-    MOST_KEY_BYTES,
-    MOST_NEW_LEVELS,
     NEW_LEVELS_PER_S,
     KeyLimits,
     NameKeys,
@@ -62,7 +62,7 @@ def test_the_keys_of_a_planner_pass(limits: KeyLimits) -> None:
         "/".join(["**", "a"] * (MAX_BRANCHES + 1)),
         "$*".join("a" * (MAX_BRANCHES + 2)),
         "/".join("a" * (MAX_LEVELS + 1)),
-        "a" * (MOST_KEY_BYTES + 1),
+        "a" * (MAX_KEY_BYTES + 1),
     ],
     ids=["levels", "parts", "deep", "long"],
 )
@@ -93,7 +93,7 @@ def test_so_many_different_keys_with_wildcards_are_kept_of_one_name_and_no_more(
 def test_different_keys_of_one_name_are_few_at_first_and_fewer_later() -> None:
     now_s = 0.0
     name = NameKeys([b"lcf/scene"], lambda: now_s)
-    for number in range(MOST_NEW_LEVELS // 2):  # each of another connection
+    for number in range(MAX_NEW_LEVELS // 2):  # each of another connection
         KeyLimits(name).check(FRAME + subscribed(f"a/{number}"))
     with pytest.raises(RefusedKeyError, match="too many new keys"):
         KeyLimits(name).check(FRAME + subscribed("a/b"))
@@ -112,11 +112,11 @@ def test_a_number_stands_for_one_key_even_if_it_was_taken_back(limits: KeyLimits
 
 
 def test_what_one_connection_declares_is_bounded(limits: KeyLimits) -> None:
-    most = MOST_DECLARED_BYTES // MOST_KEY_BYTES
-    few = [subscribed(f"{number:0{MOST_KEY_BYTES}}") for number in range(most // 2)]
+    most = MAX_DECLARED_BYTES // MAX_KEY_BYTES
+    few = [subscribed(f"{number:0{MAX_KEY_BYTES}}") for number in range(most // 2)]
     for _ in range(9):
         limits.check(FRAME + b"".join(few))  # the same again: no more than once
-    more = [subscribed(f"{number:0{MOST_KEY_BYTES}}") for number in range(most // 2, most)]
+    more = [subscribed(f"{number:0{MAX_KEY_BYTES}}") for number in range(most // 2, most)]
     assert sum(_passes(limits, FRAME + one) for one in more) < len(more)
 
 

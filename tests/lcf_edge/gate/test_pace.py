@@ -1,6 +1,6 @@
 """How fast a party may speak."""
 
-from lcf_edge.gate.pace import AT_ONCE, MOST_PER_S, Pace
+from lcf_edge.gate.pace import AT_ONCE, MAX_PER_S, Pace
 
 NOW_S = [0.0]
 
@@ -26,5 +26,5 @@ def test_so_many_may_come_at_once() -> None:
 
 
 def test_a_flood_is_slowed_down_to_what_is_allowed() -> None:
-    assert waited_s(1, 10 * MOST_PER_S, 0.0) > 9.0
-    assert waited_s(MOST_PER_S, 10, 0.0) > 9.0
+    assert waited_s(1, 10 * MAX_PER_S, 0.0) > 9.0
+    assert waited_s(MAX_PER_S, 10, 0.0) > 9.0

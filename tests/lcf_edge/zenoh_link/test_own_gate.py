@@ -19,7 +19,7 @@ from lcf_edge.cdr import decode_diagnostics
 from lcf_edge.config import Publish, Zenoh
 from lcf_edge.errors import PublishError
 from lcf_edge.gate.entrances import MAX_OF_ONE_USER
-from lcf_edge.gate.key_limits import MOST_NEW_LEVELS
+from lcf_edge.gate.key_limits import MAX_NEW_LEVELS
 from lcf_edge.tallies import PLACES
 from lcf_edge.zenoh_link.own_gate import OwnGate, behind, gated
 
@@ -104,7 +104,7 @@ def test_who_comes_again_and_again_with_other_keys_fills_no_memory_and_no_places
     planner.subscribe("lcf/diagnostics")
     link_status(planner)
     for number in range(COMERS):
-        local().tell("offer_many", key=f"lcf/{number}", count=MOST_NEW_LEVELS // 3)
+        local().tell("offer_many", key=f"lcf/{number}", count=MAX_NEW_LEVELS // 3)
     assert until(planner, "gate refused")
     assert local().get("lcf/query/schema")
     values = link_status(planner)
