@@ -24,7 +24,7 @@ from typing import Any
 import msgspec
 
 from drivers.camera import libcamera_process
-from drivers.camera.luminance import least_stride
+from drivers.camera.luminance import min_stride
 from hil_mocks.v4l2_device import drawn_image, encode
 
 SENSOR_TIMESTAMP = "SensorTimestamp"
@@ -157,7 +157,7 @@ class Configuration:
         if mode is not None and mode.bit_depth != 10:
             return Status.Invalid
         stream.size = Size(min(stream.size.width, FULL[0]), min(stream.size.height, FULL[1]))
-        stride = least_stride(libcamera_process.PIXEL_FORMATS[stream.pixel_format], stream.size.width)
+        stride = min_stride(libcamera_process.PIXEL_FORMATS[stream.pixel_format], stream.size.width)
         stream.stride = stride + self._world.padding
         return Status.Adjusted  # the colour space always is
 

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.camera import v4l2_ioctl as v4l2
-from drivers.camera.luminance import least_stride
+from drivers.camera.luminance import min_stride
 from drivers.clock import Clock
 
 Grey = npt.NDArray[np.uint8]
@@ -269,7 +269,7 @@ class MockKernel:
         answer.pixelformat = v4l2.fourcc(file.pixel_format)
         answer.field = file.camera.field
         plane = answer.planes[0] if isinstance(answer, v4l2.PlanesFormat) else answer
-        stride = least_stride(file.pixel_format, file.width)
+        stride = min_stride(file.pixel_format, file.width)
         plane.bytesperline = stride + file.camera.row_padding if stride else 0
         plane.sizeimage = file.height * max(plane.bytesperline, 2 * file.width)
 

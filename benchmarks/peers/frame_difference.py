@@ -68,8 +68,8 @@ class FrameDifference:
         """Connected parts of the mask, of the columns that stand in the way."""
         foot = mask.shape[0] - 1 - np.argmax(mask[::-1] > 0, axis=0)
         range_m, lateral_m = self._stands(foot)
-        least_m = min(_TALL_M, _TALL_SHARE * self._config.camera.height_m)
-        tall = _SHRINK * np.count_nonzero(mask, axis=0) > least_m * self._ego.focal_px / range_m
+        min_m = min(_TALL_M, _TALL_SHARE * self._config.camera.height_m)
+        tall = _SHRINK * np.count_nonzero(mask, axis=0) > min_m * self._ego.focal_px / range_m
         ttc = range_m / np.float32(self._ego.speed_mps)
         vehicle = self._config.vehicle
         in_way: Mask = tall & (ttc < vehicle.horizon_s) & (np.abs(lateral_m) < vehicle.half_width_m)

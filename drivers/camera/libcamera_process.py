@@ -300,9 +300,9 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
 def _within(known: dict[str, Any], name: str, what: str, value: float) -> float:
     if name not in known:
         raise Refused("unsupported", f"{what} cannot be set; leave it unset")
-    least, most = _first(known[name][1].min) or 0, _first(known[name][1].max) or math.inf
-    if not least <= value <= most:
-        raise Refused("unsupported", f"{what} cannot be {value:g}; choose {least:g} to {most:g}, or leave it unset")
+    low, high = _first(known[name][1].min) or 0, _first(known[name][1].max) or math.inf
+    if not low <= value <= high:
+        raise Refused("unsupported", f"{what} cannot be {value:g}; choose {low:g} to {high:g}, or leave it unset")
     return value
 
 

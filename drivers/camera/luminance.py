@@ -122,7 +122,7 @@ class FrameError(DriverError):
     """One image that cannot be used; the text says why in two or three words, for counting."""
 
 
-def least_stride(pixel_format: str, width: int) -> int:
+def min_stride(pixel_format: str, width: int) -> int:
     """Bytes from one row to the next where the device does not say; 0 for MJPG."""
     return _LAYOUTS[pixel_format].row(width) if pixel_format in _LAYOUTS else 0
 

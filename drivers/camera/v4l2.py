@@ -17,7 +17,7 @@ from collections.abc import Sequence
 from drivers.camera import by_hand, controls, offers
 from drivers.camera.arrival import Arrivals
 from drivers.camera.find import cameras, open_camera_node
-from drivers.camera.luminance import PIXEL_FORMATS, REDUCTIONS, FrameError, Grey, least_stride, luminance
+from drivers.camera.luminance import PIXEL_FORMATS, REDUCTIONS, FrameError, Grey, luminance, min_stride
 from drivers.camera.mode import Mode
 from drivers.camera.v4l2_buffers import Buffers, Filled, buffers_of
 from drivers.camera.v4l2_errors import NOT_IMPLEMENTED, as_driver_errors, started
@@ -203,7 +203,7 @@ def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, heigh
     granted_fps = _set_rate(node, fps)
     if abs(granted_fps / fps - 1) > offers.RATE_TOLERANCE:
         raise refusal
-    return Mode(name, width, height, max(granted.stride, least_stride(name, width)), granted_fps, reduction)
+    return Mode(name, width, height, max(granted.stride, min_stride(name, width)), granted_fps, reduction)
 
 
 def _set_rate(node: Node, fps: float) -> float:

@@ -89,8 +89,8 @@ def _choose(attribute: Path, available: Path, target: float) -> None:
     text = text_of(available)
     try:
         if text.startswith("["):
-            least, _, most = map(float, text.strip("[]").split())
-            choice = f"{min(max(target, least), most):g}"
+            low, _, high = map(float, text.strip("[]").split())
+            choice = f"{min(max(target, low), high):g}"
         else:
             choice = min(text.split(), key=lambda offered: abs(float(offered) - target), default=f"{target:g}")
     except ValueError as error:

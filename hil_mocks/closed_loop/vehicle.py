@@ -28,7 +28,7 @@ class Build:
     drive_lag_s: float = 0.12
     steering_lag_s: float = 0.12
     steering_radps: float = 1.5  # fastest turn of the bicycle's wheel
-    most_steering_rad: float = 0.6
+    max_steering_rad: float = 0.6
 
 
 class Vehicle:
@@ -97,7 +97,7 @@ class Vehicle:
         share = -math.expm1(-dt_s / build.steering_lag_s)
         if build.kind == "bicycle":
             angle = math.atan(build.wheelbase_m * curvature)
-            angle = min(max(angle, -build.most_steering_rad), build.most_steering_rad)
+            angle = min(max(angle, -build.max_steering_rad), build.max_steering_rad)
             most = build.steering_radps * dt_s
             self._steering_rad += min(max(share * (angle - self._steering_rad), -most), most)
             self.yaw_rate_radps = speed * math.tan(self._steering_rad) / build.wheelbase_m

@@ -165,7 +165,7 @@ class Lsm6dsv(Lsm6dso):
     power_on: ClassVar[Mapping[int, int]] = {0x0F: 0x70, 0x12: 0x44}
     status_register = 0x1B
     fifo_words = 256
-    least_force_mg = 0.061  # by FS_XL: this, twice, four, eight times as much
+    min_force_mg = 0.061  # by FS_XL: this, twice, four, eight times as much
 
     def rate_hz(self) -> float:
         """Sample rate; 0 switched off. Each code but the first two is twice the one before."""
@@ -174,10 +174,10 @@ class Lsm6dsv(Lsm6dso):
 
     def per_count(self) -> tuple[float, float]:
         """What a count is worth: m°/s, mg."""
-        return 4.375 * 2 ** (self.registers[0x15] & 15), self.least_force_mg * 2 ** (self.registers[0x17] & 3)
+        return 4.375 * 2 ** (self.registers[0x15] & 15), self.min_force_mg * 2 ** (self.registers[0x17] & 3)
 
 
 class Lsm6dsv32(Lsm6dsv):
     """LSM6DSV32X: an LSM6DSV of twice the acceleration, with the same identity."""
 
-    least_force_mg = 0.122
+    min_force_mg = 0.122

@@ -75,7 +75,7 @@ class Figures:
             f"the wild IMU: {self.excess_bytes / 1e6:.1f} MB dropped and counted",
         ]
 
-    def judge(self, least_share: float) -> None:
+    def judge(self, min_share: float) -> None:
         """Complain of what must not be; of frames, where fewer than this share came."""
         for complaint, wrong in (
             (
@@ -86,7 +86,7 @@ class Figures:
             ("no page was served", not self.pages),
             ("nothing of the wild IMU was dropped", not self.excess_bytes),
             (f"the daemon took {self.memory_mib:.0f} MiB", self.memory_mib > BUDGET_MIB + BEYOND_MIB),
-            (f"only {self.frames_share:.0%} of the frames", self.frames_share < least_share),
+            (f"only {self.frames_share:.0%} of the frames", self.frames_share < min_share),
         ):
             if wrong:
                 self.complaints.append(complaint)
@@ -106,7 +106,7 @@ def free_ports(count: int) -> list[int]:
     return ports
 
 
-def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Figures:
+def besiege(seconds: float, folder: Path, min_share: float = MIN_SHARE) -> Figures:
     """For so long. Raises ``LcfError`` where it cannot begin."""
     local, inner, outer, page_port, metrics_port = free_ports(5)
     certificates(folder / "tls")
@@ -167,7 +167,7 @@ def besiege(seconds: float, folder: Path, least_share: float = MIN_SHARE) -> Fig
                 figures.complaints.append(f"{process.name}: ended with status {status}: {(process.said or [''])[-1]}")
             if any("Traceback" in line for line in process.said) or len(process.said) > MAX_LINES:
                 figures.complaints.append(f"{process.name}: {len(process.said)} lines in its log, or a traceback")
-    figures.judge(least_share)
+    figures.judge(min_share)
     return figures
 
 
@@ -247,6 +247,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     parser.add_argument("--seconds", type=float, default=60.0, metavar="N", help="of the siege (%(default)g)")
     parser.add_argument(
         "--least-share",
+        dest="min_share",
         type=float,
         default=MIN_SHARE,
         metavar="SHARE",
@@ -255,7 +256,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     with TemporaryDirectory(prefix="lcf-edge-siege-") as folder:
         try:
-            figures = besiege(arguments.seconds, Path(folder), arguments.least_share)
+            figures = besiege(arguments.seconds, Path(folder), arguments.min_share)
         except LcfError as error:
             sys.stderr.write(f"{error}\n")
             return error.exit_status

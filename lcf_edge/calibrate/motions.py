@@ -45,7 +45,7 @@ class Step:
 
     prompt: str
     name: str
-    least_rad: float = 0.0
+    min_rad: float = 0.0
     axis: tuple[float, float, float] | None = None
     tips: bool = False
 
@@ -145,10 +145,10 @@ class Motions:
         step = STEPS[self._step]
         up = np.mean([sample.accel for sample in window], axis=0)
         tilt_rad = _between(up, rest.force_mps2)
-        if (tilt_rad < step.least_rad) if step.tips else (tilt_rad > _LEVEL_RAD):
+        if (tilt_rad < step.min_rad) if step.tips else (tilt_rad > _LEVEL_RAD):
             return False
         if step.axis is not None:
-            if self.turned_rad < step.least_rad:
+            if self.turned_rad < step.min_rad:
                 return False
             self.turns[step.name] = cv2.Rodrigues(self._rotation)[0].ravel().astype(np.float64)
         self._step += 1

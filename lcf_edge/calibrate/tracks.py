@@ -40,14 +40,14 @@ class Tracks:
 class Tracker:
     """Follows corners; ``left_out`` counts unusable intervals by reason.
 
-    The next interval begins when the median corner has moved ``least_motion_px``, after ``most_frames`` images at
+    The next interval begins when the median corner has moved ``min_motion_px``, after ``max_frames`` images at
     the latest.
     """
 
-    def __init__(self, lens: Lens, least_motion_px: float = 0.0, most_frames: int = 1) -> None:
+    def __init__(self, lens: Lens, min_motion_px: float = 0.0, max_frames: int = 1) -> None:
         self.left_out: Counter[str] = Counter()
         self._lens = lens
-        self._least_motion_px, self._most_frames = least_motion_px, most_frames
+        self._min_motion_px, self._max_frames = min_motion_px, max_frames
         self._first: Frame | None = None
         self._last: Frame | None = None
         self._start = self._now = np.empty((0, 2), np.float32)
@@ -71,7 +71,7 @@ class Tracker:
             self._begin(frame)
             return None
         moved_px = float(np.median(np.hypot(*(self._now - self._start).T)))
-        if moved_px < self._least_motion_px and self._frames < self._most_frames:
+        if moved_px < self._min_motion_px and self._frames < self._max_frames:
             return None
         tracks = Tracks(self._first.stamp_ns, frame.stamp_ns, *self._rays(self._start, self._now))
         self._begin(frame)

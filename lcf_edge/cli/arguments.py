@@ -282,14 +282,14 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
 
-def _number(least: float, most: float) -> Callable[[str], float]:
+def _number(low: float, high: float) -> Callable[[str], float]:
     def read(text: str) -> float:
         try:
             number = float(text)
         except ValueError:
             number = math.nan
-        if not least <= number <= most:  # also refuses NaN
-            raise argparse.ArgumentTypeError(f"{text}: write a number between {least:g} and {most:g}")
+        if not low <= number <= high:  # also refuses NaN
+            raise argparse.ArgumentTypeError(f"{text}: write a number between {low:g} and {high:g}")
         return number
 
     return read
@@ -315,10 +315,10 @@ def _positive(text: str) -> float:
     return number
 
 
-def _whole(least: int, most: int) -> Callable[[str], int]:
+def _whole(low: int, high: int) -> Callable[[str], int]:
     def read(text: str) -> int:
-        if not text.isdecimal() or not least <= int(text) <= most:
-            raise argparse.ArgumentTypeError(f"{text}: write a number between {least} and {most}")
+        if not text.isdecimal() or not low <= int(text) <= high:
+            raise argparse.ArgumentTypeError(f"{text}: write a number between {low} and {high}")
         return int(text)
 
     return read

@@ -81,7 +81,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         say(f"3/5 filtering and publishing: {folder / 'results.jsonl'}")
         summary = Summary(config.memory)
         rebels: dict[int, list[tuple[float, float, Cause]]] = {}
-        most_psi = (0, 0)
+        max_psi = (0, 0)
         sinks: list[Sink] = [stack.enter_context(ResultsSink(str(folder / "results.jsonl")))]
         if plot is not None:
             sinks.append(plot)
@@ -92,7 +92,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
                 sink.put(frame, scene, outcome.view)
             summary.add(scene)
             rebels[scene.seq] = trusted_rebels(scene, config.filter.tr_s)
-            most_psi = max(most_psi, (scene.sizes.psi, scene.seq))
+            max_psi = max(max_psi, (scene.sizes.psi, scene.seq))
         received = _finish(subscriber, publisher.sent)
         memory_mib = peak_resident_mib()
 
@@ -100,7 +100,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
     _write(folder / "config.toml", to_toml(config).encode())
     threats = findings(scenes.truths(drive), rebels)
     found_seqs = [threat.found_seq for threat in threats if threat.found_seq is not None]
-    drawn = sorted({most_psi[1], *found_seqs[: DRAWN_FRAMES - 1]})
+    drawn = sorted({max_psi[1], *found_seqs[: DRAWN_FRAMES - 1]})
     say(f"4/5 drawing what the filter saw: {folder}")
     _draw(recording, config, folder, drawn, video)
     if plot is not None:

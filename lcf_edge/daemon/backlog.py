@@ -33,13 +33,13 @@ class Backlog(Generic[Item]):
                 self.dropped += 1
             return fits
 
-    def take(self, most_bytes: int, timeout_s: float) -> list[Item]:
-        """Remove and return items from the front: ``most_bytes`` at most, but at least one; empty: none in time."""
+    def take(self, max_bytes: int, timeout_s: float) -> list[Item]:
+        """Remove and return items from the front: ``max_bytes`` at most, but at least one; empty: none in time."""
         with self._changed:
             self._changed.wait_for(lambda: self._items or self._closed, timeout_s)
             taken: list[Item] = []
             taken_bytes = 0
-            while self._items and (not taken or taken_bytes + self._items[0][1] <= most_bytes):
+            while self._items and (not taken or taken_bytes + self._items[0][1] <= max_bytes):
                 item, size_bytes = self._items.popleft()
                 taken.append(item)
                 taken_bytes += size_bytes

@@ -148,9 +148,9 @@ class DiskWriter(threading.Thread):
 
     def _check_room(self) -> None:
         """Raise ``OSError`` if no more of the disk may be used."""
-        least_mib = self.config.record.free_mib
-        if least_mib and free_mib(self._destination.folder) < least_mib:
-            raise OSError(errno.ENOSPC, f"less than record.free_mib = {least_mib:g} MiB are free")
+        min_mib = self.config.record.free_mib
+        if min_mib and free_mib(self._destination.folder) < min_mib:
+            raise OSError(errno.ENOSPC, f"less than record.free_mib = {min_mib:g} MiB are free")
 
     def _fail(self, error: OSError) -> None:
         where = self.file.path if self.file else self._destination.folder

@@ -134,7 +134,7 @@ class Health:
         counts: Mapping[str, int] = {**self._link.counts, "descriptor shortages": self._reserve.shortages}
         sessions = self._link.sessions
         values = {"sessions": str(sessions)} | {name: str(count) for name, count in sorted(counts.items())}
-        if sessions >= self._link.most_sessions:
+        if sessions >= self._link.max_sessions:
             return DeviceStatus("link", Level.WARN, f"{sessions} sessions: nobody else is let in", values)
         if self._reserve.short:
             return DeviceStatus("link", Level.WARN, "connections use up all file descriptors", values)

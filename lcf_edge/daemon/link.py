@@ -42,7 +42,7 @@ class Link(Protocol):
         """Set the answer to queries for the configuration."""
         ...
 
-    most_sessions: int
+    max_sessions: int
     """Largest number of sessions at a time."""
 
     @property

@@ -27,11 +27,11 @@ class _Timex(ctypes.Structure):
 
 @dataclass(frozen=True, slots=True)
 class SystemClock:
-    """``largest_error_s``: the kernel's estimate of its largest error."""
+    """``max_error_s``: the kernel's estimate of its largest error."""
 
     now_s: float
     synchronised: bool
-    largest_error_s: float
+    max_error_s: float
     resolution_s: float
     source: str  # the kernel's clock source
 
@@ -48,7 +48,7 @@ def judged(clock: SystemClock) -> Iterator[Finding]:
         year = time.gmtime(clock.now_s).tm_year
         yield warn("clock", f"it says {year}: it was never set, and stamps of scenes are wrong", _SET)
     elif clock.synchronised:
-        yield ok("clock", f"synchronised, off by {clock.largest_error_s:.3f} s at most")
+        yield ok("clock", f"synchronised, off by {clock.max_error_s:.3f} s at most")
     else:
         yield warn("clock", "nobody keeps it right: stamps will not agree with those of other computers", _SET)
     if clock.resolution_s > _COARSE_S:

@@ -73,7 +73,6 @@ class EgoMotion:
     speed_mps: float  # forward, mean over the interval, NaN: unknown
     yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
     path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
-    gravity_pitch_rad: float  # of the optical axis over the horizon, up positive, NaN: it has never stood still
     notes: tuple[str, ...]  # what degrades it; docs/replay.md lists them
 
     def to_motion(self) -> Motion:
@@ -321,7 +320,6 @@ class EgoMotionEstimator:
             self._speed_mps,
             yaw_rate_radps,
             self._path_yaw_radps,
-            self._inertial.pitch_rad,
             tuple(interval.notes),
         )
 

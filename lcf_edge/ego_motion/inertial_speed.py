@@ -2,7 +2,7 @@
 
 from collections import deque
 from collections.abc import Sequence
-from math import asin, hypot, inf, nan, sqrt
+from math import hypot, inf, nan, sqrt
 from typing import NamedTuple
 
 import numpy as np
@@ -43,7 +43,6 @@ class InertialSpeed:
     def __init__(self, gyro_noise_radps: float) -> None:
         self.mean_mps = nan  # over the last interval
         self.sigma_mps = inf
-        self.pitch_rad = nan
         self._speed_mps = 0.0
         self._up: tuple[float, float, float] | None = None  # unit vector in camera axes
         self._gravity_mps2 = GRAVITY_MPS2  # as this accelerometer measures it
@@ -83,7 +82,7 @@ class InertialSpeed:
 
     def lose(self) -> None:
         """Make the speed unknown: nothing was measured."""
-        self.mean_mps, self.sigma_mps, self.pitch_rad, self._up = nan, inf, nan, None
+        self.mean_mps, self.sigma_mps, self._up = nan, inf, None
         self._late.clear()
 
     def advance(self, dt_s: float, accel_mps2: Sequence[float], rotation: Floats, gap_s: float) -> None:
@@ -121,4 +120,3 @@ class InertialSpeed:
         """Set the direction of up."""
         size = hypot(x, y, z)
         self._up = x / size, y / size, z / size
-        self.pitch_rad = asin(max(-1.0, min(1.0, z / size)))

@@ -54,7 +54,7 @@ class Link:
         lens_for: LensFor = lens_by_config,
         gate: OwnGate | None = None,
     ) -> None:
-        self.most_sessions = MAX_SESSIONS
+        self.max_sessions = MAX_SESSIONS
         self._config = config
         self._config_text = shown(config)
         self._reopen = reopen

@@ -29,9 +29,9 @@ def test_the_bounds_of_the_gate() -> None:
 
 
 def test_what_a_party_may_say() -> None:
-    levels, most_bytes = key_limits.MAX_LEVELS, key_limits.MAX_KEY_BYTES
+    levels, max_bytes = key_limits.MAX_LEVELS, key_limits.MAX_KEY_BYTES
     assert key_limits.MAX_BRANCHES == 2
-    assert f"a key of more than {levels} levels, {most_bytes} bytes or two of `**` and `$*`" in DOCUMENT
+    assert f"a key of more than {levels} levels, {max_bytes} bytes or two of `**` and `$*`" in DOCUMENT
     assert f"more than {key_limits.MAX_WILD} different keys with wildcards of one name" in DOCUMENT
     assert f"more than {key_limits.MAX_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
     most, per_s = key_limits.MAX_NEW_LEVELS, key_limits.NEW_LEVELS_PER_S

@@ -11,7 +11,7 @@ from hil_mocks.siege.place import DAEMON_NICE
 
 @pytest.mark.skipif(shutil.which("openssl") is None, reason="no openssl here")
 def test_a_short_siege_is_withstood(tmp_path: Path) -> None:
-    figures = besiege(4.0, tmp_path, least_share=0.0)  # this machine may be busy
+    figures = besiege(4.0, tmp_path, min_share=0.0)  # this machine may be busy
     assert figures.complaints == []
     assert all(waves > 0 for waves in figures.waves.values())
     assert len(figures.waves) == 15

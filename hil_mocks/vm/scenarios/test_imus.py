@@ -64,15 +64,13 @@ def serial_imu(machine: Machine) -> Iterator[SerialImu]:
     imu.join()
 
 
-def wait_for_rate(subscriber: Subscriber, least_hz: float, most_hz: float) -> None:
+def wait_for_rate(subscriber: Subscriber, min_hz: float, max_hz: float) -> None:
     """Wait until the IMU's samples are so far apart; what had piled up before comes first."""
 
     def settled() -> bool:
-        return (
-            "imu" in subscriber.statuses and least_hz <= float(subscriber.statuses["imu"].values["rate_hz"]) <= most_hz
-        )
+        return "imu" in subscriber.statuses and min_hz <= float(subscriber.statuses["imu"].values["rate_hz"]) <= max_hz
 
-    subscriber.wait_for(settled, f"imu at {least_hz:g} to {most_hz:g}/s")
+    subscriber.wait_for(settled, f"imu at {min_hz:g} to {max_hz:g}/s")
 
 
 def test_a_living_chip_on_the_i2c_bus_is_read(daemon: Daemon, subscriber: Subscriber, bus: int) -> None:

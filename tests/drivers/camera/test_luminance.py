@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.camera.luminance import PIXEL_FORMATS, FrameError, least_stride, luminance
+from drivers.camera.luminance import PIXEL_FORMATS, FrameError, luminance, min_stride
 from hil_mocks.v4l2_device import drawn_image, encode
 
 WIDTH, HEIGHT = 64, 48
@@ -18,7 +18,7 @@ JPEG = encode(IMAGE, "MJPG")
 
 
 def read(pixel_format: str, data: bytes, padding: int = 0) -> np.ndarray:
-    stride = least_stride(pixel_format, WIDTH) + padding
+    stride = min_stride(pixel_format, WIDTH) + padding
     return luminance(pixel_format, memoryview(data), WIDTH, HEIGHT, stride)
 
 
@@ -51,7 +51,7 @@ def test_raw_pictures_of_a_sensor_with_colours_give_weighted_sums(pixel_format: 
 def test_a_picture_may_be_of_any_width(pixel_format: str) -> None:
     image = IMAGE[:, :50]
     data = memoryview(encode(image, pixel_format))
-    assert np.array_equal(luminance(pixel_format, data, 50, HEIGHT, least_stride(pixel_format, 50)), image)
+    assert np.array_equal(luminance(pixel_format, data, 50, HEIGHT, min_stride(pixel_format, 50)), image)
 
 
 @pytest.mark.parametrize("reduction", [2, 4, 8])
@@ -94,7 +94,7 @@ def test_a_jpegs_orientation_does_not_turn_the_picture() -> None:
 @pytest.mark.parametrize("pixel_format", RAW)
 def test_too_few_bytes_are_refused(pixel_format: str) -> None:
     data = encode(IMAGE, pixel_format)
-    needed = least_stride(pixel_format, WIDTH) * HEIGHT
+    needed = min_stride(pixel_format, WIDTH) * HEIGHT
     with pytest.raises(FrameError, match="short"):
         read(pixel_format, data[: needed - 1])
 

@@ -178,8 +178,8 @@ def test_rate_is_the_closest_that_the_chip_has(rig: RigMaker, driver: str, asked
     if driver in FEW_RATES_HZ:
         assert bench.device.rate_hz == min(FEW_RATES_HZ[driver], key=lambda offered: abs(offered - asked_hz))
     else:
-        least_hz = 28.1  # that every chip can be slowed to
-        assert bench.device.rate_hz == pytest.approx(asked_hz, rel=0.25) or asked_hz <= bench.device.rate_hz < least_hz
+        min_hz = 28.1  # that every chip can be slowed to
+        assert bench.device.rate_hz == pytest.approx(asked_hz, rel=0.25) or asked_hz <= bench.device.rate_hz < min_hz
     samples = bench.read_for(2)
     assert len(samples) == pytest.approx(2 * bench.device.rate_hz, abs=0.03 * bench.device.rate_hz + 2)
 

@@ -30,7 +30,7 @@ class KeptLink:
         self.closed = 0
         self.charged_mib = 0.0
         self.sessions = 0
-        self.most_sessions = 2
+        self.max_sessions = 2
         self.config: Config | None = None
         self.held = threading.Event()
         self.held.set()

@@ -16,7 +16,7 @@ from lcf_edge.doctor.finding import Context, Finding, Severity
 Machine = Callable[..., Context]
 Write = Callable[[str, str], None]
 NO_FOLDER = Config(record=Record(folder="/no-such-folder"))
-GOOD_CLOCK = SystemClock(1.8e9, synchronised=True, largest_error_s=0.002, resolution_s=1e-9, source="tsc")
+GOOD_CLOCK = SystemClock(1.8e9, synchronised=True, max_error_s=0.002, resolution_s=1e-9, source="tsc")
 RUNNING = {
     "LoadState": "loaded",
     "UnitFileState": "enabled",

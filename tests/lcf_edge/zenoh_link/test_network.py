@@ -305,7 +305,7 @@ def test_each_does_what_the_table_says_and_nothing_else(
 
 WILD = [[f"**/{n}/**" for n in range(3000)]]
 DEEP = [["/".join("a" * 40)], ["**/a/" * 10 + "b"]]
-MOST_GROWN_MIB = 20.0
+MAX_GROWN_MIB = 20.0
 
 
 def resident_mib() -> float:
@@ -327,7 +327,7 @@ def test_a_party_whose_keys_are_too_much_is_cut_before_the_daemon_hears_of_them(
     planner = party("planner")
     assert planner.ask("connected", timeout_s=PATIENCE_S)
     assert len(planner.get("lcf/query/config")) == 1
-    assert resident_mib() < before_mib + MOST_GROWN_MIB
+    assert resident_mib() < before_mib + MAX_GROWN_MIB
 
 
 def test_a_party_that_says_much_keeps_no_other_out(link: Link, rover: zenoh.Session, party: Any) -> None:

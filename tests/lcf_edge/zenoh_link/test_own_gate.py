@@ -25,8 +25,8 @@ from lcf_edge.zenoh_link.own_gate import OwnGate, behind, gated
 
 BUDGET_MIB = 85.0
 ALLOWED_MIB = 10.0
-MOST_BYTES = 3 * 2**30  # of addresses: without a gate it would take all memory
-MOST_MIB = 120.0
+MAX_BYTES = 3 * 2**30  # of addresses: without a gate it would take all memory
+MAX_MIB = 120.0
 PATIENCE = 60  # diagnostics come once a second
 PATIENCE_S = 20.0
 COMERS = 2 * MAX_OF_ONE_USER
@@ -42,7 +42,7 @@ Daemon = subprocess.Popen[str]
 def daemon(without_camera: Callable[..., Daemon]) -> Daemon:
     """As installed, but for the port; it may take no more than a part of this computer."""
     daemon = without_camera(f"memory.budget_mib={BUDGET_MIB}", "camera.width=320", "camera.height=240")
-    resource.prlimit(daemon.pid, resource.RLIMIT_AS, (MOST_BYTES, MOST_BYTES))
+    resource.prlimit(daemon.pid, resource.RLIMIT_AS, (MAX_BYTES, MAX_BYTES))
     return daemon
 
 
@@ -84,7 +84,7 @@ def test_two_keys_that_end_zenoh_do_not_end_the_daemon(
     assert until(planner, "gate refused")
     for _ in range(3):
         assert link_status(planner)
-        assert resident_mib(daemon) < MOST_MIB
+        assert resident_mib(daemon) < MAX_MIB
     assert local().get("lcf/query/schema")
 
 
