@@ -172,7 +172,7 @@ def decode_diagnostics(payload: bytes | memoryview) -> DiagnosticArray:
         try:
             status.append(DeviceStatus(name, Level(number), message, values))
         except ValueError as error:
-            raise CdrError(f"CDR: {number} is no level of a status") from error
+            raise CdrError(f"CDR: {number} is not a status level") from error
         hardware_ids.append(hardware_id)
     return DiagnosticArray(header, hardware_ids[0] if hardware_ids else "", tuple(status))
 
@@ -292,7 +292,7 @@ def decode_scene(payload: bytes | memoryview) -> Scene:
         ("state of an object", objects["state"], ObjectState),
     ):
         if (ids > max(known)).any():  # valid ids are 0 to the largest known
-            raise CdrError(f"CDR: the {name} is none that is known")
+            raise CdrError(f"CDR: the {name} is unknown")
     if _signals(circles) or _signals(psi) or _signals(objects):
         raise CdrError("CDR: a signalling NaN")
     return Scene(header.stamp_ns, seq, width, height, speed, circles, psi, objects=objects)
@@ -417,6 +417,6 @@ class _Reader:
         """Return the start of the next ``size`` bytes, and move beyond them."""
         start = self._at + -self._at % align
         if size > len(self._data) - start:
-            raise CdrError(f"CDR: {size} bytes are wanted at {start}, {max(0, len(self._data) - start)} are left")
+            raise CdrError(f"CDR: {size} bytes are needed at {start}, {max(0, len(self._data) - start)} are left")
         self._at = start + size
         return start

@@ -62,7 +62,7 @@ class Lens:
         if min(self.fx, self.fy) <= 0:
             raise ConfigError("lens: focal lengths must be positive")
         if min(self.width, self.height) < 1 or self.width * self.height > MAX_PIXELS:
-            raise ConfigError(f"lens: {self.width}x{self.height} is no size of a picture")
+            raise ConfigError(f"lens: {self.width}x{self.height} is not an image size")
         side = max(self.width, self.height)
         if not side / WIDEST <= min(self.fx, self.fy) <= max(self.fx, self.fy) <= side * NARROWEST:
             raise ConfigError(f"lens: focal lengths must be {side / WIDEST:g} to {side * NARROWEST} px")

@@ -26,8 +26,8 @@ cdef double right_of_axis(ImagePlane plane, double x) noexcept nogil
 cdef double elevation(ImagePlane plane, double right, double y) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, n=int, square=int, support=cython.uint, owned=bint, right=double)
 cpdef void add_circles(Records records, CircleColumns table, ObjectColumns objects, int kind, ImagePlane plane,
-                       double least_trust) noexcept
+                       double min_trust) noexcept
 @cython.locals(i=cython.Py_ssize_t, n=int, support=cython.uint, right=double)
-cpdef void add_objects(Records records, ObjectColumns table, ImagePlane plane, double least_trust) noexcept
+cpdef void add_objects(Records records, ObjectColumns table, ImagePlane plane, double min_trust) noexcept
 @cython.locals(i=cython.Py_ssize_t, n=int)
 cpdef void add_psi(Records records, PsiColumns table, ImagePlane plane) noexcept

@@ -68,11 +68,11 @@ def elevation(plane: ImagePlane, right: float, y: float) -> float:
 
 
 def add_circles(
-    records: Records, table: CircleColumns, objects: ObjectColumns, kind: int, plane: ImagePlane, least_trust: float
+    records: Records, table: CircleColumns, objects: ObjectColumns, kind: int, plane: ImagePlane, min_trust: float
 ) -> None:
     """Add circles with at least that trust, as ``messages.CIRCLE``."""
     for i in range(table.capacity):
-        if not table.active[i] or table.trust[i] < least_trust or not place(records, plane, table.x[i], table.y[i]):
+        if not table.active[i] or table.trust[i] < min_trust or not place(records, plane, table.x[i], table.y[i]):
             continue
         n, floats = records.count, records.floats
         right = right_of_axis(plane, table.x[i])
@@ -87,15 +87,15 @@ def add_circles(
         else:
             floats[n, 8], floats[n, 11], floats[n, 12] = INF, NAN, NAN
         square = table.square[i]
-        owned = kind == REBEL and square >= 0 and objects.trust[square] >= least_trust
+        owned = kind == REBEL and square >= 0 and objects.trust[square] >= min_trust
         records.owner[n] = objects.id[square] if owned else 0
         records.count += 1
 
 
-def add_objects(records: Records, table: ObjectColumns, plane: ImagePlane, least_trust: float) -> None:
+def add_objects(records: Records, table: ObjectColumns, plane: ImagePlane, min_trust: float) -> None:
     """Add objects with at least that trust, as ``messages.OBJECT``."""
     for i in range(table.capacity):
-        if not table.active[i] or table.trust[i] < least_trust or not place(records, plane, table.x[i], table.y[i]):
+        if not table.active[i] or table.trust[i] < min_trust or not place(records, plane, table.x[i], table.y[i]):
             continue
         n, floats = records.count, records.floats
         right = right_of_axis(plane, table.x[i])

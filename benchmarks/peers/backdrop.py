@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from benchmarks.peers.ego import Ego, carry
+from benchmarks.peers.ego import Ego, warp
 from benchmarks.peers.peer import Floats, Grey, Mask
 from lcf_edge.config import Config
 
@@ -38,7 +38,7 @@ class Backdrop:
         if self._height_m <= 0:
             return points
         moved = ego.homography(slot) @ np.linalg.inv(ego.ground_homography(slot, self._height_m))
-        ground = np.stack(carry(moved.astype(np.float32).ravel(), points[:, 0], points[:, 1]), axis=1)
+        ground = np.stack(warp(moved.astype(np.float32).ravel(), points[:, 0], points[:, 1]), axis=1)
         return np.where(points[:, 1:] > np.float32(ego.focus[1]), ground, points)
 
     def lay(self, earlier: Grey, slot: int) -> tuple[Grey, Mask]:
@@ -46,7 +46,7 @@ class Backdrop:
         ego = self._ego
         derotated = self.expect(self.pixels, slot)
         turn_back = np.linalg.inv(ego.homography(slot)).astype(np.float32).ravel()
-        seen = ego.lens.distort(np.stack(carry(turn_back, derotated[:, 0], derotated[:, 1]), axis=1))
+        seen = ego.lens.distort(np.stack(warp(turn_back, derotated[:, 0], derotated[:, 1]), axis=1))
         place = (seen + np.float32(0.5)) / np.float32(self._shrink) - np.float32(0.5)
         columns, rows = np.ascontiguousarray(place.T).reshape(2, *earlier.shape)
         covered: Mask = (columns >= 0) & (rows >= 0) & (columns < self.size[0] - 1) & (rows < self.size[1] - 1)

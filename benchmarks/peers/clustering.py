@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from benchmarks.peers.ego import Ego, carry
+from benchmarks.peers.ego import Ego, warp
 from benchmarks.peers.peer import Circles, Floats, Mask, Rows
 from benchmarks.peers.residual import Residual
 from lcf_edge.messages import CIRCLE, Cause, Kind
@@ -130,7 +130,7 @@ class TrustedCircles:
         """Account for one picture's clusters. Return the circles that are shown."""
         table, dt = self._table, np.float32(ego.last.dt_s)
         h = ego.last_homography().astype(np.float32).ravel()
-        table["x"], table["y"] = carry(h, table["x"], table["y"])
+        table["x"], table["y"] = warp(h, table["x"], table["y"])
         table["x"] += self._velocity[:, 0] * dt
         table["y"] += self._velocity[:, 1] * dt
         table["ttc"] -= dt

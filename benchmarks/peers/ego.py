@@ -105,7 +105,7 @@ class Ego:
     def derotate(self, slot: Rows, x: Floats, y: Floats) -> tuple[Floats, Floats]:
         """Positions (n,) px in the pictures of slots (n,), as if the camera had not turned since."""
         h = (self.lens.matrix @ self.rotation @ self._inverse).reshape(SLOTS, 9).astype(np.float32)[slot].T
-        return carry(h, x, y)
+        return warp(h, x, y)
 
     def focus_since(self, slot: Rows) -> tuple[Floats, Floats, Floats]:
         """Focus of expansion of the way since each slot (n,), px, and the way's forward part, m."""
@@ -118,7 +118,7 @@ class Ego:
         return x, y, forward
 
 
-def carry(h: npt.NDArray[np.float32], x: Floats, y: Floats) -> tuple[Floats, Floats]:
+def warp(h: npt.NDArray[np.float32], x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Positions (n,) through homographies (9,) or (9, n)."""
     scale = 1 / np.maximum(h[6] * x + h[7] * y + h[8], np.float32(1e-6))  # what is behind goes far away
     return (h[0] * x + h[1] * y + h[2]) * scale, (h[3] * x + h[4] * y + h[5]) * scale

@@ -5,7 +5,7 @@ import numpy as np
 import numpy.typing as npt
 
 from benchmarks.peers.clustering import TrustedCircles, cluster
-from benchmarks.peers.ego import SLOTS, Ego, carry
+from benchmarks.peers.ego import SLOTS, Ego, warp
 from benchmarks.peers.peer import Circles, Floats, Grey, Mask
 from benchmarks.peers.residual import Tracks, residual
 from lcf_edge.config import Config
@@ -60,7 +60,7 @@ class LucasKanade:
         ego = self._ego
         ideal = ego.lens.undistort(self._points)
         h = ego.last_homography().astype(np.float32).ravel()
-        turned = np.stack(carry(h, ideal[:, 0], ideal[:, 1]), axis=1)
+        turned = np.stack(warp(h, ideal[:, 0], ideal[:, 1]), axis=1)
         guess = ego.lens.distort(turned + self._velocity * np.float32(ego.last.dt_s)).astype(np.float32)
         gain = float(np.clip(cv2.mean(image)[0] / max(cv2.mean(before)[0], 1.0), 0.4, 2.5))
         if abs(gain - 1) > 0.05:  # the exposure jumped

@@ -77,9 +77,9 @@ def _by_name(name: str, kernel: Kernel) -> Node:
             raise driver_error(name, refused) from refused
         if any(card_or_name in card for card in through_libcamera):
             raise WrongDeviceError(f"{name}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
-        raise DeviceMissingError(f"{name}: no camera of that name; {_found(kernel)}")
+        raise DeviceMissingError(f"{name}: no camera has this name; {_found(kernel)}")
     if len(paths) > 1:
-        raise WrongDeviceError(f"{name}: {' and '.join(paths)} are called so; name one by /dev/v4l/by-id/…")
+        raise WrongDeviceError(f"{name}: {' and '.join(paths)} have this name; choose one by /dev/v4l/by-id/…")
     try:
         return Node(paths[0], name, kernel)
     except OSError as error:

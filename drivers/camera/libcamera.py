@@ -325,7 +325,7 @@ def _map(
         try:
             memory.append(mmap.mmap(descriptor, offset + length, mmap.MAP_SHARED, mmap.PROT_READ))
         except (OSError, ValueError) as error:
-            raise DeviceLostError(f"{name}: its buffers cannot be mapped ({error}); opened again") from error
+            raise DeviceLostError(f"{name}: cannot map its buffers ({error}); opened again") from error
         resources.callback(memory[-1].close)
     return memory
 

@@ -86,9 +86,9 @@ def _find(manager: Any, device: str) -> Any:
         found = found or [camera for camera, own in names if any(device_name in name for name in own)]
     listed = ", ".join(f"{_model(camera)} ({camera.id})" for camera in cameras)
     if not found:
-        raise Refused("missing", f"no camera of libcamera's; found: {listed}; set camera.device to one of these names")
+        raise Refused("missing", f"libcamera has no such camera; found: {listed}; set camera.device to one of these names")
     if len(found) > 1:
-        raise Refused("wrong", f"more than one camera is called so; take the id from: {listed}")
+        raise Refused("wrong", f"more than one camera has this name; use an id from: {listed}")
     return found[0]
 
 
@@ -159,7 +159,7 @@ def _hand_over(
 
 def _pass_on(libcamera: Any, connection: socket.socket, stream: Any, done: Any) -> None:
     if done.status != libcamera.Request.Status.Complete:
-        raise Refused("lost", "libcamera gave its pictures up, as when a camera is unplugged; check its cable")
+        raise Refused("lost", "libcamera cancelled its requests, as when a camera is unplugged; check its cable")
     metadata = done.buffers[stream].metadata
     stamps = {control.name: value for control, value in done.metadata.items()}
     _send(

@@ -55,7 +55,7 @@ def started(name: str) -> Iterator[None]:
     except OSError as error:
         if error.errno not in NOT_SET_UP:
             raise
-        text = f"does not start as a camera of its own ({error.strerror}); most likely it {NEEDS_LIBCAMERA}"
+        text = f"does not start on its own ({error.strerror}); most likely it {NEEDS_LIBCAMERA}"
         raise WrongDeviceError(f"{name}: {text}") from error
 
 

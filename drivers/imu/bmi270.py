@@ -129,7 +129,7 @@ class Bmi270(Bmi160):
         except OSError as error:
             raise FirmwareError(f"{self._firmware}: cannot be read ({error.strerror}); {remedy}") from error
         if len(data) != FIRMWARE_BYTES:
-            raise FirmwareError(f"{self._firmware}: not the {FIRMWARE_BYTES} bytes that a BMI270 wants; {remedy}")
+            raise FirmwareError(f"{self._firmware}: not the {FIRMWARE_BYTES} bytes that a BMI270 needs; {remedy}")
         return data
 
     def _fifo_level(self) -> int:

@@ -189,7 +189,7 @@ class _Polled:
             self._counts["io_error"] += 1
             gone = isinstance(error, OSError) and error.errno in (errno.ENODEV, errno.ENOENT, errno.EBADF)
             if gone or self._failed >= TRIES:
-                raise DeviceLostError(f"{self._name}: cannot be read any more ({error}); is the chip there?") from error
+                raise DeviceLostError(f"{self._name}: can no longer be read ({error}); is the chip still connected?") from error
             return []
         self._failed = 0
         return [self._scale.sample(stamp_ns, counts)]
@@ -233,9 +233,9 @@ class _Buffer:
         try:
             data = self._rest + os.read(self._file, BUFFER_SCANS * self._scan.type.itemsize)
         except OSError as error:
-            raise DeviceLostError(f"{self._name}: cannot be read any more ({error.strerror})") from error
+            raise DeviceLostError(f"{self._name}: can no longer be read ({error.strerror})") from error
         if len(data) == len(self._rest):
-            raise DeviceLostError(f"{self._name}: has gone; is the chip there?")
+            raise DeviceLostError(f"{self._name}: is gone; is the chip still connected?")
         whole = len(data) - len(data) % self._scan.type.itemsize
         self._rest = data[whole:]
         scans = np.frombuffer(data[:whole], self._scan.type)

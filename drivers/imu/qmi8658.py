@@ -122,7 +122,7 @@ class Qmi8658(I2cImu):
                     break
                 self._clock.sleep_s(COMMAND_LOOK_S)
             else:
-                raise DeviceLostError(f"{self.name}: does not do a command; switch its supply off and on")
+                raise DeviceLostError(f"{self.name}: does not execute a command; switch its supply off and on")
 
     def _wait(self) -> None:
         due_ns = self._polled_ns + POLL * 1e9 / self._sample_clock.rate_hz

@@ -86,7 +86,7 @@ def _explained(error: Exception, path: str, baud: int) -> DriverError:
     if code in (errno.EACCES, errno.EPERM):
         return DeviceForbiddenError(f"{path}: no permission; add the user to the group dialout and log in again")
     if code in (errno.EAGAIN, errno.EBUSY):
-        return DeviceBusyError(f"{path}: another program has it open; stop that one (fuser {path} names it)")
+        return DeviceBusyError(f"{path}: another program has it open; stop that program (fuser {path} names it)")
     if code == errno.EIO:
         return DeviceLostError(f"{path}: the serial port does not answer; plug the IMU in again")
-    return WrongDeviceError(f"{path}: is no serial port; set imu.port")
+    return WrongDeviceError(f"{path}: is not a serial port; set imu.port")

@@ -102,7 +102,7 @@ def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
         moment = Moment(time_s, cruise_mps, speed_mps, curvature, tuple(samples), frame, known)
         samples.clear()
         target_mps = min(driver.decide(moment), cruise_mps)
-        vehicle.tell(time_s, target_mps)
+        vehicle.command(time_s, target_mps)
         log.cruise_mps.append(cruise_mps)
         log.target_mps.append(target_mps)
         log.speed_mps.append(speed_mps)

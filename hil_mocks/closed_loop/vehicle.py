@@ -64,7 +64,7 @@ class Vehicle:
         corners = np.array([[-half, -length], [half, -length], [half, 0.0], [-half, 0.0]])
         return self.position + corners @ self.axes
 
-    def tell(self, time_s: float, speed_mps: float) -> None:
+    def command(self, time_s: float, speed_mps: float) -> None:
         """Decide a speed on the picture of a time."""
         self._commands.append((time_s + self.build.delay_s, max(speed_mps, 0.0)))
 

@@ -165,7 +165,7 @@ def align(turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float =
     both = _Comparison(turns, samples, around_s)
     if len(both.camera) < _MIN_TURNS:
         raise CalibrationError(
-            "camera and imu: their stamps hardly overlap; take more seconds, or set imu.time_offset_s nearer"
+            "camera and imu: their stamps hardly overlap; record for longer, or set imu.time_offset_s nearer"
         )
     for _ in range(_ITERATIONS):
         offsets_s, correlations = both.scan(around_s, SEARCH_S, _COARSE_S)
@@ -198,7 +198,7 @@ def _refuse_few(turns: Sequence[Turn], samples: Sequence[ImuSample]) -> None:
     if len(turns) < _MIN_TURNS or len(samples) < _MIN_TURNS:
         raise CalibrationError(
             f"camera and imu: rotation seen in {len(turns)} intervals between pictures, {len(samples)} inertial "
-            f"samples; {_MIN_TURNS} of each are needed: take more seconds, and look at something with corners"
+            f"samples; {_MIN_TURNS} of each are needed: record for longer, facing something with corners"
         )
     saturated = sum(sample.saturated for sample in samples)
     if saturated > _MAX_SATURATED * len(samples):

@@ -42,7 +42,7 @@ def axes_of(watched: Watched, config: Config, snap_rad: float) -> Result:
         f"uncertainty: ± {np.degrees(sigma_rad):.2f}°",
         "gyro bias: "
         + ", ".join(f"{bias:.4f}" for bias in alignment.gyro_bias_radps)
-        + " rad/s (learnt while it runs)",
+        + " rad/s (estimated while it runs)",
         *guessed(watched),
     )
     if abs(alignment.offset_s - config.imu.time_offset_s) > _MAX_LAG_S:

@@ -138,7 +138,7 @@ def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
     tilted = int(np.count_nonzero(solution.tilts_rad > _MIN_TILT_RAD))
     if tilted < _MIN_TILTED:
         raise CalibrationError(
-            f"camera: the board was tilted in {tilted} views, {_MIN_TILTED} are needed to tell the focal length; "
+            f"camera: the board was tilted in {tilted} views, {_MIN_TILTED} are needed to determine the focal length; "
             "tilt it by 30 to 45° to each side"
         )
     focal, centre = solution.sigma[:2] / solution.intrinsics[:2], solution.sigma[2:4] / views.size[0]
@@ -231,7 +231,7 @@ def _result(solution: Solution, kept: list[Sighting], dropped: int, views: Views
     left_out = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common())
     findings = (
         f"{len(kept)} views of {views.board.name}, {sum(len(view.corners) for view in kept)} corners"
-        + (f"; {dropped} views left out, whose error stood out" if dropped else ""),
+        + (f"; {dropped} views left out, with outlying errors" if dropped else ""),
         f"pictures left out: {left_out or 'none'}",
         f"reprojection error: {solution.error_px:.3f} px; of a view {errors.min():.3f} to {errors.max():.3f} px",
         f"picture covered: {views.covered().mean():.0%}; board tilted by up to {tilt_deg:.0f}°",

@@ -25,9 +25,9 @@ def as_toml(table: str, values: Mapping[str, Value]) -> str:
 def check_writable(path: Path) -> None:
     """Refuse a file that cannot be written, before any measurement. Raises ``ConfigError``."""
     if not path.is_file():
-        raise ConfigError(f"{path}: no such file to write to; name yours with -c, or make an empty one")
+        raise ConfigError(f"{path}: no such file; name yours with -c, or create an empty one")
     if not (os.access(path, os.W_OK) and os.access(path.resolve().parent, os.W_OK)):
-        raise ConfigError(f"{path}: may not be written; use sudo, or name another file with -c")
+        raise ConfigError(f"{path}: no permission to write; use sudo, or name another file with -c")
 
 
 def write(path: Path, table: str, values: Mapping[str, Value]) -> None:

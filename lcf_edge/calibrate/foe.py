@@ -123,13 +123,13 @@ def find_focus(tracked: Sequence[Tracks]) -> Focus:
     parallax = float(np.median(np.hypot(*flow.T)))
     if parallax < _MIN_PARALLAX_RAD:
         raise CalibrationError(
-            f"camera: next to nothing came nearer (median flow {np.degrees(parallax):.2f}° between pictures); drive "
+            f"camera: hardly anything came nearer (median flow {np.degrees(parallax):.2f}° between pictures); drive "
             "faster, or past nearer things"
         )
     if np.abs(slope).max() > _MAX_SLOPE:
-        raise CalibrationError("camera: no focus of expansion before it; the camera must look ahead")
+        raise CalibrationError("camera: no focus of expansion ahead; the camera must look ahead")
     if np.median(np.einsum("ni,ni->n", flow, place - slope)) < 0:
-        raise CalibrationError("camera: the flow goes inwards, it drives backwards; drive straight ahead")
+        raise CalibrationError("camera: the flow goes inwards, as when reversing; drive straight ahead")
     parts = np.array_split(np.arange(len(used)), _PIECES)
     pieces = np.array([_solve([used[row] for row in part], slope)[0] for part in parts])
     sigma = pieces.std(axis=0, ddof=1) / np.sqrt(_PIECES)

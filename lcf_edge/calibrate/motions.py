@@ -180,7 +180,7 @@ def calibrate_motions(source: SensorSource, config: Config, snap_rad: float, gui
     guide.end()
     if motions.rest is None or not motions.done:
         raise CalibrationError(
-            f"imu: the samples end before this was seen: {motions.name}; wanted, in this order: rest on level ground "
+            f"imu: the samples end before this was seen: {motions.name}; expected, in this order: rest on level ground "
             f"for {_REST_S:g} s, {', '.join(step.name for step in STEPS)}"
         )
     vehicle, misfits = axes_of(motions.rest, motions.turns)
@@ -215,7 +215,7 @@ def axes_of(rest: Rest, turns: dict[str, Floats]) -> tuple[Floats, dict[str, flo
     if misfits[worst] > _MAX_MISFIT_RAD:
         raise CalibrationError(
             f"imu: the motions contradict each other ({worst} is {np.degrees(misfits[worst]):.0f}° off); one went the "
-            "other way or askew, or the gyro's axes are not the accelerometer's: try again, one axis at a time"
+            "wrong way or at a slant, or the gyro's axes are not the accelerometer's: try again, one axis at a time"
         )
     return axes, misfits
 

@@ -68,10 +68,10 @@ class Rest:
     def findings(self) -> tuple[str, ...]:
         """Return lines for the user."""
         off = self.gravity_mps2 / GRAVITY_MPS2 - 1
-        doubt = "; more than a good accelerometer has" if abs(off) > _GRAVITY_DOUBT else ""
+        doubt = "; more than expected of a good accelerometer" if abs(off) > _GRAVITY_DOUBT else ""
         return (
             f"at rest: {self.seconds:.1f} s, {self.samples} samples, {self.samples / self.seconds:.0f} Hz",
-            f"gyro bias: {_three(self.bias_radps)} rad/s (needs no key: the daemon learns it)",
+            f"gyro bias: {_three(self.bias_radps)} rad/s (needs no key: the daemon estimates it)",
             f"gyro noise: {_three(self.noise_radps)} rad/s a sample; the bias wandered by "
             f"{self.wander_radps.max():.4f} rad/s",
             f"gravity: {self.gravity_mps2:.3f} m/s², {off:+.1%} of {GRAVITY_MPS2}{doubt}; "
@@ -118,7 +118,7 @@ def measure(samples: Sequence[ImuSample]) -> Rest:
     if moved or noise.max() > _QUIET_RADPS or shake.max() > _QUIET_MPS2:
         raise CalibrationError(
             f"imu: it moved while it should rest (gyro up to {np.abs(gyro_means - bias).max():.3f} rad/s off its mean, "
-            f"noise {noise.max():.3f} rad/s and {shake.max():.2f} m/s²); hands off, motors off, and again"
+            f"noise {noise.max():.3f} rad/s and {shake.max():.2f} m/s²); hands off, motors off, then try again"
         )
     rest = Rest(seconds, len(samples), bias, noise, gyro_means.std(axis=0), force, shake)
     off = rest.gravity_mps2 / GRAVITY_MPS2 - 1
@@ -142,7 +142,7 @@ def _refuse_unrecognised(samples: Sequence[ImuSample], rest: Rest) -> None:
             next_ns += _FRAME_NS
     if not estimator.bias.known:
         raise CalibrationError(
-            "imu: too restless for the daemon to see that it stands (bias "
+            "imu: too noisy for the daemon to see that it is at rest (bias "
             f"{np.linalg.norm(rest.bias_radps):.3f} rad/s, noise {rest.noise_radps.max():.3f} rad/s and "
             f"{rest.shake_mps2.max():.2f} m/s²); motors off, fix the IMU more firmly, or lower imu.rate_hz"
         )

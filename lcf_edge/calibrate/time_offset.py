@@ -26,7 +26,7 @@ def calibrate_time(source: SensorSource, config: Config, seconds: float | None, 
     if alignment.offset_sigma_s > _MAX_SIGMA_S:
         raise CalibrationError(
             f"camera and imu: the offset is only known to {1000 * alignment.offset_sigma_s:.1f} ms; turn more briskly, "
-            "or for more seconds"
+            "or for longer"
         )
     findings = (
         f"{len(alignment.camera)} intervals between pictures, {len(watched.samples)} inertial samples",

@@ -52,7 +52,7 @@ def parser() -> argparse.ArgumentParser:
     )
 
     pace = _pace()
-    demo = commands.add_parser("demo", allow_abbrev=False, help="see the filter work on a drive that it renders itself")
+    demo = commands.add_parser("demo", allow_abbrev=False, help="see the filter work on a rendered drive")
     demo.add_argument("--out", type=Path, default=Path("demo-out"), metavar="DIR", help="where to write (%(default)s)")
     demo.add_argument("--seconds", type=_number(1.0, 120.0), default=10.0, metavar="N", help="length of the drive (10)")
 
@@ -64,12 +64,12 @@ def parser() -> argparse.ArgumentParser:
     replay = commands.add_parser(
         "replay", allow_abbrev=False, parents=[settings, pace], help="run the filter over a recording"
     )
-    replay.add_argument("recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or pictures")
+    replay.add_argument("recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or images")
     replay.add_argument("-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output")
-    replay.add_argument("--video", type=Path, metavar="FILE.webm", help="what the filter saw, two panels; or .mp4")
-    replay.add_argument("--plot", type=Path, metavar="FILE.png", help="rows in use of each table")
+    replay.add_argument("--video", type=Path, metavar="FILE.webm", help="video of what the filter saw, two panels; or .mp4")
+    replay.add_argument("--plot", type=Path, metavar="FILE.png", help="plot of the rows in use of each table")
     replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
-    replay.add_argument("--realtime", action="store_true", help="as slow as the recording was made: --speed 1")
+    replay.add_argument("--realtime", action="store_true", help="at the recording's own pace: --speed 1")
 
     _add_evaluate(commands, settings)
 
@@ -81,10 +81,10 @@ def parser() -> argparse.ArgumentParser:
         "record",
         allow_abbrev=False,
         parents=[settings],
-        help="the daemon, with camera, IMU, speed and scenes recorded into a file",
+        help="the daemon, recording camera, IMU, speed and scenes into a file",
     )
     record.add_argument(
-        "file", type=Path, metavar="FILE.mcap", help="a new file; without an ending: a folder, as a bag of rosbag2"
+        "file", type=Path, metavar="FILE.mcap", help="a new file; without a suffix: a folder, as a rosbag2 bag"
     )
     record.add_argument("--seconds", type=_positive, metavar="N", help="length of the recording (until Ctrl-C)")
 
@@ -106,7 +106,7 @@ def parser() -> argparse.ArgumentParser:
         parents=[source, settings, pace],
         help="what a running daemon sees, or a recording shows, as a table in the terminal",
         description="Shows objects, circles, figures and devices of a daemon, five times a second; q or Ctrl-C ends. "
-        "Of a recording too: space plays and pauses, s steps, arrows go 5 s to and fro, p and n to the previous and "
+        "For a recording: space plays and pauses, s steps, arrows skip 5 s back or forward, p and n go to the previous and "
         "the next alarm.",
     )
     _add_recording(watch)
@@ -124,10 +124,10 @@ def parser() -> argparse.ArgumentParser:
     )
 
     gate = commands.add_parser(
-        "gate", allow_abbrev=False, help="before the daemon: keeps strangers away from it, and what is too much"
+        "gate", allow_abbrev=False, help="guards the daemon's port: keeps out strangers and floods"
     )
     gate.add_argument(
-        "--tls", type=Path, metavar="DIR", help="certificates, as docs/network.md says; without: for this machine"
+        "--tls", type=Path, metavar="DIR", help="certificates (docs/network.md); without: only for this machine"
     )
     gate.add_argument("--listen", metavar="HOST", help="where parties connect (0.0.0.0; without --tls 127.0.0.1)")
     gate.add_argument("--port", type=_whole(0, 65535), default=7447, metavar="N", help="(%(default)s)")
@@ -151,16 +151,16 @@ def parser() -> argparse.ArgumentParser:
         "--listen",
         default="127.0.0.1",
         metavar="HOST",
-        help="address of the page (%(default)s); any that is not of this machine alone asks for a token",
+        help="address of the page (%(default)s); one that other machines reach requires a token",
     )
 
     doctor = commands.add_parser(
         "doctor",
         allow_abbrev=False,
         parents=[settings],
-        help="look at devices, permissions, clock, network, memory: what is wrong and how to fix it",
-        description="Looks at everything that the daemon needs, says what is wrong and how to fix it. Opens camera and "
-        "IMU as the daemon would, unless it has them: then it is asked. Changes nothing else. Exit status 1: "
+        help="check devices, permissions, clock, network, memory: what is wrong and how to fix it",
+        description="Checks everything that the daemon needs, says what is wrong and how to fix it. Opens camera and "
+        "IMU as the daemon would, or asks the daemon if it has them. Changes nothing else. Exit status 1: "
         "something failed, 2: the configuration cannot be used.",
     )
     doctor.add_argument("--json", action="store_true", help="one JSON object a finding")
@@ -179,7 +179,7 @@ def _add_evaluate(commands: "argparse._SubParsersAction[_Parser]", settings: _Pa
         allow_abbrev=False,
         parents=[settings],
         help="replay many recordings and report what was found, false, late and slow",
-        description="Replays recordings, compares what the filter reports with what is known of them, and writes one "
+        description="Replays recordings, compares what the filter reports with the truth where it is known, and writes one "
         "report: a page with pictures, and JSON. A recording that cannot be read is reported and left out.",
     )
     evaluate.add_argument(
@@ -189,39 +189,39 @@ def _add_evaluate(commands: "argparse._SubParsersAction[_Parser]", settings: _Pa
         "--truth",
         type=Path,
         metavar="FILE",
-        help="what is in the pictures, or a folder with NAME.jsonl (truth.jsonl beside each recording)",
+        help="what is in the frames, or a folder with NAME.jsonl (truth.jsonl beside each recording)",
     )
     evaluate.add_argument(
-        "--against", type=Path, metavar="RESULTS", help="an earlier report to compare with: its folder, or report.json"
+        "--against", type=Path, metavar="RESULTS", help="an earlier report to compare with: its folder or report.json"
     )
     evaluate.add_argument(
         "--out", type=Path, default=Path("evaluation"), metavar="FOLDER", help="where to write (%(default)s)"
     )
     work = evaluate.add_mutually_exclusive_group()
     work.add_argument(
-        "--jobs", type=_whole(1, 1024), metavar="N", help="how many at once, on this computer (one a processor)"
+        "--jobs", type=_whole(1, 1024), metavar="N", help="how many at once, on this computer (one per processor)"
     )
     work.add_argument(
-        "--scheduler", metavar="ENDPOINT", help="of a Dask cluster that does it instead, as in tcp://host:8786"
+        "--scheduler", metavar="ENDPOINT", help="run on a Dask cluster instead, as in tcp://host:8786"
     )
 
 
 def _pace() -> _Parser:
     pace = _Parser(add_help=False)
     pace.add_argument(
-        "--start", type=_number(0.0, 1e6), default=0.0, metavar="S", help="begin that long after the first picture"
+        "--start", type=_number(0.0, 1e6), default=0.0, metavar="S", help="start so many seconds after the first frame"
     )
-    pace.add_argument("--duration", type=_positive, default=math.inf, metavar="S", help="and end that long after it")
+    pace.add_argument("--duration", type=_positive, default=math.inf, metavar="S", help="stop so many seconds after the start")
     pace.add_argument(
-        "--speed", type=_number(SLOWEST, FASTEST), metavar="N", help="times as fast as the recording was made"
+        "--speed", type=_number(SLOWEST, FASTEST), metavar="N", help="N times the recording's own pace"
     )
-    pace.add_argument("--loop", action="store_true", help="begin again at the end, until Ctrl-C")
-    pace.add_argument("--step", action="store_true", help="stand still at each picture")
+    pace.add_argument("--loop", action="store_true", help="start over at the end, until Ctrl-C")
+    pace.add_argument("--step", action="store_true", help="pause at each frame")
     return pace
 
 
 def _add_recording(command: argparse.ArgumentParser) -> None:
-    text = "in place of a daemon: ASL folder, MCAP file, video or pictures"
+    text = "in place of a daemon: ASL folder, MCAP file, video or images"
     command.add_argument("recording", type=Path, nargs="?", metavar="RECORDING", help=text)
 
 
@@ -230,8 +230,8 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
     task.add_argument(
         "--from", dest="recording", type=Path, metavar="RECORDING", help="a recording in place of the devices"
     )
-    task.add_argument("--report", type=Path, metavar="FILE.png", help="a figure to judge it by")
-    task.add_argument("--write", action="store_true", help="put the result into the configuration file")
+    task.add_argument("--report", type=Path, metavar="FILE.png", help="a figure to judge the result by")
+    task.add_argument("--write", action="store_true", help="write the result to the configuration file")
 
     def add(name: str, text: str) -> _Parser:
         return kinds.add_parser(name, allow_abbrev=False, parents=[settings, task], help=text, description=text)
@@ -247,17 +247,17 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         metavar="BOARD",
         help="checkerboard:9x6:25mm by its inner corners (the default), or charuco:8x6:28mm by its squares",
     )
-    camera.add_argument("--print-board", type=Path, metavar="FILE", help="only write the board, png, pdf or svg")
+    camera.add_argument("--print-board", type=Path, metavar="FILE", help="only write the board: png, pdf or svg")
     camera.add_argument(
         "--model",
         choices=("radial-tangential", "equidistant"),
         default="radial-tangential",
-        help="how the lens bends; equidistant for fisheyes (%(default)s)",
+        help="distortion model; equidistant for fisheyes (%(default)s)",
     )
     camera.add_argument(
         "--views", type=_whole(8, 100), default=20, metavar="N", help="how many views to take (%(default)s)"
     )
-    imu = add("imu", "the IMU: noise, and its axes by motions to which it prompts")
+    imu = add("imu", "the IMU: noise, and its axes from motions it prompts for")
     way = imu.add_mutually_exclusive_group()
     way.add_argument("--by-camera", action="store_true", help="axes by comparing gyro and camera instead")
     way.add_argument("--at-rest", action="store_true", help="only noise, bias and gravity")
@@ -265,20 +265,20 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         "--snap",
         type=_number(0.0, 45.0),
         metavar="DEG",
-        help="take axes as exact when they are so near to it (15 by motions, 0 by camera)",
+        help="snap axes to exact ones within this angle (15 by motions, 0 by camera)",
     )
     foe = add("foe", "how the camera is mounted, yaw and pitch, from a straight drive")
-    clocks = add("time", "the offset between the clocks of camera and IMU, from turning to and fro")
-    mask = add("mask", "own parts in view: what never moves while driving, or as outlined")
+    clocks = add("time", "the offset between the clocks of camera and IMU, from turning back and forth")
+    mask = add("mask", "own parts in view: what never moves while driving, or outlines")
     mask.add_argument(
         "--polygon",
         action="append",
         type=_polygon,
         metavar="X,Y,X,Y,...",
-        help="an outline, px of the picture, in place of what never moves; may be given several times",
+        help="an outline, px of the image, in place of what never moves; may be repeated",
     )
     for kind, default_s in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
-        text = f"how long to take ({default_s}; of a recording: all)"
+        text = f"how long to measure ({default_s}; of a recording: all)"
         kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
 

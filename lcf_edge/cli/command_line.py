@@ -20,7 +20,7 @@ from lcf_edge.image_limit import limit_opencv
 from lcf_edge.printable import printable
 
 if other := namesake("drivers"):
-    sys.exit(f"lcf-edge: {other}: in the way of our package of this name; rename it, or start in another folder")
+    sys.exit(f"lcf-edge: {other}: it hides our package of the same name; rename it, or start in another folder")
 
 from drivers.errors import DriverError
 
@@ -45,7 +45,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             arguments = parser().parse_args(argv)
             _COMMANDS[arguments.command](arguments)
         finally:
-            _tell()  # also what argparse printed
+            _write_lines()  # also what argparse printed
     except LcfError as error:
         _say(f"lcf-edge: {error}")
         return error.exit_status
@@ -70,13 +70,13 @@ def _config(arguments: argparse.Namespace) -> None:
     config = _load(arguments)
     from lcf_edge.cli.config import report  # noqa: PLC0415
 
-    _tell(report(config))
+    _write_lines(report(config))
 
 
 def _doctor(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.doctor import doctor  # noqa: PLC0415
 
-    doctor(arguments.config, arguments.set, as_json=arguments.json, tell=_tell)
+    doctor(arguments.config, arguments.set, as_json=arguments.json, write_line=_write_lines)
 
 
 def _run(arguments: argparse.Namespace) -> None:
@@ -88,7 +88,7 @@ def _run(arguments: argparse.Namespace) -> None:
 def _record(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.record import record  # noqa: PLC0415
 
-    _tell(record(arguments.file, arguments.seconds, arguments.config, arguments.set))
+    _write_lines(record(arguments.file, arguments.seconds, arguments.config, arguments.set))
 
 
 def _daemon_address(arguments: argparse.Namespace) -> "DaemonAddress":
@@ -110,7 +110,7 @@ def _shown(arguments: argparse.Namespace) -> "DaemonAddress | Replayed":
     pace = _pace(arguments)
     if arguments.recording is None:
         if pace != Pace() or arguments.config or arguments.set:
-            raise UsageError(f"{arguments.command}: options of a recording, and none is named; name RECORDING")
+            raise UsageError(f"{arguments.command}: these options need a recording; name RECORDING")
         return _daemon_address(arguments)
     from lcf_edge.monitor.replay.replayed import Replayed  # noqa: PLC0415
 
@@ -123,27 +123,27 @@ def _watch(arguments: argparse.Namespace) -> None:
     if arguments.json:
         if arguments.recording is not None:
             raise UsageError("watch: --json is for a daemon; lcf-edge replay RECORDING -o - writes a line a frame")
-        watch_lines(_daemon_address(arguments), _tell)
+        watch_lines(_daemon_address(arguments), _write_lines)
     else:
-        watch_table(_shown(arguments), _tell)
+        watch_table(_shown(arguments), _write_lines)
 
 
 def _gate(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.gate import gate  # noqa: PLC0415
 
-    gate(arguments.tls, arguments.listen, arguments.port, arguments.to, _tell)
+    gate(arguments.tls, arguments.listen, arguments.port, arguments.to, _write_lines)
 
 
 def _view(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.view import view  # noqa: PLC0415
 
-    view(_shown(arguments), arguments.listen, arguments.port, _tell)
+    view(_shown(arguments), arguments.listen, arguments.port, _write_lines)
 
 
 def _foxglove(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.foxglove import foxglove  # noqa: PLC0415
 
-    foxglove(_daemon_address(arguments), arguments.port, _tell)
+    foxglove(_daemon_address(arguments), arguments.port, _write_lines)
 
 
 def _replay(arguments: argparse.Namespace) -> None:
@@ -158,7 +158,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     if arguments.results == "-":
         print(*summary, sep="\n", file=sys.stderr)
     else:
-        _tell(*summary)
+        _write_lines(*summary)
 
 
 def _evaluate(arguments: argparse.Namespace) -> None:
@@ -168,7 +168,7 @@ def _evaluate(arguments: argparse.Namespace) -> None:
 
     question = Question(arguments.recordings, arguments.config, arguments.set, arguments.truth, arguments.against)
     work = Work(arguments.jobs, arguments.scheduler)
-    _tell(*evaluate(question, arguments.out, work, lambda text: _say(f"lcf-edge: warning: {text}")))
+    _write_lines(*evaluate(question, arguments.out, work, lambda text: _say(f"lcf-edge: warning: {text}")))
 
 
 def _task(arguments: argparse.Namespace) -> "Task":
@@ -188,37 +188,37 @@ def _calibrate(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli import calibrate  # noqa: PLC0415
 
     if arguments.what == "camera" and arguments.print_board:
-        _tell(*calibrate.print_board(arguments.board, arguments.print_board))
+        _write_lines(*calibrate.print_board(arguments.board, arguments.print_board))
         return
     task = _task(arguments)
     match arguments.what:
         case "camera":
-            _tell(*calibrate.camera(task, arguments.board, arguments.model, arguments.views))
+            _write_lines(*calibrate.camera(task, arguments.board, arguments.model, arguments.views))
         case "imu" if arguments.at_rest:
-            _tell(*calibrate.imu_at_rest(task))
+            _write_lines(*calibrate.imu_at_rest(task))
         case "imu" if arguments.by_camera:
-            _tell(*calibrate.imu_by_camera(task, arguments.snap))
+            _write_lines(*calibrate.imu_by_camera(task, arguments.snap))
         case "imu":
-            _tell(*calibrate.imu_by_motions(task, arguments.snap))
+            _write_lines(*calibrate.imu_by_motions(task, arguments.snap))
         case "foe":
-            _tell(*calibrate.foe(task))
+            _write_lines(*calibrate.foe(task))
         case "time":
-            _tell(*calibrate.time(task))
+            _write_lines(*calibrate.time(task))
         case "mask":
-            _tell(*calibrate.mask(task, arguments.polygon))
+            _write_lines(*calibrate.mask(task, arguments.polygon))
 
 
 def _demo(arguments: argparse.Namespace) -> None:
     from lcf_edge.cli.demo import demo  # noqa: PLC0415
 
-    demo(arguments.out, arguments.seconds, _tell)
+    demo(arguments.out, arguments.seconds, _write_lines)
 
 
 def _bench(arguments: argparse.Namespace) -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")  # as the daemon
     from lcf_edge.cli.bench import bench  # noqa: PLC0415
 
-    bench(arguments.seconds, _tell)
+    bench(arguments.seconds, _write_lines)
 
 
 _COMMANDS: Mapping[str, Callable[[argparse.Namespace], None]] = {
@@ -243,7 +243,7 @@ def _say(text: str) -> None:
     print(printable(" ".join(text.split()), 2000), file=sys.stderr)
 
 
-def _tell(*lines: str) -> None:
+def _write_lines(*lines: str) -> None:
     """Print lines on standard output and flush, so that a failure is noticed here, not at exit."""
     try:
         sys.stdout.writelines(f"{line}\n" for line in lines)

@@ -168,7 +168,7 @@ def _render(drive: scenes.Drive, folder: Path) -> None:
     except OSError as error:
         raise cannot_write(folder, error) from error
     except BrokenProcessPool as error:
-        raise LcfError(f"{folder}: the rendering process was ended from outside; free memory, try again") from error
+        raise LcfError(f"{folder}: the rendering process was killed; free memory, try again") from error
 
 
 def _open_link() -> tuple[zenoh.Session, str]:
@@ -200,7 +200,7 @@ def _finish(subscriber: subprocess.Popen[str], sent: int) -> Received:
         return msgspec.json.decode(received, type=Received)
     except (subprocess.TimeoutExpired, msgspec.DecodeError) as error:
         subscriber.kill()
-        raise PublishError("the demo's subscriber did not tell what it received; try again") from error
+        raise PublishError("the demo's subscriber did not report what it received; try again") from error
 
 
 def _draw(recording: Recording, config: Config, folder: Path, drawn: list[int], video: VideoSink | None) -> None:
@@ -224,9 +224,9 @@ def _write(path: Path, data: bytes) -> None:
 
 def _found_line(threat: FoundThreat) -> str:
     if threat.latency_s is None:
-        return f"missed   {threat.name}, in sight for {(threat.last_ns - threat.since_ns) / 1e9:.1f} s"
+        return f"missed   {threat.name}, in view for {(threat.last_ns - threat.since_ns) / 1e9:.1f} s"
     ((cause, _),) = threat.causes.most_common(1)
-    return f"found    {threat.name}, {cause.name.lower()}, {threat.latency_s:.2f} s after it came to threaten"
+    return f"found    {threat.name}, {cause.name.lower()}, {threat.latency_s:.2f} s after it became a threat"
 
 
 def _live_lines(folder: Path, endpoint: str) -> tuple[str, str]:

@@ -14,7 +14,7 @@ from lcf_edge.doctor.finding import Finding, Severity
 from lcf_edge.errors import LcfError
 from lcf_edge.printable import printable
 
-Tell = Callable[[str], None]
+WriteLine = Callable[[str], None]
 
 _COLOURS = {Severity.OK: "32", Severity.WARN: "33", Severity.FAIL: "31"}
 _WIDE = len("configuration")
@@ -25,7 +25,7 @@ class UnfitError(LcfError):
     """A check found something that does not work."""
 
 
-def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, tell: Tell) -> None:
+def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, write_line: WriteLine) -> None:
     """Run all checks and report each finding as it is found.
 
     Raises ``UnfitError`` when something failed, and ``ConfigError`` for an unusable configuration, after the checks
@@ -36,13 +36,13 @@ def doctor(path: Path | None, settings: Sequence[str], *, as_json: bool, tell: T
     levels: Counter[Severity] = Counter()
     for finding in examine(context):
         levels[finding.level] += 1
-        tell(json_line(finding) if as_json else line(finding, coloured=coloured))
+        write_line(json_line(finding) if as_json else line(finding, coloured=coloured))
     if context.error is not None:
         raise context.error
     if levels[Severity.FAIL]:
         raise UnfitError(f"{_count(levels[Severity.FAIL], 'check')} failed; fix the first one and look again")
     if not as_json:
-        tell(f"\nnothing failed, {_count(levels[Severity.WARN], 'warning')}")
+        write_line(f"\nnothing failed, {_count(levels[Severity.WARN], 'warning')}")
 
 
 def line(finding: Finding, *, coloured: bool = False) -> str:

@@ -78,7 +78,7 @@ def _figures(total: Numbers) -> dict[str, tuple[str, str]]:
     """Return lines with each number and what it counts."""
     figures = {}
     if total.due:
-        figures["found"] = f"{total.found} of {total.due}", "sightings of threats"
+        figures["found"] = f"{total.found} of {total.due}", "threats in view, frame by frame"
     if total.late_s is not None:
         figures["late"] = f"{total.late_s:.2f}", "s until a threat is found, median"
     if total.false_a_picture is not None:

@@ -12,7 +12,7 @@ from lcf_edge.monitor.live.daemon_address import DaemonAddress
 HOST = "127.0.0.1"
 
 
-def foxglove(address: DaemonAddress, port: int, tell: Callable[[str], None]) -> None:
+def foxglove(address: DaemonAddress, port: int, write_line: Callable[[str], None]) -> None:
     """Serve until a signal ends it. Raises ``PublishError``, and ``LcfError`` without the extra ``foxglove``."""
     try:
         import foxglove as _  # noqa: F401
@@ -24,5 +24,5 @@ def foxglove(address: DaemonAddress, port: int, tell: Callable[[str], None]) -> 
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, lambda *_: ended.set())
     with closing(Relay(address, HOST, port)) as relay:
-        tell(f"open a connection to ws://{HOST}:{relay.port} in Foxglove (Ctrl-C ends)")
+        write_line(f"open a connection to ws://{HOST}:{relay.port} in Foxglove (Ctrl-C ends)")
         ended.wait()

@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 DAEMON_PORT = 7448
 
 
-def gate(tls: Path | None, host: str | None, port: int, to: str | None, tell: Callable[[str], None]) -> None:
+def gate(tls: Path | None, host: str | None, port: int, to: str | None, write_line: Callable[[str], None]) -> None:
     """Let parties through to the daemon on this machine until a signal ends it. Raises ``LcfError``."""
     import asyncio
     import socket
@@ -32,10 +32,10 @@ def gate(tls: Path | None, host: str | None, port: int, to: str | None, tell: Ca
     except (OSError, OverflowError) as error:
         reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
         raise LcfError(
-            f"gate: {host}:{port}: cannot be listened on ({reason}); choose with --listen, --port"
+            f"gate: {host}:{port}: cannot listen ({reason}); choose with --listen, --port"
         ) from error
     with listening:
-        tell(f"{'tls' if tls else 'tcp'}/{host}:{listening.getsockname()[1]} leads to {leads}")
+        write_line(f"{'tls' if tls else 'tcp'}/{host}:{listening.getsockname()[1]} leads to {leads}")
         asyncio.run(serve([listening], Gate(entrance)))
 
 

@@ -19,7 +19,7 @@ def record(file: Path, seconds: float | None, path: Path | None, settings: Seque
     recorded, and what ``run`` raises.
     """
     if file.exists():
-        raise UsageError(f"{file}: is there already; name another file, or remove it")
+        raise UsageError(f"{file}: already exists; name another file, or remove it")
     is_bag = not file.suffix
     if is_bag:
         _make(file)
@@ -33,7 +33,7 @@ def record(file: Path, seconds: float | None, path: Path | None, settings: Seque
     (recorder,) = (sink for sink in sinks if isinstance(sink, Recorder))
     summary = f"{file}: {recorder.summary()}"
     if not recorder.frames:
-        raise LcfError(f"{summary}; see above what the camera or the disk lacks")
+        raise LcfError(f"{summary}; the messages above say why")
     return summary
 
 

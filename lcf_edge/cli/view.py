@@ -8,7 +8,7 @@ from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.replay.replayed import Replayed
 
 
-def view(shown: DaemonAddress | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
+def view(shown: DaemonAddress | Replayed, host: str, port: int, write_line: Callable[[str], None]) -> None:
     """Serve the page until a signal ends it.
 
     Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``view``.
@@ -21,4 +21,4 @@ def view(shown: DaemonAddress | Replayed, host: str, port: int, tell: Callable[[
 
     from lcf_edge.monitor.web.server import serve
 
-    asyncio.run(serve(shown, host, port, tell))
+    asyncio.run(serve(shown, host, port, write_line))

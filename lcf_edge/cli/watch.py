@@ -23,15 +23,15 @@ PLAIN_INTERVAL_S = 1.0
 PLAIN_LINES = 100
 
 
-def watch_lines(address: DaemonAddress, tell: Callable[[str], None]) -> None:
+def watch_lines(address: DaemonAddress, write_line: Callable[[str], None]) -> None:
     """Print one JSON object a scene, until interrupted. Raises ``PublishError``."""
     with closing(scenes(address.endpoint, scene_key(address.prefix), config_file=address.config_file)) as arriving:
         for scene in arriving:
-            tell(msgspec.json.encode(scene_fields(scene)).decode())
+            write_line(msgspec.json.encode(scene_fields(scene)).decode())
 
 
-def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) -> None:
-    """Show the table until q or Ctrl-C; where standard output is no terminal, pass plain text to ``tell``.
+def watch_table(shown: DaemonAddress | Replayed, write_line: Callable[[str], None]) -> None:
+    """Show the table until q or Ctrl-C; where standard output is no terminal, pass plain text to ``write_line``.
 
     Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``watch`` or when the terminal is
     closed.
@@ -69,7 +69,7 @@ def watch_table(shown: DaemonAddress | Replayed, tell: Callable[[str], None]) ->
         while True:
             with console.capture() as text:
                 console.print(screen(), height=PLAIN_LINES)
-            tell(text.get())
+            write_line(text.get())
             time.sleep(PLAIN_INTERVAL_S)
 
 

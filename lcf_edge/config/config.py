@@ -323,7 +323,7 @@ def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     if filled and not data.strip():
         raise ConfigError(f"{path}: empty; for the defaults, write a comment into it")
     if len(data) > bounded_toml.MAX_BYTES:
-        raise ConfigError(f"{path}: too large for a configuration; name another file with -c")
+        raise ConfigError(f"{path}: too large for a configuration file; name another file with -c")
     try:
         return bounded_toml.parse(data.decode())
     except ValueError as error:
@@ -421,7 +421,7 @@ def _check(config: Config, origin: str) -> None:
     _check_endpoints(config.zenoh, origin)
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
-        raise ConfigError(f"{origin}: imu.axes: three rows of three numbers are needed")
+        raise ConfigError(f"{origin}: imu.axes: needs three rows of three numbers")
     if axes and not _is_rotation(axes):
         raise ConfigError(f"{origin}: imu.axes: not a rotation (rows must be orthonormal, determinant +1)")
     if config.vehicle.speed_source == "constant" and config.vehicle.speed_mps is None:
@@ -434,7 +434,7 @@ def _check(config: Config, origin: str) -> None:
 
 def _check_lens(camera: Camera, origin: str) -> None:
     if camera.intrinsics and len(camera.intrinsics) != 4:
-        raise ConfigError(f"{origin}: camera.intrinsics: four numbers fx, fy, cx, cy in px are needed")
+        raise ConfigError(f"{origin}: camera.intrinsics: needs four numbers fx, fy, cx, cy in px")
     if camera.intrinsics and min(camera.intrinsics[:2]) <= 0:
         raise ConfigError(f"{origin}: camera.intrinsics: focal lengths must be positive")
     numbers = {"none": (0,), "radial-tangential": (4, 5), "equidistant": (4,)}[camera.distortion_model]
@@ -456,7 +456,7 @@ def _check_mask(camera: Camera, origin: str) -> None:
             -camera.width <= x <= 2 * camera.width and -camera.height <= y <= 2 * camera.height for x, y in polygon
         ):
             size = f"{camera.width}x{camera.height}"
-            raise ConfigError(f"{origin}: camera.mask: polygon {number} lies far outside of a picture of {size} px")
+            raise ConfigError(f"{origin}: camera.mask: polygon {number} lies far outside an image of {size} px")
 
 
 def _check_endpoints(zenoh: Zenoh, origin: str) -> None:

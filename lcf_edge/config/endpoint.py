@@ -17,7 +17,7 @@ def fault(endpoint: str) -> str:
     shown = bare(endpoint)
     protocol, slash, address = shown.partition("?")[0].partition("/")
     if not (protocol and slash and address):
-        return f"{shown}: no endpoint, which is protocol/address; {_EXAMPLE}"
+        return f"{shown}: not an endpoint (protocol/address); {_EXAMPLE}"
     if protocol not in _WITH_PORTS:
         return ""
     host, colon, port = address.rpartition(":")

@@ -32,7 +32,7 @@ def why(tree: dict[str, Any], key: str, table: type[msgspec.Struct]) -> str:
     if isinstance(kind, inspect.LiteralType):
         return _none_of(value, kind.values)
     secret = isinstance(kind, inspect.ListType) and isinstance(value, str)  # an endpoint, perhaps with secrets
-    return f"{_expected(kind)} is needed, not {'a text' if secret else _quoted(value)}"
+    return f"{_expected(kind)} is needed, not {'a string' if secret else _quoted(value)}"
 
 
 def _given(kind: inspect.Type) -> inspect.Type:
@@ -47,7 +47,7 @@ def _none_of(value: Any, possible: Sequence[object]) -> str:
     text = value[:_MAX_SHOWN].lower() if isinstance(value, str) else ""
     close = [choices[each] for each in get_close_matches(text, choices, n=2, cutoff=_MIN_ALIKE)]
     hint = f"did you mean {' or '.join(close)}? " if close else ""
-    return f"{_quoted(value)} is not possible; {hint}write one of {', '.join(choices.values())}"
+    return f"{_quoted(value)} is not allowed; {hint}write one of {', '.join(choices.values())}"
 
 
 def _expected(kind: inspect.Type) -> str:
@@ -59,7 +59,7 @@ def _expected(kind: inspect.Type) -> str:
         case inspect.BoolType():
             return "true or false"
         case inspect.StrType():
-            return "a text in quotes"
+            return "a string in quotes"
         case inspect.ListType():
             return "a list in brackets"
     return "a table of keys"

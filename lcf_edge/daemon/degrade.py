@@ -10,19 +10,19 @@ DARK = 25  # mean grey level of a dark image
 _BLIND_S = 0.5  # without corners
 
 _WORDS = {
-    "no imu": "no inertial samples: only the pictures tell the rotation, and the flow lines are widened; check imu",
+    "no imu": "no inertial samples: rotation comes from the images alone, and the flow lines are widened; check imu",
     "imu gap": "inertial samples are missing between two pictures; check the IMU's cable and rate",
-    "gyro stuck": "the gyro repeats one value without noise: it is not used; check imu and its wires",
-    "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or see more than a plain wall",
+    "gyro stuck": "the gyro repeats one value without noise and is ignored; check imu and its wires",
+    "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or show it more than a plain wall",
     "rotation from odometry": "rotation is taken from odometry",
     "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
     "speed drifts": "speed comes from the accelerometer alone and drifts",
-    "speed from ground": "nothing measures the speed: the ground in the pictures tells it, as camera.height_m has it",
+    "speed from ground": "nothing measures the speed: it is estimated from the ground in the images, by camera.height_m",
 }
 
 _WORDS_OF_A_RECORDING = {  # without mentioning a cable
     "imu gap": "inertial samples are missing between two pictures of the recording, or where it begins again",
-    "gyro stuck": "the gyro of the recording repeats one value without noise: it is not used",
+    "gyro stuck": "the gyro of the recording repeats one value without noise and is ignored",
 }
 
 
@@ -48,9 +48,9 @@ class Degradation:
         if frame.stamp_ns - self._corners_ns >= _BLIND_S * 1e9:
             grey = float(frame.image[::8, ::8].mean())
             yield (
-                f"dark: no corners, the mean grey level is {grey:.0f} of 255; uncover the lens or give light"
+                f"dark: no corners, the mean grey level is {grey:.0f} of 255; uncover the lens or add light"
                 if grey < DARK
-                else "blind: no corners; the lens is covered or out of focus, or all that it sees is plain"
+                else "blind: no corners; the lens is covered or out of focus, or everything in view is plain"
             )
         if self._last_ns is not None:
             yield from self._too_slow(scene, (frame.stamp_ns - self._last_ns) / 1e9)

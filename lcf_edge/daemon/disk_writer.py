@@ -103,7 +103,7 @@ class DiskWriter(threading.Thread):
         except OSError as error:
             self._fail(error)
             return None
-        LOGGER.info("recorder: %s %s", "goes on in" if self.trouble else "records into", self.file.path)
+        LOGGER.info("recorder: %s %s", "continues in" if self.trouble else "records into", self.file.path)
         self.trouble = None
         return self.file
 
@@ -132,7 +132,7 @@ class DiskWriter(threading.Thread):
             return
         self._sync_at_ns = now_ns + round(SYNC_S * 1e9)
         if file.vanished:
-            LOGGER.warning("recorder: %s: was removed; the next file begins", file.path)
+            LOGGER.warning("recorder: %s: was removed; starting the next file", file.path)
             self._drop_file()
             return
         try:
@@ -159,7 +159,7 @@ class DiskWriter(threading.Thread):
         self._retry_at_ns = time.monotonic_ns() + round(RETRY_S * 1e9)
         if not self.trouble:
             self.trouble = f"{where}: cannot be written ({error.strerror})"
-            LOGGER.error("recorder: %s; free the disk, or record elsewhere; tried again meanwhile", self.trouble)
+            LOGGER.error("recorder: %s; free the disk, or record elsewhere; still trying", self.trouble)
 
     def _drop_file(self) -> None:
         """Close the file as it is."""

@@ -135,7 +135,7 @@ class Health:
         sessions = self._link.sessions
         values = {"sessions": str(sessions)} | {name: str(count) for name, count in sorted(counts.items())}
         if sessions >= self._link.max_sessions:
-            return DeviceStatus("link", Level.WARN, f"{sessions} sessions: nobody else is let in", values)
+            return DeviceStatus("link", Level.WARN, f"{sessions} sessions: no more are let in", values)
         if self._reserve.short:
             return DeviceStatus("link", Level.WARN, "connections use up all file descriptors", values)
         return DeviceStatus("link", Level.OK, "open", values)

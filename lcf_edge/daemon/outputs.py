@@ -77,9 +77,9 @@ class Outputs:
         deadline_s = time.monotonic() + timeout_s
         for sink in self._sinks:
             if not sink.join(max(deadline_s - time.monotonic(), 0)):
-                LOGGER.warning("%s: does not end in time; left behind", sink.name)
+                LOGGER.warning("%s: does not end in time; abandoned", sink.name)
 
     def _leave_out(self, sink: Sink, error: SinkError) -> None:
-        LOGGER.error("%s: %s; the daemon goes on without it", sink.name, error)
+        LOGGER.error("%s: %s; continuing without it", sink.name, error)
         self._errors[sink.name] = error
         self._working = tuple(other for other in self._working if other is not sink)

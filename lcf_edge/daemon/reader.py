@@ -62,7 +62,7 @@ class Reader(threading.Thread, Generic[Record]):
         error = self._device.error
         if delivers and self.away_since_ns is not None:
             self.error = self.away_since_ns = None
-            LOGGER.info("%s: delivers", self.name)
+            LOGGER.info("%s: delivering", self.name)
         elif error is not None and str(error) != str(self.error):
             if self.away_since_ns is None:
                 self.away_since_ns = now_ns
@@ -75,5 +75,5 @@ class Reader(threading.Thread, Generic[Record]):
         if not self._told_of_excess and any(self.counts[name] for name in EXCESS):
             self._told_of_excess = True
             LOGGER.warning(
-                "%s: sends more than any such device; the excess is dropped and counted; check it", self.name
+                "%s: sends more than any such device should; the excess is dropped and counted; check it", self.name
             )

@@ -160,7 +160,7 @@ class Service:
             self._to_do.get(timeout=max(next_s - time.monotonic(), 0))()
         except queue.Empty:
             if next_s == self._ends_at_s:
-                self._end(f"{self._seconds:g} s are over")
+                self._end(f"{self._seconds:g} s have passed")
             elif next_s == self._check_at_s:
                 self._check_at_s = max(self._check_at_s + CHECK_S, time.monotonic())
                 self._check_peers()
@@ -204,7 +204,7 @@ class Service:
             self._ends_at_s = math.inf if self._seconds is None else time.monotonic() + self._seconds
             self._notifier.status(self._health.line(self._memory))
             self._notifier.ready()
-            LOGGER.info("ready: %s", "without a camera" if self._readers[0].error else "frames come")
+            LOGGER.info("ready: %s", "without a camera" if self._readers[0].error else "receiving frames")
 
     def _log_notes(self, notes: Sequence[str]) -> None:
         kinds = {note.partition(":")[0]: note for note in notes}
@@ -225,9 +225,9 @@ class Service:
                 self._take(load(self._path, self._settings, filled=self._filled))  # an editor may just have emptied it
             done = True
         except LcfError as error:
-            LOGGER.error("reload: %s; the old configuration stays", error)
+            LOGGER.error("reload: %s; keeping the old configuration", error)
         except Exception as error:  # noqa: BLE001  # a bug must not end what runs
-            LOGGER.error("reload: internal error: %r; please report it; the old configuration stays", error)
+            LOGGER.error("reload: internal error: %r; please report it; keeping the old configuration", error)
         if not done and self._reserve.short:  # others may have taken the lent descriptors
             self._signature = None  # so it is tried again with the next tick
         if self._ready:
@@ -284,7 +284,7 @@ class Service:
             if thread.ident is not None:
                 thread.join(max(deadline_s - time.monotonic(), 0))
                 if thread.is_alive():
-                    LOGGER.warning("%s: does not end; left behind", thread.name)
+                    LOGGER.warning("%s: does not end; abandoned", thread.name)
         self._outputs.close()
         self._link.close()
         self._outputs.join(begun_s + WRITTEN_WITHIN_S - time.monotonic())

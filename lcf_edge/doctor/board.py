@@ -30,7 +30,7 @@ def _heat(context: Context) -> Iterator[Finding]:
     elif board.temperature_c is not None and board.temperature_c >= HOT_C:
         yield warn("board", f"{name}: {heat}, about to slow down; cool it")
     else:
-        yield ok("board", f"{name}: {heat}, nothing slows it down")
+        yield ok("board", f"{name}: {heat}, not throttled")
 
 
 def _governor(context: Context) -> Iterator[Finding]:
@@ -39,9 +39,9 @@ def _governor(context: Context) -> Iterator[Finding]:
     driver = _text(context, "devices/system/cpu/cpu0/cpufreq/scaling_driver")
     if governor == "powersave" and driver not in _OWN_GOVERNORS:
         everywhere = str(folder / "scaling_governor").replace("cpu0", "cpu*")
-        yield warn("board", "the processor is kept slow (powersave)", f"echo ondemand | sudo tee {everywhere}")
+        yield warn("board", "the processor is held at a low clock (powersave)", f"echo ondemand | sudo tee {everywhere}")
     elif governor:
-        yield ok("board", f"governor of the processor: {governor}")
+        yield ok("board", f"processor governor: {governor}")
 
 
 def _disk(context: Context) -> Iterator[Finding]:

@@ -157,7 +157,7 @@ def _nearest(context: Context, path: Path) -> tuple[str, ...]:
 def judged(context: Context, measured: Measured[Frame], exposure_s: float | None = None) -> Iterator[Finding]:
     """Return findings about images; ``exposure_s``: as the camera reports it, None: unknown."""
     if not measured.records:
-        yield fail("camera", f"{measured.name}: opens, but gives no picture that can be used ({_counts(measured)})")
+        yield fail("camera", f"{measured.name}: opens, but delivers no usable image ({_counts(measured)})")
         return
     yield _rate(context, measured, exposure_s)
     if measured.steps_back or measured.counts["stamped at arrival"]:
@@ -175,7 +175,7 @@ def _rate(context: Context, measured: Measured[Frame], exposure_s: float | None)
     summary += f"; {lost}" if lost else ""
     if camera.driver == "recording" or measured.rate_hz >= _SLOW * camera.fps:
         return ok("camera", summary)
-    why = "as cameras are that expose longer in the dark"
+    why = "as with cameras that expose longer in the dark"
     if exposure_s is not None and too_long:
         why = f"its exposure of {1e3 * exposure_s:.1f} ms is longer than a frame"
     return warn(
@@ -193,11 +193,11 @@ def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Confi
     grey, count = float(image.mean()), len(corners.pixel)
     summary = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"
     if grey < DARK:
-        return warn("camera", f"dark: {summary}; take off the cap, give light, or let it expose by itself")
+        return warn("camera", f"dark: {summary}; take off the cap, add light, or use automatic exposure")
     if grey > BRIGHT:
-        return warn("camera", f"burnt out: {summary}; shade it, or let it expose by itself")
+        return warn("camera", f"overexposed: {summary}; shade it, or use automatic exposure")
     if count < FEW_CORNERS:
-        return warn("camera", f"blind: {summary}; the lens is covered, out of focus, or looks at something plain")
+        return warn("camera", f"blind: {summary}; the lens is covered, out of focus, or facing something plain")
     return ok("camera", summary)
 
 

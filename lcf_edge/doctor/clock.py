@@ -46,11 +46,11 @@ def judged(clock: SystemClock) -> Iterator[Finding]:
     """Return findings about a clock."""
     if clock.now_s < _EARLIEST_S:
         year = time.gmtime(clock.now_s).tm_year
-        yield warn("clock", f"it says {year}: it was never set, and stamps of scenes are wrong", _SET)
+        yield warn("clock", f"it says {year}: it was never set, so the stamps of scenes are wrong", _SET)
     elif clock.synchronised:
         yield ok("clock", f"synchronised, off by {clock.max_error_s:.3f} s at most")
     else:
-        yield warn("clock", "nobody keeps it right: stamps will not agree with those of other computers", _SET)
+        yield warn("clock", "not synchronised: stamps will not agree with those of other computers", _SET)
     if clock.resolution_s > _COARSE_S:
         yield warn("clock", f"the monotonic clock steps by {1e3 * clock.resolution_s:.1f} ms: stamps are coarse")
     else:

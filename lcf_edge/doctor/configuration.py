@@ -24,13 +24,13 @@ def check(context: Context) -> Iterator[Finding]:
     if context.error is not None:
         yield fail(
             "configuration",
-            f"{context.error}; camera, IMU, memory and network are looked at when it is fixed",
+            f"{context.error}; camera, IMU, memory and network are checked once it is fixed",
             edit(context.path) if str(context.path) in str(context.error) else "",
         )
     elif context.path.exists():
         yield ok("configuration", f"{context.path} is valid")
     else:
-        yield ok("configuration", f"there is no {context.path}: the defaults hold")
+        yield ok("configuration", f"there is no {context.path}: defaults apply")
 
 
 def _given(path: Path, settings: Sequence[str], config: Config) -> frozenset[str]:

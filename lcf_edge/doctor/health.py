@@ -28,7 +28,7 @@ def check(context: Context) -> Iterator[Finding]:
     daemon = context.daemon
     running = next((process for process in processes(context.proc) if process.is_daemon), None)
     if daemon is not None and daemon.scene:
-        yield warn("daemon", f"answers at {daemon.endpoint}, but has no scene ({daemon.scene})", _JOURNAL)
+        yield warn("daemon", f"answers at {daemon.endpoint}, but has no scenes ({daemon.scene})", _JOURNAL)
     elif daemon is not None:
         yield ok("daemon", f"answers at {daemon.endpoint}, has scenes")
     elif running is not None:
@@ -39,7 +39,7 @@ def check(context: Context) -> Iterator[Finding]:
             f"tr '\\0' ' ' < /proc/{running.pid}/cmdline",
         )
     else:
-        yield ok("daemon", "does not run")
+        yield ok("daemon", "not running")
     for status in daemon.statuses.values() if daemon else ():
         if status.name not in _DEVICES:
             yield _of_status("daemon", status.name, status)
@@ -57,8 +57,8 @@ def of_device(context: Context, name: str, daemon: Process) -> Finding:
     """Return findings about a device that the daemon has open."""
     status = context.daemon.statuses.get(name) if context.daemon else None
     if status is not None:
-        return _of_status(name, "the daemon has it", status)
-    text = f"not opened, since {daemon} may have it and does not say"
+        return _of_status(name, "in use by the daemon", status)
+    text = f"not opened: {daemon} may be using it and does not say"
     return warn(name, text, "sudo systemctl stop lcf-edge  # then look again")
 
 

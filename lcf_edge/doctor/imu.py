@@ -98,7 +98,7 @@ def _at_rest(context: Context, samples: list[ImuSample]) -> Iterator[Finding]:
     accel = np.array([sample.accel for sample in samples])
     if gyro.std(axis=0).max() > _STILL_RADPS or accel.std(axis=0).max() > _STILL_MPS2:
         yield warn(
-            "imu", "moves, so that gravity and bias cannot be measured", f"{context.again()}  # while it stands still"
+            "imu", "moving, so gravity and bias cannot be measured", f"{context.again()}  # while it stands still"
         )
         return
     gravity_mps2 = float(np.linalg.norm(accel.mean(axis=0)))
@@ -137,7 +137,7 @@ def _none(context: Context) -> Finding:
     unknown = [] if shared else _strangers(context)
     if unknown:
         where = f"{', '.join(f'0x{address:02x}' for address in unknown)} on i2c-{context.config.imu.bus}"
-        what = f"{text}; at {where} is something that no driver knows: a copy of an IMU?"
+        what = f"{text}; at {where} is a device that no driver recognises: a copy of an IMU?"
         return warn("imu", what, context.again("imu.driver=mpu6500", f"imu.address=0x{unknown[0]:02x}"))
     serial = ports(context.dev)
     there = f"; at a serial port: {', '.join(serial)}" if serial else ""

@@ -30,7 +30,7 @@ def check(context: Context) -> Iterator[Finding]:
         if same:
             yield fail("instances", f"{unit} and {other} both have {', '.join(same)}", edit(context.path))
         else:
-            yield ok("instances", f"nothing of {unit} collides with {other}")
+            yield ok("instances", f"{unit} and {other} do not conflict")
 
 
 def collisions(one: Config, other: Config) -> list[str]:

@@ -34,7 +34,7 @@ def _free(context: Context, budget_mib: float) -> Iterator[Finding]:
     elif swapped_mib > 0.1 * sizes_mib.get("MemTotal", 0.0):
         yield warn(
             "memory",
-            f"{text}, but {swapped_mib:.0f} MiB lie in swap: something is too large",
+            f"{text}, but {swapped_mib:.0f} MiB are in swap: something takes too much",
             "ps --sort=-rss -eo rss,comm | head",
         )
     else:

@@ -44,20 +44,20 @@ def exposed(context: Context, options: Zenoh) -> Iterator[Finding]:
     if plain:
         yield warn(
             "network",
-            f"{', '.join(plain)}: whoever reaches this port reads every scene and can send a speed "
+            f"{', '.join(plain)}: anyone who reaches this port can read every scene and send a speed "
             "(no encryption, no passwords); docs/network.md says how to open it with TLS",
             context.again(_LOOPBACK),
         )
     elif outside and not _wants_certificates(options):
         yield warn(
             "network",
-            f"{', '.join(outside)}: encrypted, but everybody is let in; docs/network.md has the lines for enable_mtls",
+            f"{', '.join(outside)}: encrypted, but anyone is let in; docs/network.md has the lines for enable_mtls",
             edit(Path(options.config_file or "/etc/lcf-edge/zenoh.json5")),
         )
     elif outside:
         yield warn(
             "network",
-            f"{', '.join(outside)}: for those with a certificate, but strangers can keep them out; "
+            f"{', '.join(outside)}: only for holders of a certificate, but strangers can block them; "
             "let lcf-edge gate listen there (docs/network.md)",
             "sudo systemctl enable --now lcf-edge-gate",
         )

@@ -93,7 +93,7 @@ def _state(properties: Mapping[str, str], unit: str) -> Iterator[Finding]:
     if properties.get("ActiveState") == "failed":
         if properties.get("ExecMainStatus") == "2":
             file = f" -c {DEFAULT_PATH.parent}/{unit.partition('@')[2]}.toml" if "@" in unit else ""
-            yield fail("service", "failed: its configuration cannot work", f"lcf-edge config{file}")
+            yield fail("service", "failed: its configuration cannot be used", f"lcf-edge config{file}")
         else:
             why = _ENDS.get(result, f"{result}, exit status {properties.get('ExecMainStatus')}")
             again = f"sudo systemctl reset-failed {unit} && sudo systemctl start {unit}"
@@ -103,6 +103,6 @@ def _state(properties: Mapping[str, str], unit: str) -> Iterator[Finding]:
             "service", f"{properties.get('ActiveState')} ({properties.get('SubState')})", f"sudo systemctl start {unit}"
         )
     elif restarts != "0":
-        yield warn("service", f"runs, after it was started anew {restarts} times by itself", journal)
+        yield warn("service", f"running, restarted automatically {restarts} times", journal)
     else:
-        yield ok("service", f"{properties.get('SubState')}, never started anew")
+        yield ok("service", f"{properties.get('SubState')}, never restarted")

@@ -30,7 +30,7 @@ def check(_: Context) -> Iterator[Finding]:
     if missing:
         yield ok(
             "software",
-            f"for people only, and not here: {', '.join(missing)} (pip install 'lcf-edge[{','.join(missing)}]')",
+            f"optional, not installed: {', '.join(missing)} (pip install 'lcf-edge[{','.join(missing)}]')",
         )
 
 
@@ -40,7 +40,7 @@ def packages(installed: Mapping[str, str]) -> Iterator[Finding]:
         numbers = tuple(map(int, re.findall(r"\d+", installed[name])[:2]))
         if numbers and not least <= numbers < below:
             supported = f">={least[0]}.{least[1]},<{below[0]}"
-            text = f"{name} {installed[name]} was never tried; supported is {supported}"
+            text = f"{name} {installed[name]} is untested; supported: {supported}"
             yield (fail if numbers < least else warn)("software", text, f"pip install '{name}{supported}'")
     versions = ", ".join(f"{name} {version}" for name, version in installed.items() if version)
     yield ok("software", f"lcf-edge {__version__}, Python {platform.python_version()}, {versions}")
@@ -58,7 +58,7 @@ def _computer(is_64_bit: bool) -> Finding:
     text = f"{platform.system()} {platform.release()} on {platform.machine()}"
     if is_64_bit:
         return ok("software", f"{text}, 64 bits")
-    return fail("software", f"{text}: a Python of 32 bits, for which there is no Zenoh; install a 64-bit system")
+    return fail("software", f"{text}: 32-bit Python, for which there is no Zenoh; install a 64-bit system")
 
 
 def _installed(name: str) -> str:

@@ -123,7 +123,7 @@ def _frames(of: Report, folder: Path) -> dict[str, Path]:
     """The files of a report's frames, by the names of the recordings. Raises ``UsageError``."""
     for row in of.read:
         if row.frames and not _FRAMES.fullmatch(row.frames):  # a foreign report could name any file
-            raise UsageError(f"{folder}: {row.frames} is no file of frames of a report; evaluate again")
+            raise UsageError(f"{folder}: {row.frames} is not a report's file of frames; evaluate again")
     return {row.name: folder / row.frames for row in of.read if row.frames}
 
 

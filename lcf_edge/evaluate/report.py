@@ -227,7 +227,7 @@ def read(path: Path) -> tuple[Report, Path]:
     except OSError as error:
         raise UsageError(f"{file}: cannot be read ({error.strerror}); name what lcf-edge evaluate wrote") from error
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise UsageError(f"{file}: no report of lcf-edge evaluate ({error})") from error
+        raise UsageError(f"{file}: not a report of lcf-edge evaluate ({error})") from error
     if report.format != FORMAT:
         raise UsageError(f"{file}: a report of format {report.format}, not {FORMAT}; evaluate again")
     return report, file.parent

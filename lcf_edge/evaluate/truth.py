@@ -65,12 +65,12 @@ def read_truth(path: Path | None) -> Truth:
         return Truth(None)
     try:
         if path.stat().st_size > MAX_BYTES:
-            raise RecordingError(f"{path}: too large for a file of truth; one line a picture is enough")
+            raise RecordingError(f"{path}: too large for a truth file; one line a frame is enough")
         return Truth(_pictures(path))
     except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror}); name another file of truth") from error
+        raise RecordingError(f"{path}: cannot be read ({error.strerror}); name another truth file") from error
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
-        raise RecordingError(f"{path}: {error}; docs/evaluate.md tells what a line of truth holds") from error
+        raise RecordingError(f"{path}: {error}; docs/evaluate.md describes a line of truth") from error
 
 
 def _pictures(path: Path) -> dict[int, list[Known]]:

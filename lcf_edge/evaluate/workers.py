@@ -120,8 +120,8 @@ def _refuse_strangers(client: "Client", endpoint: str) -> None:
         raise LcfError(f"{endpoint}: the scheduler has no workers; start one: dask worker {endpoint}")
     for worker, version in client.run(_version, on_error="return").items():
         if version != __version__:
-            found = f"lcf-edge {version}" if isinstance(version, str) else "no lcf-edge that works"
-            raise LcfError(f"{worker}: {found} there, {__version__} here; install the same at all workers")
+            found = f"lcf-edge {version}" if isinstance(version, str) else "no working lcf-edge"
+            raise LcfError(f"{worker}: {found} there, {__version__} here; install the same version on all workers")
 
 
 def _version() -> str:

@@ -49,7 +49,7 @@ class DaemonAwayError(OSError):
 class Entrance(Protocol):
     """Raises ``OSError`` or ``IncompleteReadError`` for strangers, ``DaemonAwayError`` when the daemon is away."""
 
-    most_of_one_name: int
+    max_of_one_name: int
     stranger: str
     """What those are counted as who stay one."""
 
@@ -69,7 +69,7 @@ class Entrance(Protocol):
 class ByCertificate:
     """Of those on the network, by TLS."""
 
-    most_of_one_name = MAX_OF_ONE_NAME
+    max_of_one_name = MAX_OF_ONE_NAME
     stranger = "no certificate"
 
     def __init__(self, certificates: Certificates, daemon_port: int) -> None:
@@ -102,7 +102,7 @@ class ByCertificate:
 class ByUser:
     """Of programs on this computer, by the user who runs them. ``tallies``: where they are counted."""
 
-    most_of_one_name = MAX_OF_ONE_USER
+    max_of_one_name = MAX_OF_ONE_USER
     stranger = "no session"
 
     def __init__(self, path: Path, tallies: Tallies | None = None) -> None:

@@ -29,7 +29,7 @@ MAX_GREETERS = 48  # strangers who have said something that strangers say
 SILENCE_S = 15.0  # Zenoh is silent for 2.5 s at most
 PAUSE_S = 0.1  # when the system refuses a connection
 PENALTY_S = 1.0
-TELL_EACH_S = 10.0
+REPORT_EACH_S = 10.0
 COLLECT_EACH = 32  # connections: asyncio leaves each in a reference cycle with 256 KiB of buffer
 BACKLOG = 1024  # who does not fit would come again after a second
 LET_IN = "let in "
@@ -41,7 +41,7 @@ async def serve(listening: Sequence[socket.socket], gate: "Gate", ends: int | No
     loop.set_exception_handler(lambda *_: None)  # of connections: counted where they end
     gc.collect()
     gc.freeze()  # objects that exist now stay: collections are short
-    tasks = [loop.create_task(work) for work in (*map(gate.accept, listening), gate.tell())]
+    tasks = [loop.create_task(work) for work in (*map(gate.accept, listening), gate.report())]
 
     def end() -> None:
         for task in tasks:
@@ -53,7 +53,7 @@ async def serve(listening: Sequence[socket.socket], gate: "Gate", ends: int | No
         loop.add_reader(ends, end)
     with suppress(asyncio.CancelledError):
         await asyncio.gather(*tasks)
-    gate.tell_now()
+    gate.report_now()
 
 
 class Gate:
@@ -111,13 +111,13 @@ class Gate:
             self._make_room(self._greeters, MAX_GREETERS)
             self._greeters[task] = None
 
-    async def tell(self) -> None:
+    async def report(self) -> None:
         """Now and then, until cancelled."""
         while True:
-            await asyncio.sleep(TELL_EACH_S)
-            self.tell_now()
+            await asyncio.sleep(REPORT_EACH_S)
+            self.report_now()
 
-    def tell_now(self) -> None:
+    def report_now(self) -> None:
         """Report what has happened since the last report."""
         news = self.counts - self._reported
         self._reported = self.counts.copy()
@@ -178,7 +178,7 @@ class Gate:
         if not self._entrance.knows(name):
             return "of no known name"
         names = list(self._parties.values())
-        if len(names) >= MAX_PARTIES or names.count(name) >= self._entrance.most_of_one_name:
+        if len(names) >= MAX_PARTIES or names.count(name) >= self._entrance.max_of_one_name:
             return f"too many of {name}"
         return ""
 

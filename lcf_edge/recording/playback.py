@@ -87,7 +87,7 @@ class Playback:
             lap = self._lap
             while not self._waiting[kind]:
                 if self._lap > lap + 1:
-                    raise RecordingError(f"{self.recording.path}: nothing of that kind in it; name another recording")
+                    raise RecordingError(f"{self.recording.path}: has no such data; name another recording")
                 self._advance()
             due_ns, record = self._waiting[kind].popleft()
             assert isinstance(record, kind)

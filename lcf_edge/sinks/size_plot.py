@@ -99,12 +99,12 @@ class SizePlot(Sink):
             raise cannot_write(self.path, error) from error
 
 
-def _spread(heights: npt.NDArray[np.float64], least_gap: float) -> npt.NDArray[np.float64]:
-    """Return heights from 0 up, with neighbours pushed apart to at least ``least_gap``."""
+def _spread(heights: npt.NDArray[np.float64], min_gap: float) -> npt.NDArray[np.float64]:
+    """Return heights from 0 up, with neighbours pushed apart to at least ``min_gap``."""
     order = np.argsort(heights, kind="stable")
     placed = heights[order]
     for _ in range(200):
-        push = np.maximum(least_gap - np.diff(placed), 0.0) / 2
+        push = np.maximum(min_gap - np.diff(placed), 0.0) / 2
         placed[1:] += push
         placed[:-1] -= push
         placed = np.maximum(placed, 0.0)

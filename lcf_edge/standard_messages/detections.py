@@ -20,7 +20,7 @@ def encode_detections_2d(scene: Scene, setup: Setup) -> bytes:
     writer.scalars("I", len(scene.objects))
     for thing in scene.objects:
         writer.header(scene.stamp_ns, setup.frame_id)
-        _hypothesis(writer, thing, setup.most_trust, np.zeros(3), np.zeros((6, 6)))
+        _hypothesis(writer, thing, setup.max_trust, np.zeros(3), np.zeros((6, 6)))
         writer.scalars("5d", *(float(thing[name]) for name in ("x", "y")), 0.0, thing["width"], thing["height"])
         writer.string(str(thing["id"]))
     return writer.payload()
@@ -34,18 +34,18 @@ def encode_detections_3d(scene: Scene, setup: Setup) -> bytes:
     writer.scalars("I", len(objects))
     for thing, middle, size in zip(objects, positions(objects), sizes(objects, setup.lens), strict=True):
         writer.header(scene.stamp_ns, setup.frame_id)
-        _hypothesis(writer, thing, setup.most_trust, middle, _covariance(thing, middle))
+        _hypothesis(writer, thing, setup.max_trust, middle, _covariance(thing, middle))
         writer.scalars("7d", *middle, *_NO_POSE[3:])
         writer.scalars("3d", size[0], size[1], size[0])
         writer.string(str(thing["id"]))
     return writer.payload()
 
 
-def _hypothesis(writer: Writer, thing: np.void, most_trust: float, middle: Floats, covariance: Floats) -> None:
+def _hypothesis(writer: Writer, thing: np.void, max_trust: float, middle: Floats, covariance: Floats) -> None:
     """The only one."""
     writer.scalars("I", 1)
     writer.string(class_name(thing))
-    writer.scalars("d", min(max(float(thing["trust"]) / most_trust, 0.0), 1.0))
+    writer.scalars("d", min(max(float(thing["trust"]) / max_trust, 0.0), 1.0))
     writer.scalars("7d", *middle, *_NO_POSE[3:])
     writer.scalars("36d", *covariance.ravel())
 

@@ -28,7 +28,7 @@ class Setup:
     pitch_rad: float = 0.0  # looks up
     yaw_rad: float = 0.0  # looks to the right
     horizon_s: float = 4.0  # what is met later is no threat yet
-    most_trust: float = 5.0
+    max_trust: float = 5.0
 
     @classmethod
     def from_config(cls, config: Config, lens: Lens) -> "Setup":

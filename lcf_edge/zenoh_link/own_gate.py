@@ -63,12 +63,12 @@ def _address(endpoint: str) -> tuple[str, int] | None:
 class OwnGate:
     """Listens at ``endpoints``, and leads to ``endpoint``, in a folder of its own.
 
-    A gate that ends is started again; meanwhile the ports stay, and those who come wait. ``tell``: what an operator
+    A gate that ends is started again; meanwhile the ports stay, and those who come wait. ``report``: what an operator
     should know. Raises ``PublishError`` for a port that cannot be listened on.
     """
 
-    def __init__(self, endpoints: Sequence[str], prefix: str, tell: Callable[[str], object]) -> None:
-        self._tell = tell
+    def __init__(self, endpoints: Sequence[str], prefix: str, report: Callable[[str], object]) -> None:
+        self._report = report
         self._prefix = prefix
         self._restarts = 0
         self._ended = threading.Event()
@@ -125,12 +125,12 @@ class OwnGate:
             try:
                 self._process = self._started()
             except OSError as error:
-                self._tell(f"the gate cannot be started ({error.strerror}); tried again")
+                self._report(f"the gate cannot be started ({error.strerror}); tried again")
             else:
                 status = self._process.wait()
                 if self._ended.is_set():
                     return
-                self._tell(f"the gate has ended with status {status}; started again")
+                self._report(f"the gate has ended with status {status}; started again")
             self._restarts += 1
             self._ended.wait(RESTART_S)
 

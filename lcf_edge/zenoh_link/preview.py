@@ -15,7 +15,7 @@ PREVIEW = ZenohTopic(
     "preview/compressed",
     "sensor_msgs/msg/CompressedImage",
     zenoh.Priority.BACKGROUND,
-    largest_bytes=MAX_MESSAGE_BYTES,
+    max_bytes=MAX_MESSAGE_BYTES,
 )
 
 

@@ -64,13 +64,13 @@ class MessagePublisher:
         """Wait until somebody subscribes; False when nobody did in time."""
         matched = threading.Event()
 
-        def tell(status: zenoh.MatchingStatus) -> None:
+        def on_match(status: zenoh.MatchingStatus) -> None:
             if status.matching:
                 matched.set()
 
         with ExitStack() as listeners:
             for publisher in self._publishers:
-                listeners.enter_context(publisher.declare_matching_listener(tell))
+                listeners.enter_context(publisher.declare_matching_listener(on_match))
             return self.matched or matched.wait(timeout_s)
 
     def put(self, payload: bytes) -> None:

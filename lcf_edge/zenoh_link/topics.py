@@ -23,7 +23,7 @@ class ZenohTopic:
     message: str  # "lcf_msgs/msg/Scene"
     priority: zenoh.Priority
     express: bool = False
-    largest_bytes: int = 2**17  # of a payload; a scene has some 60 a circle
+    max_bytes: int = 2**17  # of a payload; a scene has some 60 a circle
     is_global: bool = False  # not under the prefix
     is_lasting: bool = False  # for ROS 2: late subscribers get the last one
 
@@ -38,7 +38,7 @@ class ZenohTopic:
 
     def payload(self, sample: zenoh.Sample) -> bytes:
         """Return the payload of a sample. Raises ``CdrError`` if it is larger than any of this topic."""
-        if len(sample.payload) > self.largest_bytes:
+        if len(sample.payload) > self.max_bytes:
             raise CdrError(f"{self.name}: {len(sample.payload)} bytes are too many")
         return sample.payload.to_bytes()
 

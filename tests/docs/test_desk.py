@@ -52,7 +52,7 @@ def test_daemon_table_and_page(blocks: Blocks, start: Start) -> None:
     )
     daemon = start(run_line)
     assert daemon.stderr
-    assert any("ready: frames come" in line for line in daemon.stderr)
+    assert any("ready: receiving frames" in line for line in daemon.stderr)
     table = start(f"{watch_line} --json")
     assert table.stdout
     assert "circles" in json.loads(table.stdout.readline())

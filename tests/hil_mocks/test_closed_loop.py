@@ -103,7 +103,7 @@ def test_it_keeps_to_its_course(kind: str) -> None:
     waves = tuple((at, 0.25 * math.sin(at)) for at in np.linspace(0, 12, 40).tolist())
     vehicle = Vehicle(Build(kind), Course(12.0, waves), 1.0)
     aside = []
-    vehicle.tell(-1.0, 1.0)
+    vehicle.command(-1.0, 1.0)
     for step in range(2400):
         vehicle.step(step / 200, 1 / 200, 0.4)
         aside.append(vehicle.course.locate(vehicle.position, vehicle.travelled_m)[1])

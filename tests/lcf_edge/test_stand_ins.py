@@ -241,7 +241,7 @@ def replayed(recording: Path) -> Seen:
     return driven(config, open_recording(recording, config))
 
 
-def largest_error_rad(seen: Seen, other: Seen) -> float:
+def max_error_rad(seen: Seen, other: Seen) -> float:
     """Of the rotation between two pictures."""
     apart = np.einsum("nij,nkj->nik", seen.rotations[2:], other.rotations[2:])
     return float(np.arccos(np.clip((np.trace(apart, axis1=1, axis2=2) - 1) / 2, -1, 1)).max())
@@ -249,7 +249,7 @@ def largest_error_rad(seen: Seen, other: Seen) -> float:
 
 def test_the_replay_finds_the_walker(replayed: Seen) -> None:
     assert replayed.threats == {"walker": pytest.approx(0.15, abs=0.11)}
-    assert largest_error_rad(replayed, replace(replayed, rotations=np.array([np.eye(3)] * FRAMES))) > 0.01
+    assert max_error_rad(replayed, replace(replayed, rotations=np.array([np.eye(3)] * FRAMES))) > 0.01
 
 
 @pytest.mark.parametrize("imu", [driver for driver in get_args(ImuDriver) if driver != "none"])
@@ -266,5 +266,5 @@ def assert_alike(bench: Bench, replayed: Seen, camera: str, imu: str) -> None:
     config = configured(f"camera.driver={camera}", *bench.camera(camera), f"imu.driver={imu}", *settings)
     seen = driven(config, live(bench, config, read))
     assert seen.threats == replayed.threats
-    assert largest_error_rad(seen, replayed) < 5e-4  # a quarter of a pixel
+    assert max_error_rad(seen, replayed) < 5e-4  # a quarter of a pixel
     assert not seen.notes

@@ -98,10 +98,10 @@ def test_a_camera_that_the_daemon_has_is_busy(running: Daemon) -> None:
 
 
 def test_the_doctor_knows_it(running: Daemon) -> None:
-    """First while the daemon has it, then on its own."""
+    """First while in use by the daemon, then on its own."""
     output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
     assert "camera" in output
-    assert "the daemon has it: delivers" in output
+    assert "in use by the daemon: delivering" in output
     running.stop()
     output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
     assert "/dev/video0: through libcamera" in output
@@ -124,7 +124,7 @@ def test_it_has_a_name_and_an_id(free: Machine) -> None:
     ("command", "output"),
     [
         (f"{BY_HAND}.v4l2 /dev/video0", "gives pictures only through libcamera, as ribbon-cable cameras do; set cam"),
-        (f"{BY_HAND}.libcamera imx219", "imx219: no camera of libcamera's; found: Sensor B (platform/vimc.0 Sensor B)"),
+        (f"{BY_HAND}.libcamera imx219", "imx219: libcamera has no such camera; found: Sensor B (platform/vimc.0 Sensor B)"),
         (f"{LIBCAMERA} --width 8000", "Sensor B: no auto of 8000x120; offered: RGB3: "),
         (f"{LIBCAMERA} --gain 2", "Sensor B: the gain cannot be set; leave it unset"),
         (

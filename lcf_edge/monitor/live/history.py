@@ -20,13 +20,13 @@ class ReceivedMessage:
 
 
 class History:
-    """Holds the messages of the last ``length_s`` seconds, of each topic at most ``largest_bytes``."""
+    """Holds the messages of the last ``length_s`` seconds, of each topic at most ``max_bytes``."""
 
-    def __init__(self, length_s: float = LENGTH_S, largest_bytes: Mapping[str, int] = MAX_BYTES) -> None:
+    def __init__(self, length_s: float = LENGTH_S, max_bytes: Mapping[str, int] = MAX_BYTES) -> None:
         self._length_ns = round(length_s * 1e9)
-        self._largest = largest_bytes
-        self._kept: dict[str, deque[ReceivedMessage]] = {topic: deque() for topic in largest_bytes}
-        self._bytes = dict.fromkeys(largest_bytes, 0)
+        self._max_bytes = max_bytes
+        self._kept: dict[str, deque[ReceivedMessage]] = {topic: deque() for topic in max_bytes}
+        self._bytes = dict.fromkeys(max_bytes, 0)
         self._lock = threading.Lock()
 
     def add(self, message: ReceivedMessage) -> None:
@@ -35,7 +35,7 @@ class History:
         with self._lock:
             self._kept[topic].append(message)
             self._bytes[topic] += len(message.payload)
-            while self._bytes[topic] > self._largest[topic]:
+            while self._bytes[topic] > self._max_bytes[topic]:
                 self._forget(topic)
             self._expire(message.received_ns)
 

@@ -259,14 +259,14 @@ class Player:
             self._shown = frame, outcome.scene, outcome.view()
             self._preview = self._preview if self._playing else None
             if not went_on or frame.stamp_ns - self._diagnostics_stamp_ns() >= _POINT_S * 1e9:
-                self._tell(outcome.scene)
+                self._add_point(outcome.scene)
             if self._preview_on and (not self._playing or time.monotonic() - self._drawn_s >= _PREVIEW_S):
                 self._draw()
 
     def _diagnostics_stamp_ns(self) -> int:
         return 0 if self._diagnostics is None else self._diagnostics.header.stamp_ns
 
-    def _tell(self, scene: PipelineScene) -> None:
+    def _add_point(self, scene: PipelineScene) -> None:
         """Add a point to the plots, at the time of the recording."""
         memory = asdict(self._config.memory)
         values = {f"{table}_fill": f"{getattr(scene.sizes, table)}/{memory[table]}" for table in TABLES}

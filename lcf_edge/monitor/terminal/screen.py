@@ -32,7 +32,7 @@ class Column:
     """One value of an object or a circle."""
 
     name: str
-    least_columns: int  # a narrower terminal goes without it
+    min_columns: int  # a narrower terminal goes without it
     text: Callable[[np.void], str]
     columns: int | None = None  # least width, so that columns do not move; None: that of its name
 
@@ -211,7 +211,7 @@ class Screen:
         shown = rows[: max(lines - _TABLE_HEAD, 0)]
         hidden = f", {len(rows) - len(shown)} not shown" if len(shown) < len(rows) else ""
         head = Text.assemble(*count, hidden, no_wrap=True, overflow="ellipsis")
-        columns = [column for column in all_columns if width >= column.least_columns]
+        columns = [column for column in all_columns if width >= column.min_columns]
         stale = self.snapshot.scene_age_s(self.now_ns) >= STALE_S
         cells = [[column.name for column in columns], *([column.text(row) for column in columns] for row in shown)]
         widths = [

@@ -53,7 +53,7 @@ class Doorkeeper:
         connections = [one for one in server.connections if one.transport is not None]
         if len(connections) < MAX_CONNECTIONS:
             return server()
-        LOGGER.warning("more than %d connections; the longest idle are let go", MAX_CONNECTIONS)
+        LOGGER.warning("more than %d connections; closing those idle longest", MAX_CONNECTIONS)
         idle = next((one for one in connections if one not in self._busy), None)
         if idle is None:
             return _TurnedAway()

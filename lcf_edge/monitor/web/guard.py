@@ -55,7 +55,7 @@ class Guard:
         if self.token is None and not is_loopback(_name(request.host)):
             return web.Response(status=403, text=f"{request.host} is not this machine; use http://127.0.0.1\n")
         if request.headers.get("Origin", f"//{request.host}").partition("//")[2] != request.host:
-            return web.Response(status=403, text="another page may not look\n")
+            return web.Response(status=403, text="requests from other pages are refused\n")
         if self.token is None:
             return None
         brought = request.query.get(TOKEN) or request.cookies.get(_cookie(request), "")

@@ -59,8 +59,8 @@ PAGE = {
 }
 
 
-async def serve(shown: DaemonAddress | Replayed, host: str, port: int, tell: Callable[[str], None]) -> None:
-    """Serve until SIGINT or SIGTERM; ``tell`` hears the address. Raises ``PublishError``, ``LcfError``."""
+async def serve(shown: DaemonAddress | Replayed, host: str, port: int, write_line: Callable[[str], None]) -> None:
+    """Serve until SIGINT or SIGTERM; ``write_line`` hears the address. Raises ``PublishError``, ``LcfError``."""
     handler = _OneLine()
     handler.addFilter(NoFlood())
     for logger in (logging.getLogger("aiohttp"), logging.getLogger("asyncio"), LOGGER):
@@ -85,7 +85,7 @@ async def serve(shown: DaemonAddress | Replayed, host: str, port: int, tell: Cal
     try:
         await runner.setup()
         listening = await _listen(runner, door, host, port)
-        tell(f"open {_address(host, listening.sockets[0].getsockname()[1], guard.token)} (Ctrl-C ends)")
+        write_line(f"open {_address(host, listening.sockets[0].getsockname()[1], guard.token)} (Ctrl-C ends)")
         await ended.wait()
     finally:
         if listening is not None:
@@ -149,13 +149,13 @@ class Server:
 
     async def _updates(self, request: web.Request) -> web.StreamResponse:
         if len(self._sockets) >= MAX_BROWSERS:
-            raise web.HTTPServiceUnavailable(text=f"{MAX_BROWSERS} browsers look already\n")
+            raise web.HTTPServiceUnavailable(text=f"{MAX_BROWSERS} browsers are already connected\n")
         browser = web.WebSocketResponse(max_msg_size=64, compress=False, timeout=1.0)
         await browser.prepare(request)
         self._sockets[browser] = request
         try:
             await self._switch_preview()
-            await self._tell(browser)
+            await self._send_updates(browser)
         except (TimeoutError, ConnectionError):  # it is gone: it neither asks nor reads
             _abort(request)
         finally:
@@ -164,7 +164,7 @@ class Server:
             await browser.close()
         return browser
 
-    async def _tell(self, browser: web.WebSocketResponse) -> None:
+    async def _send_updates(self, browser: web.WebSocketResponse) -> None:
         audience, last_s = Audience(), -INTERVAL_S
         while (await browser.receive(SILENCE_S)).type is WSMsgType.TEXT:
             await asyncio.sleep(last_s + INTERVAL_S - time.monotonic())
@@ -180,7 +180,7 @@ class Server:
     async def _obey(self, request: web.Request) -> web.Response:
         """Obey slider and buttons; only JSON, which no form on another page can send."""
         if request.content_type != "application/json" or (request.content_length or 0) > MAX_COMMAND_BYTES:
-            raise web.HTTPBadRequest(text="a command as JSON is wanted\n")
+            raise web.HTTPBadRequest(text="a JSON command is required\n")
         try:
             command = msgspec.json.decode(await request.content.read(MAX_COMMAND_BYTES), type=Command)
         except msgspec.DecodeError:
@@ -195,7 +195,7 @@ class Server:
 
     async def _save(self, request: web.Request) -> web.StreamResponse:
         if self._saving >= MAX_SAVES_AT_ONCE:
-            raise web.HTTPServiceUnavailable(text=f"{MAX_SAVES_AT_ONCE} save already\n")
+            raise web.HTTPServiceUnavailable(text=f"{MAX_SAVES_AT_ONCE} recordings are already being saved\n")
         self._saving += 1
         try:
             return await self._saved(request)
@@ -206,7 +206,7 @@ class Server:
         now_ns = time.time_ns()
         messages = self._history.messages(now_ns)
         if not messages:
-            raise web.HTTPNotFound(text="nothing came in the last seconds: there is nothing to save\n")
+            raise web.HTTPNotFound(text="nothing arrived in the last seconds: there is nothing to save\n")
         name = f"lcf-edge-{utc(now_ns):%Y%m%dT%H%M%SZ}.mcap"
         response = web.StreamResponse(
             headers={
@@ -268,7 +268,7 @@ def _own_address(host: str) -> str:
 def _cannot_listen(error: OSError | OverflowError, host: str, port: int) -> str:
     code = getattr(error, "errno", None) or 0  # negative for an unknown name, with its own text
     reason = os.strerror(code) if code > 0 else getattr(error, "strerror", None) or str(error)
-    return f"view: {host}:{port}: cannot be listened on ({reason}); choose with --listen HOST and --port N"
+    return f"view: {host}:{port}: cannot listen ({reason}); choose with --listen HOST and --port N"
 
 
 class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]

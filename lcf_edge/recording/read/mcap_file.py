@@ -160,7 +160,7 @@ class _Channels:
             self.topics[channel.id] = McapTopic(channel.topic, schema_name, channel.message_encoding)
         elif record.opcode == Opcode.MESSAGE:
             if len(record.body) < _MESSAGE.size:
-                raise _DamageError(f"byte {record.offset}: a record is nonsense")
+                raise _DamageError(f"byte {record.offset}: a record is malformed")
             number, _, log_time_ns, _ = _MESSAGE.unpack_from(record.body)
             if topic := self.topics.get(number):
                 return McapMessage(topic, log_time_ns, bytes(record.body[_MESSAGE.size :]))
@@ -177,7 +177,7 @@ class _Channels:
 def _named(record: _Record, *names: str) -> str:
     """The first of ``names``, which are kept. Raises ``_DamageError``."""
     if sum(map(len, names)) > MAX_NAME:
-        raise _DamageError(f"byte {record.offset}: a name of thousands of letters")
+        raise _DamageError(f"byte {record.offset}: a name of thousands of characters")
     return names[0]
 
 
@@ -242,4 +242,4 @@ def _parse(read: Callable[[ReadDataStream], Any], record: _Record) -> Any:
     try:
         return read(ReadDataStream(io.BytesIO(record.body)))
     except (McapError, struct.error, UnicodeDecodeError, OverflowError) as error:
-        raise _DamageError(f"byte {record.offset}: a record is nonsense") from error
+        raise _DamageError(f"byte {record.offset}: a record is malformed") from error

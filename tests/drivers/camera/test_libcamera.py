@@ -263,7 +263,7 @@ class TestNames:
     def test_by_a_node_that_belongs_to_it(self, open_camera: Open) -> None:
         world = World(names=("imx708", "imx219"), nodes=(Path("/dev/null").stat().st_rdev,))
         take(open_camera(world, "/dev/null"), 1)
-        with pytest.raises(DeviceMissingError, match=r"^/dev/zero: no camera of libcamera's; found: imx708 \(/base/"):
+        with pytest.raises(DeviceMissingError, match=r"^/dev/zero: libcamera has no such camera; found: imx708 \(/base/"):
             open_camera(world, "/dev/zero")
 
     def test_a_name_that_two_have_is_refused_with_their_ids(self, open_camera: Open) -> None:
@@ -381,7 +381,7 @@ class TestByHand:
     def test_a_camera_that_is_not_there_is_one_line(self, capsys: pytest.CaptureFixture[str]) -> None:
         assert main(["imx500"]) == 1
         (line,) = capsys.readouterr().err.splitlines()
-        assert line.startswith("imx500: no camera of libcamera's; found: imx219")
+        assert line.startswith("imx500: libcamera has no such camera; found: imx219")
 
 
 class TestWhyThereIsNone:

@@ -106,12 +106,12 @@ def test_the_end_of_a_range_is_flagged(clipped: bytes) -> None:
 
 
 @given(st.integers(0, 1000), st.floats(0.05, 3.0))
-def test_rates_add_up_to_the_turn_that_was_made(seed: int, largest_radps: float) -> None:
+def test_rates_add_up_to_the_turn_that_was_made(seed: int, max_radps: float) -> None:
     """The angles are told to 0.01°; their steps cancel, whatever the orientation."""
     rng = np.random.default_rng(seed)
     phases, speeds = rng.uniform(0, 2 * math.pi, 3), rng.uniform(1.0, 4.0, 3)
     times = np.arange(100) / 100
-    gyro = largest_radps * np.sin(phases + speeds * times[:, None])
+    gyro = max_radps * np.sin(phases + speeds * times[:, None])
     encoder, parser = RvcEncoder(), RvcParser()
     found = [
         reading.gyro
@@ -124,5 +124,5 @@ def test_rates_add_up_to_the_turn_that_was_made(seed: int, largest_radps: float)
         window = slice(begin, begin + 5)  # a frame interval
         turned = np.sum(np.array(found)[window], axis=0) / 100
         assert turned == pytest.approx(
-            np.sum(truth[window], axis=0) / 100, abs=math.radians(0.03) + 2e-4 * largest_radps
+            np.sum(truth[window], axis=0) / 100, abs=math.radians(0.03) + 2e-4 * max_radps
         )

@@ -54,5 +54,5 @@ def test_a_reset_that_never_ends_is_reported(rig: RigMaker, monkeypatch: pytest.
 
 def test_a_command_that_is_never_done_is_reported(rig: RigMaker, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("hil_mocks.i2c.qmi8658.COMMAND_NS", 10**10)
-    with pytest.raises(DeviceLostError, match="does not do a command; switch its supply off and on"):
+    with pytest.raises(DeviceLostError, match="does not execute a command; switch its supply off and on"):
         rig("qmi8658").open()

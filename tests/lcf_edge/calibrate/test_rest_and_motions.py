@@ -146,7 +146,7 @@ def test_the_mounting_of_the_camera_is_allowed_for(turntable: Make, given: Make,
     [
         ("the motions contradict each other", by_hand(side_deg=-45)),
         ("the motions contradict each other", by_hand(left_deg=-90)),
-        ("end before this was seen: nose down; wanted, in this order: rest on level ground", by_hand(10, 10)),
+        ("end before this was seen: nose down; expected, in this order: rest on level ground", by_hand(10, 10)),
         ("end before this was seen: right side down", by_hand(10)),
         ("end before this was seen: left turn", by_hand(left_deg=20)),
     ],

@@ -377,7 +377,7 @@ def test_a_replay_goes_step_by_step(recording: Path) -> None:
         timeout=PATIENCE_S,
     )
     assert sequence(done) == [0, 1, 2]
-    assert done.stderr.startswith("picture 0: Enter lets it come, Ctrl-D ends\n")
+    assert done.stderr.startswith("picture 0: Enter shows it, Ctrl-D ends\n")
     assert "frames   3, 0.2 s of recording" in done.stderr
 
 

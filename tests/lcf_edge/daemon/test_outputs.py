@@ -75,7 +75,7 @@ def test_a_sink_that_fails_is_left_out_and_reported_once(link: Any, caplog: pyte
     outputs.close()
     assert outputs.statuses() == [DeviceStatus("kept", Level.ERROR, "disk/full: cannot be written")]
     assert [record.getMessage() for record in caplog.records] == [
-        "kept: disk/full: cannot be written; the daemon goes on without it"
+        "kept: disk/full: cannot be written; continuing without it"
     ]
 
 
@@ -96,7 +96,7 @@ def test_a_sink_that_does_not_end_is_left_behind_and_named(caplog: pytest.LogCap
             return timeout_s > 1
 
     Outputs([Stuck(), Kept()]).join(0.5)
-    assert [record.getMessage() for record in caplog.records] == ["stuck: does not end in time; left behind"]
+    assert [record.getMessage() for record in caplog.records] == ["stuck: does not end in time; abandoned"]
 
 
 def test_of_a_sink_only_put_and_close_must_be_written() -> None:

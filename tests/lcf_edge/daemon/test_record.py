@@ -150,7 +150,7 @@ def test_killed_it_leaves_all_but_the_last_second(start: Start, tmp_path: Path, 
 @pytest.mark.parametrize(
     ("arguments", "status", "part"),
     [
-        (("there.mcap",), 2, "there.mcap: is there already; name another file, or remove it"),
+        (("there.mcap",), 2, "there.mcap: already exists; name another file, or remove it"),
         (("drive.bag",), 2, "drive.bag: the name must end in .mcap"),
         (("nowhere/drive.mcap",), 1, "nowhere/drive.mcap: cannot be written"),
         (("drive.mcap", "--seconds", "0"), 2, "0: write a number above 0"),

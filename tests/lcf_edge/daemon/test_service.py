@@ -193,7 +193,7 @@ def test_when_no_more_sessions_are_let_in_that_is_reported(config: Config, runs:
     assert link.statuses["link"].level is Level.OK
     link.sessions = 2
     link.wait_for(lambda: link.statuses["link"].level is Level.WARN)
-    assert link.statuses["link"].message == "2 sessions: nobody else is let in"
+    assert link.statuses["link"].message == "2 sessions: no more are let in"
     assert link.statuses["link"].values["sessions"] == "2"
 
 
@@ -305,7 +305,7 @@ def test_a_broken_file_changes_nothing(
     scenes = len(link.scenes)
     link.wait_for(lambda: len(link.scenes) > scenes + 3)
     (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
-    assert message.endswith("; the old configuration stays")
+    assert message.endswith("; keeping the old configuration")
     assert str(path) in message
 
 
@@ -329,7 +329,7 @@ def test_a_file_that_is_emptied_changes_nothing(
     manager.until("RELOADING=1")
     manager.until("READY=1")
     (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
-    assert message.endswith("; the old configuration stays")
+    assert message.endswith("; keeping the old configuration")
     assert str(path) in message
     assert begun._config == config
 
@@ -407,7 +407,7 @@ def test_a_pipeline_that_fails_does_not_take_the_place_of_the_old_one(
     link.wait_for(lambda: len(link.scenes) > scenes + 5)
     (message,) = {record.getMessage() for record in caplog.records if record.getMessage().startswith("reload: ")}
     assert message == (
-        "reload: internal error: ZeroDivisionError('division by zero'); please report it; the old configuration stays"
+        "reload: internal error: ZeroDivisionError('division by zero'); please report it; keeping the old configuration"
     )
     assert begun._config == config
 

@@ -225,7 +225,7 @@ def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera)
     assert all(finding.level is Severity.OK and "exposure" not in finding.text for finding in look())
 
 
-@pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "burnt out")])
+@pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "overexposed")])
 def test_a_picture_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
     webcam.images = plain(grey)
     found = one(look(), Severity.WARN)
@@ -255,4 +255,4 @@ def test_a_camera_that_the_daemon_has_is_not_opened_but_asked_for(
     status = DeviceStatus("camera", Level.STALE, "silent since then", {"rate_hz": "29.97"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"camera": status}, "")
     _, found = camera.check(context)
-    assert (found.level, found.text) == (Severity.FAIL, "the daemon has it: silent since then (rate_hz 29.97)")
+    assert (found.level, found.text) == (Severity.FAIL, "in use by the daemon: silent since then (rate_hz 29.97)")

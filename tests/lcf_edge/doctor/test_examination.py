@@ -48,7 +48,7 @@ def test_a_check_that_hangs_is_reported_and_left_behind(machine: Machine) -> Non
     released.set()
     assert there.text == "there"
     assert (hung.level, hung.subject) == (Severity.FAIL, "camera")
-    assert hung.text.startswith("does not come back within 0.1 s")
+    assert hung.text.startswith("does not return within 0.1 s")
     assert hung.remedy
     assert [finding.text for finding in others] == ["one", "two"]
 

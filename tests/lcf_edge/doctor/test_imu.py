@@ -126,7 +126,7 @@ def test_a_copy_that_no_driver_knows_is_reported_and_how_to_learn_what_it_says(
 
     found = only(look(Imu()))
     assert found.level is Severity.WARN
-    assert found.text.endswith("; at 0x68 on i2c-1 is something that no driver knows: a copy of an IMU?")
+    assert found.text.endswith("; at 0x68 on i2c-1 is a device that no driver recognises: a copy of an IMU?")
     assert found.remedy.startswith("lcf-edge doctor --set imu.driver=mpu6500 --set imu.address=0x68 ")
     refused = only(look(Imu(driver="mpu6500", address=0x68)))
     assert refused.text.endswith("or imu.identity to 0x5e if it is a copy")
@@ -364,7 +364,7 @@ def test_an_imu_that_the_daemon_has_is_not_opened_but_asked_for(
     status = DeviceStatus("imu", Level.OK, "delivers", {"rate_hz": "200.00"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"imu": status}, "")
     found = only(list(imu.check(context)))
-    assert (found.level, found.text) == (Severity.OK, "the daemon has it: delivers (rate_hz 200.00)")
+    assert (found.level, found.text) == (Severity.OK, "in use by the daemon: delivers (rate_hz 200.00)")
 
 
 def test_a_daemon_without_an_imu_leaves_it_to_others(

@@ -45,9 +45,9 @@ def test_a_cool_board_is_reported_with_name_and_temperature(machine: Machine, wr
     heat, governor, disk = board.check(machine(Config(record=Record(folder="/"))))
     assert (heat.level, heat.text) == (
         Severity.OK,
-        "Raspberry Pi 4 Model B Rev 1.4: 48 °C, nothing slows it down",
+        "Raspberry Pi 4 Model B Rev 1.4: 48 °C, not throttled",
     )
-    assert (governor.level, governor.text) == (Severity.OK, "governor of the processor: ondemand")
+    assert (governor.level, governor.text) == (Severity.OK, "processor governor: ondemand")
     assert "GiB are free in / " in f"{disk.text} "
 
 
@@ -150,7 +150,7 @@ def test_systemd_is_asked_for_the_unit(machine: Machine, systemctl: Callable[[st
     answer = "\n".join(f"{key}={value}" for key, value in RUNNING.items())
     asks = f"""[ "$1 $2" = "show lcf-edge.service" ] && echo "{answer}" """
     (found,) = service.check(machine(systemctl=systemctl(asks)))
-    assert (found.level, found.text) == (Severity.OK, "running, never started anew")
+    assert (found.level, found.text) == (Severity.OK, "running, never restarted")
 
 
 def test_a_systemd_that_hangs_is_left(
@@ -180,13 +180,13 @@ def test_without_systemd_it_says_so(machine: Machine, command: str) -> None:
             "inactive (dead)",
             "sudo systemctl start lcf-edge",
         ),
-        ({"NRestarts": "3"}, Severity.WARN, "runs, after it was started anew 3 times", "journalctl -u lcf-edge"),
+        ({"NRestarts": "3"}, Severity.WARN, "running, restarted automatically 3 times", "journalctl -u lcf-edge"),
         ({"ActiveState": "failed", "Result": "watchdog"}, Severity.FAIL, "failed: the pipeline hung", "journalctl"),
         ({"ActiveState": "failed", "Result": "oom-kill"}, Severity.FAIL, "failed: it took more memory", "journalctl"),
         (
             {"ActiveState": "failed", "Result": "exit-code", "ExecMainStatus": "2"},
             Severity.FAIL,
-            "failed: its configuration cannot work",
+            "failed: its configuration cannot be used",
             "lcf-edge config",
         ),
         (

@@ -105,7 +105,7 @@ def test_a_scheduler_without_workers_is_refused(scheduler: Cluster, drive: Path)
 
 def test_workers_of_another_version_are_refused(monkeypatch: pytest.MonkeyPatch, cluster: Cluster, drive: Path) -> None:
     monkeypatch.setattr("lcf_edge.evaluate.workers.__version__", "0.0.0")
-    with pytest.raises(LcfError, match=r"lcf-edge \S+ there, 0\.0\.0 here; install the same at all workers"):
+    with pytest.raises(LcfError, match=r"lcf-edge \S+ there, 0\.0\.0 here; install the same version on all workers"):
         list(by_cluster([Task("drive", drive, Config())], cluster.endpoint, quiet))
 
 

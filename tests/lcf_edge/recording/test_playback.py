@@ -163,7 +163,7 @@ class TestTiming:
     ) -> None:
         camera = devices(RecordedCamera)
 
-        def most_bytes_after(pause_s: float) -> int:
+        def peak_bytes_after(pause_s: float) -> int:
             clock.sleep_s(pause_s)
             gc.collect()  # what other tests have left
             tracemalloc.reset_peak()
@@ -172,8 +172,8 @@ class TestTiming:
 
         tracemalloc.start()
         try:
-            after_a_minute = most_bytes_after(60.0)  # the IMU's ring is full then
-            after_four = most_bytes_after(240.0)
+            after_a_minute = peak_bytes_after(60.0)  # the IMU's ring is full then
+            after_four = peak_bytes_after(240.0)
         finally:
             tracemalloc.stop()
         assert after_four < 1.1 * after_a_minute

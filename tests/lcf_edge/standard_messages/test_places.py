@@ -136,7 +136,7 @@ def test_the_camera_sits_where_the_configuration_says(read: Read) -> None:
         vehicle=Vehicle(horizon_s=3.0),
     )
     setup = Setup.from_config(config, Lens(640, 480, 500.0, 500.0, 319.5, 239.5))
-    assert (setup.horizon_s, setup.most_trust) == (3.0, 5.0)
+    assert (setup.horizon_s, setup.max_trust) == (3.0, 5.0)
     (transform,) = read(camera_transform.encode_camera_transform(5, setup), camera_transform.MESSAGE).transforms
     assert (transform.header.frame_id, transform.child_frame_id) == ("base_footprint", "front")
     moved, turned = transform.transform.translation, transform.transform.rotation

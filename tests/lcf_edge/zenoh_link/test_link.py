@@ -112,11 +112,11 @@ def test_a_preview_is_wanted_only_while_somebody_looks(
     link = Link(session, Config(publish=Publish(preview_hz=100.0)))
     looking, gone = threading.Event(), threading.Event()
 
-    def tell(status: zenoh.MatchingStatus) -> None:
+    def on_match(status: zenoh.MatchingStatus) -> None:
         (looking if status.matching else gone).set()
 
     publisher = session.declare_publisher("lcf/preview/compressed")
-    with publisher.declare_matching_listener(tell):
+    with publisher.declare_matching_listener(on_match):
         assert not link.has_preview_subscriber()
         peer.subscribe("lcf/preview/*")
         assert looking.wait(PATIENCE_S)

@@ -275,7 +275,7 @@ def test_the_last_seconds_are_saved_for_independent_readers(seen: tuple[Any, Any
 
 def test_with_nothing_to_save_it_says_so(lonely: str) -> None:
     answer: Any = ask(lonely, "/save")
-    assert (answer.status, answer.body) == (404, b"nothing came in the last seconds: there is nothing to save\n")
+    assert (answer.status, answer.body) == (404, b"nothing arrived in the last seconds: there is nothing to save\n")
 
 
 def deaf(address: str) -> socket.socket:
@@ -335,7 +335,7 @@ def test_a_signal_ends_it_while_somebody_looks(rover: Any, view: Callable[..., A
 @pytest.mark.parametrize(
     ("arguments", "status", "part"),
     [
-        (["--listen", "192.0.2.1"], 1, "view: 192.0.2.1:8088: cannot be listened on"),
+        (["--listen", "192.0.2.1"], 1, "view: 192.0.2.1:8088: cannot listen"),
         (["--port", "70000"], 2, "--port: 70000"),
         (["--port", "x"], 2, "--port: x"),
         (["--connect", "nonsense"], 1, "nonsense"),
@@ -352,7 +352,7 @@ def test_what_cannot_be_served_ends_in_one_line(
 def test_a_port_in_use(lonely: str, capsys: pytest.CaptureFixture[str]) -> None:
     port = str(urlsplit(lonely).port)
     assert main(["view", "--port", port]) == 1
-    assert f"127.0.0.1:{port}: cannot be listened on (Address already in use)" in capsys.readouterr().err
+    assert f"127.0.0.1:{port}: cannot listen (Address already in use)" in capsys.readouterr().err
 
 
 def test_without_the_library_it_names_the_extra(

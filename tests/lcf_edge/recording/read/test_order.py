@@ -75,13 +75,13 @@ def test_a_long_stream_is_put_in_order_and_little_of_it_is_held() -> None:
     """Pictures arrive 40 ms late, at 20/s, next to an IMU at 200/s: as a camera driver delivers them."""
     arrivals = [(t + 40, camera_frame(t)) for t in range(0, 20_000, 50)] + [(t, imu(t)) for t in range(3, 20_000, 5)]
     arrivals.sort(key=lambda arrival: arrival[0])
-    taken = delivered = most_held = 0
+    taken = delivered = max_held = 0
 
     def source() -> Any:
-        nonlocal taken, most_held
+        nonlocal taken, max_held
         for _, item in arrivals:
             taken += 1
-            most_held = max(most_held, taken - delivered)
+            max_held = max(max_held, taken - delivered)
             yield item
 
     items = []
@@ -90,7 +90,7 @@ def test_a_long_stream_is_put_in_order_and_little_of_it_is_held() -> None:
         delivered += 1
         items.append(item)
     assert (len(items), late) == (len(arrivals), [])
-    assert most_held <= MAX_WAITING_FRAMES + MAX_WAITING_SAMPLES + 1
+    assert max_held <= MAX_WAITING_FRAMES + MAX_WAITING_SAMPLES + 1
     check_delivery(items, kinds=[ImuSample])
 
 
