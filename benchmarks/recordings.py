@@ -75,7 +75,7 @@ def tables(results: Sequence[Result]) -> list[Table]:
     return [
         table("Threats found, of those in sight", lambda s: f"{s.found}/{s.due}" if s.due else "-"),
         table("Found after, s", lambda s: number(s.latency_s, 2)),
-        table("Rebels on nothing, a picture", lambda s: number(s.false_a_picture, 2)),
+        table("Rebels on nothing, a picture", lambda s: number(s.false_per_frame, 2)),
         table("Pictures with a contact below 1 s that does not come", lambda s: str(s.contacts)),
         table("Step, median ms", lambda s: number(s.median_ms, 2)),
     ]

@@ -1,6 +1,6 @@
 """Draw docs/pictures/shape.svg, and write the table of columns in docs/developing.md: ``python docs/shape.py``.
 
-The picture shows which parts of the project import which. An arrow is left out where a longer way leads there as well.
+The image shows which parts of the project import which. An arrow is left out where a longer way leads there as well.
 Arrows go down; one that goes up is red.
 """
 
@@ -90,7 +90,7 @@ def reduced(arrows: Arrows) -> list[tuple[str, str]]:
 
 
 def svg() -> str:
-    """Return the picture."""
+    """Return the image."""
     place = {
         part: (round(_WIDTH * (column + 1) / (len(parts) + 1)), 30 + _ROW * row)
         for row, parts in enumerate(LAYERS)

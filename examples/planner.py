@@ -47,7 +47,7 @@ class Vehicle:
     focal_px: float = 500.0
     braking_mps2: float = 1.5  # that is comfortable
     acceleration_mps2: float = 1.0
-    delay_s: float = 0.35  # from a picture to the brakes
+    delay_s: float = 0.35  # from an image to the brakes
     gap_m: float = 0.7  # left to what it stops for
     margin_m: float = 0.2  # left to the side
 

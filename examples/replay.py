@@ -1,4 +1,4 @@
-"""A recording through the filter, as in a notebook: how many objects a frame has, and one frame as a picture.
+"""A recording through the filter, as in a notebook: how many objects a frame has, and one frame as an image.
 
 python examples/replay.py demo-out/recording demo-out/config.toml frame.png
 """

@@ -2,7 +2,7 @@
 
 ``python -m hil_mocks.libcamera_device WORLD FD REQUEST`` runs ``drivers.camera.libcamera_process`` on the cameras of
 ``WORLD``, which is a ``World`` as JSON. They behave as a Raspberry Pi's: a sensor with modes of which some see only a
-part of the picture, and the one of the nearest size is taken when nobody chooses; pictures in shared memory, at the
+part of the image, and the one of the nearest size is taken when nobody chooses; images in shared memory, at the
 camera's rate, on the system's clock. ``command`` makes what the driver is given.
 """
 
@@ -38,7 +38,7 @@ MODES = {  # size: what is seen of the sensor, shortest time of a frame in µs
 
 
 class World(msgspec.Struct, frozen=True, kw_only=True):
-    """What there is, and what goes wrong; numbers of pictures count from the start of the stream."""
+    """What there is, and what goes wrong; numbers of images count from the start of the stream."""
 
     names: tuple[str, ...] = ("imx219",)  # of the cameras
     nodes: tuple[int, ...] = ()  # device numbers that belong to the first
@@ -52,11 +52,11 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     busy: bool = False
     hangs: bool = False  # while it opens
     padding: int = 0  # bytes after each row
-    bad: bool = False  # every other picture is marked as bad
-    skipped: int = -1  # the picture that is lost
-    cancelled: int = -1  # the picture with which the camera is gone
-    crash: int = -1  # the picture at which libcamera crashes
-    silent: int = -1  # the picture from which on nothing comes
+    bad: bool = False  # every other image is marked as bad
+    skipped: int = -1  # the image that is lost
+    cancelled: int = -1  # the image with which the camera is gone
+    crash: int = -1  # the image at which libcamera crashes
+    silent: int = -1  # the image from which on nothing comes
     stamp_offset_s: float = 0.0
     stamped: bool = True  # SensorTimestamp is there
 
@@ -67,7 +67,7 @@ def command(world: World) -> tuple[str, ...]:
 
 
 class Status(Enum):
-    """Of requests, pictures and configurations; each of them has some."""
+    """Of requests, images and configurations; each of them has some."""
 
     Complete = Success = Valid = 0
     Adjusted = Cancelled = 1
@@ -75,7 +75,7 @@ class Status(Enum):
 
 
 class StreamRole(Enum):
-    """What pictures are for."""
+    """What images are for."""
 
     Viewfinder = 0
     Raw = 1
@@ -170,7 +170,7 @@ class Configuration:
 
 
 class Buffer:
-    """A picture's memory."""
+    """An image's memory."""
 
     def __init__(self, length: int) -> None:
         self.descriptor = os.memfd_create("picture")
@@ -252,14 +252,14 @@ class Camera:
         return Request(cookie)
 
     def start(self, controls: dict[Control, Any]) -> None:
-        """Pictures come from now on."""
+        """Images come from now on."""
         started_with = {control.name: value for control, value in controls.items()}
         if self._world.log_path:
             Path(self._world.log_path).write_text(json.dumps({"mode": self._mode, **started_with}), encoding="utf-8")
         threading.Thread(target=self._run, args=(started_with["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
 
     def stop(self) -> None:
-        """No more pictures."""
+        """No more images."""
         self._stopped.set()
 
     def queue_request(self, request: Request) -> None:
@@ -319,7 +319,7 @@ class Manager:
 
 
 class Allocator:
-    """Memory for a camera's pictures."""
+    """Memory for a camera's images."""
 
     def __init__(self, camera: Camera) -> None:
         self._camera = camera

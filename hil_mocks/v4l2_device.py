@@ -1,7 +1,7 @@
 """Cameras behind the kernel's V4L2 interface, so that the shipped driver runs without a kernel that has one.
 
 ``MockKernel`` answers the system calls of ``drivers.camera.v4l2_ioctl.Kernel`` for the ``MockCamera`` that are plugged
-into it; pictures come at the camera's rate on a clock. What a real device was seen to do wrong can be switched on.
+into it; images come at the camera's rate on a clock. What a real device was seen to do wrong can be switched on.
 """
 
 import errno
@@ -62,7 +62,7 @@ def drawn_image(seq: int, width: int, height: int) -> Grey:
 
 @dataclass
 class MockCamera:
-    """A camera and its faults; a fault that counts pictures ends by itself."""
+    """A camera and its faults; a fault that counts images ends by itself."""
 
     card: str = "Mock Webcam"
     driver: str = "uvcvideo"
@@ -72,7 +72,7 @@ class MockCamera:
     images: Callable[[int, int, int], Grey] = drawn_image
     transfer: float = 0.5  # share of an interval from start of exposure to the filled buffer
     row_padding: int = 0  # bytes after each row
-    data_offset: int = 0  # bytes before the picture, of a multi-planar device
+    data_offset: int = 0  # bytes before the image, of a multi-planar device
     field: int = v4l2.FIELD_NONE
     stamp_flags: int = v4l2.FLAG_TIMESTAMP_MONOTONIC | v4l2.FLAG_STAMPED_AT_EXPOSURE
     stamp_offset_s: float = 0.0
@@ -85,10 +85,10 @@ class MockCamera:
     dequeue_error: int = 0
     late_s: float = 0.0  # added to the transfer
     stalled: bool = False
-    drop: int = 0  # pictures that the camera loses
-    flag_error: int = 0  # pictures with V4L2_BUF_FLAG_ERROR
-    short: int = 0  # pictures of which half arrives
-    spoil: Callable[[bytes], bytes] | None = None  # what happens to the bytes of a picture
+    drop: int = 0  # images that the camera loses
+    flag_error: int = 0  # images with V4L2_BUF_FLAG_ERROR
+    short: int = 0  # images of which half arrives
+    spoil: Callable[[bytes], bytes] | None = None  # what happens to the bytes of an image
 
 
 class _Open:
@@ -101,7 +101,7 @@ class _Open:
         self.empty: deque[int] = deque()
         self.filled: deque[v4l2.Buffer] = deque()
         self.started_ns: int | None = None
-        self.exposed = 0  # pictures since the start of the stream
+        self.exposed = 0  # images since the start of the stream
 
 
 class MockKernel:
@@ -164,7 +164,7 @@ class MockKernel:
         return memory
 
     def poll(self, fd: int, timeout_s: float) -> int:
-        """As poll(2) for POLLIN; the clock goes on to the next picture or to the timeout."""
+        """As poll(2) for POLLIN; the clock goes on to the next image or to the timeout."""
         self.calls["poll"] += 1
         file = self._files[fd]
         end_ns = self._clock.monotonic_ns() + round(timeout_s * 1e9)
@@ -194,7 +194,7 @@ class MockKernel:
         return self._exposure_ns(file, number) + round((camera.transfer / file.fps + camera.late_s) * 1e9)
 
     def _expose(self, file: _Open) -> None:
-        """Fill buffers with the pictures that are complete by now; without an empty buffer they are lost."""
+        """Fill buffers with the images that are complete by now; without an empty buffer they are lost."""
         now_ns = self._clock.monotonic_ns()
         while file.started_ns is not None and self._complete_ns(file, file.exposed) <= now_ns:
             number = file.exposed
@@ -336,7 +336,7 @@ class MockKernel:
 
 
 def encode(image: Grey, pixel_format: str, row_padding: int = 0) -> bytes:
-    """A grey picture as a camera would send it, rows of raw formats followed by padding.
+    """A grey image as a camera would send it, rows of raw formats followed by padding.
 
     Bits that the format has beyond eight are set, so that a reader that takes the wrong ones sees it.
     """

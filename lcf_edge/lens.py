@@ -95,8 +95,8 @@ class Lens:
             return self
         if abs(width * self.height - height * self.width) > max(self.width, self.height):  # 1 px of rounding
             raise ConfigError(
-                f"camera.intrinsics: made for {self.width}x{self.height}, the pictures are {width}x{height}, "
-                "another aspect; give camera.intrinsics, camera.width and camera.height of these pictures"
+                f"camera.intrinsics: made for {self.width}x{self.height}, the images are {width}x{height}, "
+                "another aspect; give camera.intrinsics, camera.width and camera.height of these images"
             )
         sx, sy = width / self.width, height / self.height
         cx, cy = (self.cx + 0.5) * sx - 0.5, (self.cy + 0.5) * sy - 0.5

@@ -104,7 +104,7 @@ class Pipeline:
             raise ConfigError(
                 f"memory.budget_mib: the tables need {needed_mib:.2f} MiB, the budget is {budget_mib:g}; "
                 f"most goes to {name} ({size / 2**20:.2f}): lower the other keys of memory, or take smaller "
-                "pictures"
+                "images"
             )
 
     def table_bytes(self) -> dict[str, int]:

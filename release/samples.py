@@ -75,7 +75,7 @@ def write(drive: Drive, path: Path) -> None:
 
 
 def _items(drive: Drive) -> Iterator[tuple[Frame, Truth] | ImuSample | SpeedSample]:
-    """In the order in which a daemon gets them: before each picture the samples up to the first one after it."""
+    """In the order in which a daemon gets them: before each image the samples up to the first one after it."""
     samples: list[ImuSample | SpeedSample] = [*scenes.imu(drive), *scenes.odometry(drive)]
     samples.sort(key=lambda sample: sample.stamp_ns)
     late_ns = round(1e9 / min(scenes.IMU_HZ, scenes.ODOMETRY_HZ))

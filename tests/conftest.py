@@ -41,10 +41,10 @@ def pytest_configure() -> None:
 
 @dataclass(frozen=True)
 class Approach:
-    """A straight drive at ``speed_mps`` towards a wall that fills the picture, ``wall_m`` away at the start.
+    """A straight drive at ``speed_mps`` towards a wall that fills the image, ``wall_m`` away at the start.
 
     In front of it a square of 48 px goes to the right at 80 px/s.
-    Iterating gives pictures, IMU samples and speeds in the order in which a recording delivers them.
+    Iterating gives images, IMU samples and speeds in the order in which a recording delivers them.
     """
 
     frames: int = 16
@@ -70,7 +70,7 @@ class Approach:
             yield Frame(frame_ns, seq, self.image(seq))
 
     def stamp_ns(self, seq: int) -> int:
-        """Time of a picture."""
+        """Time of an image."""
         return self.start_ns + round(seq * 1e9 / self.fps)
 
     def image(self, seq: int) -> Grey:
@@ -115,7 +115,7 @@ def approach() -> Callable[..., Approach]:
 
 @pytest.fixture(scope="session")
 def noise() -> Callable[..., Grey]:
-    """Pictures in which everything is a corner."""
+    """Images in which everything is a corner."""
 
     def draw(seed: int = 0, width: int = 640, height: int = 480) -> Grey:
         return np.random.default_rng(seed).integers(0, 256, (height, width), np.uint8)

@@ -64,5 +64,5 @@ class Arrivals:
         self._waited_ns += waited_ns
         if self._waited_ns > self._stall_ns:
             raise DeviceStalledError(
-                f"{self._name}: no usable picture for {self._stall_ns / 1e9:.1f} s; check cable, power and light"
+                f"{self._name}: no usable image for {self._stall_ns / 1e9:.1f} s; check cable, power and light"
             )

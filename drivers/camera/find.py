@@ -53,7 +53,7 @@ def _by_path(path: str, kernel: Kernel) -> Node:
     node.close()
     if node.needs_libcamera:
         raise WrongDeviceError(f"{path}: {NEEDS_LIBCAMERA}; {_found(kernel)}")
-    raise WrongDeviceError(f"{path}: gives no pictures (metadata, output or radio); {_found(kernel)}")
+    raise WrongDeviceError(f"{path}: gives no images (metadata, output or radio); {_found(kernel)}")
 
 
 def _by_name(name: str, kernel: Kernel) -> Node:

@@ -86,7 +86,9 @@ def _find(manager: Any, device: str) -> Any:
         found = found or [camera for camera, own in names if any(device_name in name for name in own)]
     listed = ", ".join(f"{_model(camera)} ({camera.id})" for camera in cameras)
     if not found:
-        raise Refused("missing", f"libcamera has no such camera; found: {listed}; set camera.device to one of these names")
+        raise Refused(
+            "missing", f"libcamera has no such camera; found: {listed}; set camera.device to one of these names"
+        )
     if len(found) > 1:
         raise Refused("wrong", f"more than one camera has this name; use an id from: {listed}")
     return found[0]
@@ -257,7 +259,7 @@ def _check_rate(camera: Any, fps: float) -> None:
     fastest_us, slowest_us = _limits(camera)
     if slowest_us and not 0.99 * fastest_us <= 1e6 / fps <= 1.01 * slowest_us:
         slow, fast = 1e6 / slowest_us, 1e6 / fastest_us if fastest_us else 0.0
-        raise Refused("unsupported", f"no {fps:g} pictures a second at this size; offered: {slow:.4g}..{fast:.4g}/s")
+        raise Refused("unsupported", f"no {fps:g} frames a second at this size; offered: {slow:.4g}..{fast:.4g}/s")
 
 
 def _limits(camera: Any) -> tuple[int, int]:

@@ -199,7 +199,7 @@ def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, heigh
     if (granted.width, granted.height, granted.pixel_format) != (*size, name):
         raise refusal
     if granted.field not in {FIELD_ANY, FIELD_NONE}:
-        raise UnsupportedSettingError(f"{node.name}: only interlaced pictures; choose another size or camera")
+        raise UnsupportedSettingError(f"{node.name}: only interlaced images; choose another size or camera")
     granted_fps = _set_rate(node, fps)
     if abs(granted_fps / fps - 1) > offers.RATE_TOLERANCE:
         raise refusal

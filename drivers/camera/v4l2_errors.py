@@ -15,7 +15,7 @@ from drivers.errors import (
 )
 
 NEEDS_LIBCAMERA = (
-    'gives pictures only through libcamera, as ribbon-cable cameras do; set camera.driver = "libcamera"'
+    'gives images only through libcamera, as ribbon-cable cameras do; set camera.driver = "libcamera"'
     " (docs/raspberry-pi.md)"
 )
 NOT_SET_UP = (errno.EINVAL, errno.EPIPE, errno.ENOLINK)  # of STREAMON: the pipeline does not fit, or leads nowhere

@@ -189,7 +189,9 @@ class _Polled:
             self._counts["io_error"] += 1
             gone = isinstance(error, OSError) and error.errno in (errno.ENODEV, errno.ENOENT, errno.EBADF)
             if gone or self._failed >= TRIES:
-                raise DeviceLostError(f"{self._name}: can no longer be read ({error}); is the chip still connected?") from error
+                raise DeviceLostError(
+                    f"{self._name}: can no longer be read ({error}); is the chip still connected?"
+                ) from error
             return []
         self._failed = 0
         return [self._scale.sample(stamp_ns, counts)]

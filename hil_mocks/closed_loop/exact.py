@@ -1,4 +1,4 @@
-"""What is true of each body in a picture, as the records of objects have it."""
+"""What is true of each body in an image, as the records of objects have it."""
 
 import math
 from collections.abc import Sequence
@@ -31,11 +31,11 @@ class Motion:
 
 @dataclass(frozen=True, slots=True)
 class Exact:
-    """One body in one picture; right and forward are those of the vehicle."""
+    """One body in one image; right and forward are those of the vehicle."""
 
     number: int
     name: str
-    box: Bounds  # x, y, w, h in px of the picture, clipped to it
+    box: Bounds  # x, y, w, h in px of the image, clipped to it
     visible: float  # share of its area that nothing nearer hides
     range_m: float  # ahead of the camera, to its nearest corner
     bearing_rad: float  # of the middle of its box
@@ -50,7 +50,7 @@ class Exact:
 
     @property
     def in_sight(self) -> bool:
-        """Large enough in the picture, and not mostly hidden."""
+        """Large enough in the image, and not mostly hidden."""
         return self.visible >= MIN_VISIBLE and min(self.box[2:]) >= MIN_BOX_PX
 
     @property

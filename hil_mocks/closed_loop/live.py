@@ -33,12 +33,12 @@ Item = Frame | ImuSample | SpeedSample
 
 
 def world_of(seed: int) -> World:
-    """The world of a seed with small pictures, which a busy computer draws in time; it starts at rest."""
+    """The world of a seed with small images, which a busy computer draws in time; it starts at rest."""
     return worlds.make(seed, lens=LENS, start_mps=0.0)
 
 
 class LiveDriver:
-    """Hands pictures and samples to the devices as they come, and obeys the newest speed."""
+    """Hands images and samples to the devices as they come, and obeys the newest speed."""
 
     def __init__(self, fps: float) -> None:
         self.target_mps = 0.0
@@ -49,7 +49,7 @@ class LiveDriver:
         self._came = threading.Condition()
 
     def decide(self, moment: Moment) -> float:
-        """The speed that is wanted when the next picture is due, m/s."""
+        """The speed that is wanted when the next image is due, m/s."""
         assert moment.frame is not None
         with self._came:
             for item in (*moment.samples, moment.frame):
@@ -86,7 +86,7 @@ class _Device:
         self._live, self._kind = live, kind
 
     def read(self) -> Sequence[Item]:
-        """What came; of pictures the newest."""
+        """What came; of images the newest."""
         found = self._live.come(self._kind)
         return found[-1:] if self._kind is Frame else found
 

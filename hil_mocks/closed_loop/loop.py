@@ -1,4 +1,4 @@
-"""One drive in lockstep: picture and samples in, a decision out, which changes the next picture."""
+"""One drive in lockstep: image and samples in, a decision out, which changes the next image."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ from lcf_edge.rendered.projection import Stage
 from lcf_edge.rendered.rendering import Renderer
 
 BODIES_EVERY = 2  # steps of the vehicle
-LATE_STEPS = 4  # samples that are read after a picture was taken and before it is looked at
+LATE_STEPS = 4  # samples that are read after an image was taken and before it is looked at
 STANDS_MPS = 0.02
 _ARRIVED_S = 1.0  # that it stands before what ends its course
 _NEAR_END_M = 1.5
@@ -31,7 +31,7 @@ class Moment:
     speed_mps: float  # of the vehicle, true
     curvature: float  # of the course here, 1/m, left positive
     samples: tuple[ImuSample | SpeedSample, ...]  # since the last
-    frame: Frame | None  # None: no pictures are drawn
+    frame: Frame | None  # None: no images are drawn
     known: tuple[Exact, ...]
 
 
@@ -54,7 +54,7 @@ class Contact:
 
 @dataclass(slots=True)
 class Log:
-    """What a drive was, one entry a picture."""
+    """What a drive was, one entry an image."""
 
     cruise_mps: list[float] = field(default_factory=list)
     target_mps: list[float] = field(default_factory=list)

@@ -13,7 +13,7 @@ _BEFORE_S, _AFTER_S = 1.0, 0.5  # the truth's own braking is looked for so long 
 
 @dataclass(frozen=True, slots=True)
 class Braking:
-    """From the first to the last picture of it."""
+    """From the first to the last image of it."""
 
     first: int
     last: int
@@ -43,9 +43,9 @@ class Outcome:
 
 
 def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
-    """The brakings of a drive; `right`: whether the planner with the truth would brake, for each picture.
+    """The brakings of a drive; `right`: whether the planner with the truth would brake, for each image.
 
-    A braking is for nothing if it would not in any picture of it, nor shortly before or after.
+    A braking is for nothing if it would not in any image of it, nor shortly before or after.
     """
     found: list[Braking] = []
     first: int | None = None
@@ -72,7 +72,7 @@ def brakes(target_mps: float, cruise_mps: float) -> bool:
 
 
 def was_in_view(log: Log, contact: Contact, fps: float) -> bool:
-    """Whether a picture showed what was run into early enough to stop, and late enough to be remembered then.
+    """Whether an image showed what was run into early enough to stop, and late enough to be remembered then.
 
     Where none did, the planner with the truth, in this drive, would have run into it as well.
     """

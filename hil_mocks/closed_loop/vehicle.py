@@ -24,7 +24,7 @@ class Build:
     wheelbase_m: float = 0.5  # of the bicycle
     acceleration_mps2: float = 1.0
     braking_mps2: float = 2.5  # the most
-    delay_s: float = 0.15  # from a picture to the first effect of what was decided on it
+    delay_s: float = 0.15  # from an image to the first effect of what was decided on it
     drive_lag_s: float = 0.12
     steering_lag_s: float = 0.12
     steering_radps: float = 1.5  # fastest turn of the bicycle's wheel
@@ -65,7 +65,7 @@ class Vehicle:
         return self.position + corners @ self.axes
 
     def command(self, time_s: float, speed_mps: float) -> None:
-        """Decide a speed on the picture of a time."""
+        """Decide a speed on the image of a time."""
         self._commands.append((time_s + self.build.delay_s, max(speed_mps, 0.0)))
 
     def step(self, time_s: float, dt_s: float, track_m: float) -> None:

@@ -43,7 +43,7 @@ FPS = 15.0
 WARM_S = 4.0
 PAUSE_S = 2.0
 PATIENCE_S = 30.0
-BUDGET_MIB = 120.0  # the stand-in's pictures are in it
+BUDGET_MIB = 120.0  # the stand-in's images are in it
 BEYOND_MIB = 10.0  # the budget, for a moment
 MIN_SHARE = 0.9  # of the frames, where the attackers have processors of their own
 LET_IN_S = 2.0
@@ -59,7 +59,7 @@ class Figures:
     let_in_s: list[float] = field(default_factory=list)  # of planners
     descriptors: dict[str, int] = field(default_factory=dict)  # most
     memory_mib: float = 0.0  # of the daemon, most
-    frames_share: float = 0.0  # of the pictures that the camera made
+    frames_share: float = 0.0  # of the images that the camera made
     excess_bytes: int = 0  # of the wild IMU, that the daemon dropped
     pages: int = 0
     complaints: list[str] = field(default_factory=list)
@@ -186,7 +186,7 @@ def watched(
     for attack in attacks:
         attack.start()
     with opened_session(reading_from(f"tls/localhost:{outer}", planner)) as session:
-        received: list[int] = []  # numbers of pictures
+        received: list[int] = []  # numbers of images
 
         def count(sample: zenoh.Sample) -> None:
             received.append(decode_scene(SCENE.payload(sample)).seq)

@@ -26,11 +26,11 @@ from lcf_edge.zenoh_link import opened_session
 
 KINDS = ("crossing", "passing", "two_crossing", "oncoming")  # of drives, in turn
 SILENT_S = 60.0  # without diagnostics: the daemon is stuck, or gone
-SETTLED = 3  # seconds with the same counters: all pictures are where they belong
+SETTLED = 3  # seconds with the same counters: all images are where they belong
 RELOAD_EACH_S = 20.0  # in the mean
 LOOK_EACH_S = 15.0
 ENDS_WITHIN_S = 10.0
-BUDGET_MIB = 192.0  # the drive's pictures are in it
+BUDGET_MIB = 192.0  # the drive's images are in it
 
 
 class SoakError(LcfError):
@@ -103,7 +103,7 @@ class Daemon:
         return (self.log.read_text(encoding="utf-8", errors="replace").splitlines() or ["(it is empty)"])[-1]
 
     def pause(self) -> None:
-        """Let no picture come."""
+        """Let no image come."""
         self._process.send_signal(signal.SIGUSR1)
 
     go_on = pause
@@ -140,7 +140,7 @@ class Daemon:
 
 
 def live(daemon: Daemon, life: Life, frame_limit: int, seconds: float) -> None:
-    """One life, until so many pictures or seconds are over. Raises ``SoakError``."""
+    """One life, until so many images or seconds are over. Raises ``SoakError``."""
     begin_s = time.monotonic()
     daemon.look(on=True)  # what the first look costs belongs to the warm-up
     while life.balance.put < frame_limit and time.monotonic() - begin_s < seconds:
@@ -194,7 +194,7 @@ def soak(frame_limit: int, seconds: float, lives: int, seed: int, folder: Path) 
             finally:
                 daemon.close()
                 rows = (f"{put},{mib}" for put, mib in life.memory)
-                (place / "memory.csv").write_text("\n".join(("pictures,MiB", *rows)) + "\n", encoding="ascii")
+                (place / "memory.csv").write_text("\n".join(("images,MiB", *rows)) + "\n", encoding="ascii")
     return lived
 
 
@@ -204,7 +204,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         prog="python -m hil_mocks.soak", description="The daemon at full speed, with random faults.", allow_abbrev=False
     )
     length = parser.add_mutually_exclusive_group(required=True)
-    length.add_argument("--frames", type=_positive, metavar="N", help="pictures in all")
+    length.add_argument("--frames", type=_positive, metavar="N", help="images in all")
     length.add_argument("--minutes", type=float, metavar="N", help="time in all")
     parser.add_argument("--lives", type=_positive, default=4, metavar="N", help="runs of the daemon (%(default)s)")
     parser.add_argument("--seed", type=int, default=1, metavar="N", help="of the faults (%(default)s)")
@@ -213,7 +213,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         type=float,
         default=1.0,
         metavar="N",
-        help="growth of memory in 100,000 pictures, beyond 3 sigma, that is no failure (%(default)s)",
+        help="growth of memory in 100,000 images, beyond 3 sigma, that is no failure (%(default)s)",
     )
     parser.add_argument("--logs", type=Path, metavar="DIR", help="keep log and memory of each life here")
     arguments = parser.parse_args(argv)

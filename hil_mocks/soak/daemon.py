@@ -1,6 +1,6 @@
 """`lcf-edge run` on the stand-ins of the soak: ``python -m hil_mocks.soak.daemon DRIVE.npz SEED [OPTION ...]``.
 
-SIGUSR1 stops the pictures, and lets them go on.
+SIGUSR1 stops the images, and lets them go on.
 """
 
 import signal

@@ -9,7 +9,7 @@ import numpy as np
 
 from lcf_edge.diagnostics import DeviceStatus
 
-WARM_UP = 20_000  # pictures of a life, or its first half, whose memory is not looked at: pools and caches fill
+WARM_UP = 20_000  # images of a life, or its first half, whose memory is not looked at: pools and caches fill
 PER_FRAMES = 100_000
 
 Parts = Mapping[str, DeviceStatus]
@@ -17,7 +17,7 @@ Parts = Mapping[str, DeviceStatus]
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """Where the pictures of one life are."""
+    """Where the images of one life are."""
 
     delivered: int
     put: int
@@ -35,13 +35,13 @@ class Balance:
 
     @property
     def lost(self) -> int:
-        """Frames that left no trace; while pictures come, one or two are on their way."""
+        """Frames that left no trace; while images come, one or two are on their way."""
         return self.delivered - self.put - self.overtaken
 
 
 @dataclass(slots=True)
 class Life:
-    """One run of the daemon. ``memory``: pictures put so far, and MiB that were resident then."""
+    """One run of the daemon. ``memory``: images put so far, and MiB that were resident then."""
 
     seed: int
     memory: list[tuple[int, float]] = field(default_factory=list)
@@ -71,7 +71,7 @@ class Life:
 
 
 def slope(lives: Sequence[Sequence[tuple[int, float]]]) -> tuple[float, float]:
-    """MiB in ``PER_FRAMES`` pictures that all lives have in common, and its 1 sigma; NaN: too little was seen.
+    """MiB in ``PER_FRAMES`` images that all lives have in common, and its 1 sigma; NaN: too little was seen.
 
     A straight line with an offset of its own for each life, fitted by least squares to what comes after the warm-up.
     Successive values resemble each other, which widens sigma as a first-order autoregression does.
@@ -110,12 +110,12 @@ def lines(lives: Sequence[Life]) -> list[str]:
     counts = sum((life.counts for life in lives), Counter[str]())
     return [
         *report,
-        f"pictures: {sum(one.delivered for one in balances)} delivered, {put} put, "
+        f"images: {sum(one.delivered for one in balances)} delivered, {put} put, "
         f"{sum(one.overtaken for one in balances)} overtaken, {sum(one.lost for one in balances)} lost",
         f"scenes received by the subscriber: {sum(life.received for life in lives)} of {put}",
         f"restarts: {len(lives) - 1}",
         "counted: " + (", ".join(f"{what} {number}" for what, number in sorted(counts.items())) or "nothing"),
-        f"memory: {rise:+.3f} MiB per {PER_FRAMES} pictures, 1 sigma {sigma:.3f}",
+        f"memory: {rise:+.3f} MiB per {PER_FRAMES} images, 1 sigma {sigma:.3f}",
     ]
 
 
@@ -127,13 +127,13 @@ def _warm_and_end(memory: Sequence[tuple[int, float]]) -> tuple[float, float]:
 
 
 def _warm(memory: Sequence[tuple[int, float]]) -> float:
-    """Pictures after which it is warm."""
+    """Images after which it is warm."""
     return min(WARM_UP, memory[-1][0] / 2) if memory else 0
 
 
 def complaints(lives: Sequence[Life], allowed_mib: float) -> list[str]:
     """What a soak must not show: one line each."""
-    found = [f"life {n}: {life.balance.lost} pictures lost" for n, life in enumerate(lives, 1) if life.balance.lost]
+    found = [f"life {n}: {life.balance.lost} images lost" for n, life in enumerate(lives, 1) if life.balance.lost]
     found += [f"life {n}: {life.gave_up}" for n, life in enumerate(lives, 1) if life.gave_up]
     found += [
         f"life {n}: SIGTERM took {life.ended_s:.1f} s"
@@ -142,5 +142,5 @@ def complaints(lives: Sequence[Life], allowed_mib: float) -> list[str]:
     ]
     rise, sigma = slope([life.memory for life in lives])
     if rise - 3 * sigma > allowed_mib:
-        found.append(f"memory grows by {rise:.2f} MiB per {PER_FRAMES} pictures, {allowed_mib:g} are allowed")
+        found.append(f"memory grows by {rise:.2f} MiB per {PER_FRAMES} images, {allowed_mib:g} are allowed")
     return found

@@ -1,7 +1,7 @@
-"""Camera, IMU and odometry of one drive that is driven again and again, as fast as the daemon takes its pictures.
+"""Camera, IMU and odometry of one drive that is driven again and again, as fast as the daemon takes its images.
 
 The drive's own time runs: stamps are those of a vehicle in real time, only that they come sooner. Whoever knows that a
-picture became a scene calls ``Feed.taken``, and the next one comes. Faults come at random, from a seed.
+image became a scene calls ``Feed.taken``, and the next one comes. Faults come at random, from a seed.
 """
 
 import threading
@@ -21,9 +21,9 @@ from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import stamp_ns
 
 WAIT_S = 0.25  # of one read
-CAMERA_FAULT_EACH = 1500  # pictures, in the mean
+CAMERA_FAULT_EACH = 1500  # images, in the mean
 SAMPLES_FAULT_EACH = 3000  # reads of IMU or odometry, in the mean
-MAX_FAULT = 40  # pictures
+MAX_FAULT = 40  # images
 
 Table = npt.NDArray[np.float64]
 CameraFault = Literal["unplugged", "dropped", "burst", "dark", "noise", "leap"]
@@ -32,7 +32,7 @@ SAMPLE_FAULTS = ("unplugged", "wild", "gap", "again")
 
 
 def save(drive: scenes.Drive, path: Path) -> None:
-    """Render a drive into one file (npz): pictures, and samples with their time from the first picture, s."""
+    """Render a drive into one file (npz): images, and samples with their time from the first image, s."""
     start_ns = stamp_ns(0.0)
     frames = [frame for frame, _ in scenes.frames(drive)]
     np.savez(
@@ -47,7 +47,7 @@ def save(drive: scenes.Drive, path: Path) -> None:
 
 
 class Feed:
-    """The drive's time, which all devices share. ``start_ns``: of the first picture, monotonic."""
+    """The drive's time, which all devices share. ``start_ns``: of the first image, monotonic."""
 
     def __init__(self, path: Path, seed: int, start_ns: int) -> None:
         with np.load(path) as drive:
@@ -57,7 +57,7 @@ class Feed:
             self.lap_s = float(drive["seconds"])
         self.random = Random(seed)
         self.faults: Counter[str] = Counter()
-        self.seq = 0  # of the next picture
+        self.seq = 0  # of the next image
         self.start_ns = start_ns
         self.interval_ns = round(self.lap_s / len(self.images) * 1e9)
         self._horizon_ns = start_ns
@@ -68,22 +68,22 @@ class Feed:
         self._goes_on.set()
 
     def taken(self) -> None:
-        """The newest picture is done with."""
+        """The newest image is done with."""
         self._taken.set()
 
     def pause_or_go_on(self) -> None:
-        """No picture comes until it is called again; for a signal handler."""
+        """No image comes until it is called again; for a signal handler."""
         (self._goes_on.clear if self._goes_on.is_set() else self._goes_on.set)()
 
     def await_taken(self) -> bool:
-        """Wait until the next picture may come; False: not yet."""
+        """Wait until the next image may come; False: not yet."""
         if self._goes_on.wait(WAIT_S) and self._taken.wait(WAIT_S):
             self._taken.clear()
             return True
         return False
 
     def advance(self, frames: int = 1) -> int:
-        """Let time pass, with all samples up to the next picture and one more. Return its stamp."""
+        """Let time pass, with all samples up to the next image and one more. Return its stamp."""
         with self._passed:
             self.seq += frames
             stamp_ns = self.start_ns + (self.seq - 1) * self.interval_ns
@@ -115,12 +115,12 @@ class FastCamera:
         self.counts: Counter[str] = Counter()
         self._feed = feed
         self._fault = ""
-        self._left = 0  # pictures that it lasts
+        self._left = 0  # images that it lasts
         if feed.fault("camera", ("missing",), each=4):
             raise DeviceMissingError(f"{self.name}: unplugged; plug it in again")
 
     def read(self) -> list[Frame]:
-        """The next picture. Raises ``DeviceLostError`` now and then."""
+        """The next image. Raises ``DeviceLostError`` now and then."""
         feed = self._feed
         if self._fault != "burst" and not feed.await_taken():
             return []
@@ -147,11 +147,11 @@ class FastCamera:
         self.counts[f"fault {self._fault}"] += 1
         self._left = self._feed.random.randint(2, MAX_FAULT) if self._fault in {"burst", "dark", "noise"} else 1
         if self._fault == "unplugged":
-            self._feed.taken()  # the picture that would have come
+            self._feed.taken()  # the image that would have come
             raise DeviceLostError(f"{self.name}: unplugged; plug it in again")
 
     def _skipped(self) -> int:
-        """Pictures that the camera counts and nobody gets."""
+        """Images that the camera counts and nobody gets."""
         most = {"dropped": MAX_FAULT, "leap": 200}.get(self._fault, 0)
         skipped = self._feed.random.randint(1, most) if most else 0
         self.counts["dropped"] += skipped

@@ -197,7 +197,7 @@ def align(turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float =
 def _refuse_few(turns: Sequence[Turn], samples: Sequence[ImuSample]) -> None:
     if len(turns) < _MIN_TURNS or len(samples) < _MIN_TURNS:
         raise CalibrationError(
-            f"camera and imu: rotation seen in {len(turns)} intervals between pictures, {len(samples)} inertial "
+            f"camera and imu: rotation seen in {len(turns)} intervals between images, {len(samples)} inertial "
             f"samples; {_MIN_TURNS} of each are needed: record for longer, facing something with corners"
         )
     saturated = sum(sample.saturated for sample in samples)

@@ -35,7 +35,7 @@ def axes_of(watched: Watched, config: Config, snap_rad: float) -> Result:
         )
     axes, words = snapped(alignment.axes, snap_rad)
     findings = (
-        f"{len(alignment.camera)} intervals between pictures, {len(watched.samples)} inertial samples",
+        f"{len(alignment.camera)} intervals between images, {len(watched.samples)} inertial samples",
         f"correlation: {alignment.correlation:.3f}; left over: {alignment.residual_radps:.3f} rad/s of an axis, where "
         f"{', '.join(f'{rate:.2f}' for rate in alignment.rates_radps)} rad/s were turned about x, y, z",
         *words,

@@ -110,7 +110,7 @@ def solve(views: Views, model: Model) -> Result:
 def refuse_poor(views: Views) -> None:
     """Refuse views that do not determine a lens. Raises ``CalibrationError``."""
     if len(views.kept) < MIN_VIEWS:
-        reasons = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common(3)) or "no pictures"
+        reasons = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common(3)) or "no images"
         raise CalibrationError(
             f"camera: {len(views.kept)} usable views of {views.board.name}, at least {MIN_VIEWS} are needed "
             f"(left out: {reasons}); check --board, light and focus, and show it from more sides"
@@ -119,12 +119,12 @@ def refuse_poor(views: Views) -> None:
     spread = np.ptp(middles, axis=0)
     if spread.min() < _MIN_SPREAD:
         way = ("from left to right", "up and down")[int(np.argmin(spread))]
-        raise CalibrationError(f"camera: the board was always in one place; move it {way} through the whole picture")
+        raise CalibrationError(f"camera: the board was always in one place; move it {way} through the whole image")
     share = float(views.covered().mean())
     if share < _MIN_COVERAGE:
         raise CalibrationError(
-            f"camera: corners were seen in {share:.0%} of the picture, {_MIN_COVERAGE:.0%} are needed; hold the "
-            "board nearer, and into the picture's corners"
+            f"camera: corners were seen in {share:.0%} of the image, {_MIN_COVERAGE:.0%} are needed; hold the "
+            "board nearer, and into the image's corners"
         )
 
 
@@ -153,7 +153,7 @@ def refuse_unbelievable(solution: Solution, views: Views, model: Model) -> None:
     corners = np.array([(x, y) for x in (0, width - 1) for y in (0, height - 1)], np.float32)
     if not np.isfinite(lens.undistort(corners)).all():
         raise CalibrationError(
-            "camera: the lens that was found folds back inside the picture; take views in the picture's corners, or "
+            "camera: the lens that was found folds back inside the image; take views in the image's corners, or "
             "try the other --model"
         )
 
@@ -232,9 +232,9 @@ def _result(solution: Solution, kept: list[Sighting], dropped: int, views: Views
     findings = (
         f"{len(kept)} views of {views.board.name}, {sum(len(view.corners) for view in kept)} corners"
         + (f"; {dropped} views left out, with outlying errors" if dropped else ""),
-        f"pictures left out: {left_out or 'none'}",
+        f"images left out: {left_out or 'none'}",
         f"reprojection error: {solution.error_px:.3f} px; of a view {errors.min():.3f} to {errors.max():.3f} px",
-        f"picture covered: {views.covered().mean():.0%}; board tilted by up to {tilt_deg:.0f}°",
+        f"image covered: {views.covered().mean():.0%}; board tilted by up to {tilt_deg:.0f}°",
         f"focal length: {fx:.2f} ± {sigma[0]:.2f}, {fy:.2f} ± {sigma[1]:.2f} px",
         f"centre: {cx:.2f} ± {sigma[2]:.2f}, {cy:.2f} ± {sigma[3]:.2f} px",
         "distortion: " + ", ".join(f"{k:.4f} ± {s:.4f}" for k, s in zip(solution.distortion, sigma[4:], strict=True)),

@@ -54,7 +54,7 @@ def watch(source: SensorSource, config: Config, seconds: float | None, guide: Gu
         if tracks is not None:
             watched.add(turn(tracks, travel(config)))
         guide.progress(
-            f"{len(watched.turns)} pictures, {len(watched.samples)} samples, {watched.brisk_s:.0f} s of brisk turning"
+            f"{len(watched.turns)} images, {len(watched.samples)} samples, {watched.brisk_s:.0f} s of brisk turning"
         )
     guide.end()
     if tracker is not None:

@@ -97,7 +97,7 @@ def calibrate_foe(source: SensorSource, config: Config, seconds: float | None, g
         guide.progress(f"{len(tracked)} intervals with motion")
     guide.end()
     if lens is None:
-        raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
+        raise CalibrationError("camera: no images came; check camera.device, or name another recording")
     focus = find_focus(tracked)
     return _result(focus, lens, image, config)
 
@@ -123,7 +123,7 @@ def find_focus(tracked: Sequence[Tracks]) -> Focus:
     parallax = float(np.median(np.hypot(*flow.T)))
     if parallax < _MIN_PARALLAX_RAD:
         raise CalibrationError(
-            f"camera: hardly anything came nearer (median flow {np.degrees(parallax):.2f}° between pictures); drive "
+            f"camera: hardly anything came nearer (median flow {np.degrees(parallax):.2f}° between images); drive "
             "faster, or past nearer things"
         )
     if np.abs(slope).max() > _MAX_SLOPE:
@@ -217,7 +217,7 @@ def _result(focus: Focus, lens: Lens, image: npt.NDArray[np.uint8], config: Conf
     turned = f"; {focus.left_out} left out, in which it turned" if focus.left_out else ""
     findings = (
         f"{focus.intervals} intervals of straight driving{turned}; {len(focus.place)} flow vectors",
-        f"focus of expansion: x {x:.1f}, y {y:.1f} px of the undistorted picture",
+        f"focus of expansion: x {x:.1f}, y {y:.1f} px of the undistorted image",
         f"yaw: {np.degrees(focus.yaw_rad):+.2f} ± {sigma_deg[0]:.2f}° (positive: looks to the right)",
         f"pitch: {np.degrees(focus.pitch_rad):+.2f} ± {sigma_deg[1]:.2f}° (positive: looks up)",
         f"configured: yaw {np.degrees(config.camera.yaw_rad):+.2f}°, pitch {np.degrees(config.camera.pitch_rad):+.2f}°",
@@ -243,7 +243,7 @@ def _painter(focus: Focus, lens: Lens, image: npt.NDArray[np.uint8]) -> "Callabl
         left.plot(*at, "+", color=report.RED, markersize=22, markeredgewidth=2)
         left.plot(*centre, "x", color="white", markersize=9)
         left.set(xlim=(0, lens.width), ylim=(lens.height, 0))
-        left.set_title("flow without rotation; +: its focus, x: the picture's centre", loc="left")
+        left.set_title("flow without rotation; +: its focus, x: the image's centre", loc="left")
         degrees = np.degrees(np.arctan(focus.pieces)) * (-1, 1)
         right.plot(*degrees.T, "o", color=report.BLUE, label="fifths of the drive")
         right.errorbar(

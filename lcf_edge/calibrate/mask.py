@@ -82,17 +82,17 @@ def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, 
         stillness = stillness or Stillness(*item.image.shape)
         image, last_ns = item.image, item.stamp_ns
         stillness.add(image)
-        guide.progress(f"{stillness.frames} pictures")
+        guide.progress(f"{stillness.frames} images")
     guide.end()
     if stillness is None:
-        raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
+        raise CalibrationError("camera: no images came; check camera.device, or name another recording")
     own = own_parts(stillness)
     polygons = outlines(own)
     if not polygons:
         raise CalibrationError(
-            f"camera: nothing stands still in {stillness.frames} pictures; outline what is in view with --polygon"
+            f"camera: nothing stands still in {stillness.frames} images; outline what is in view with --polygon"
         )
-    words = f"{stillness.frames} pictures; {len(polygons)} own parts, {own.mean():.1%} of the picture"
+    words = f"{stillness.frames} images; {len(polygons)} own parts, {own.mean():.1%} of the image"
     return _result(polygons, image, config, (words,))
 
 
@@ -101,7 +101,7 @@ def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon]
     image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
     guide.end()
     if image is None:
-        raise CalibrationError("camera: no pictures came; check camera.device, or name another recording")
+        raise CalibrationError("camera: no images came; check camera.device, or name another recording")
     return _result(polygons, image, config, (f"{len(polygons)} own parts, as given",))
 
 
@@ -109,7 +109,7 @@ def own_parts(stillness: Stillness) -> Marked:
     """What stands still, and the plain surfaces that it encloses. Raises ``CalibrationError``."""
     if stillness.frames < _MIN_FRAMES:
         raise CalibrationError(
-            f"camera: {stillness.frames} pictures {_APART_S:g} s apart, {_MIN_FRAMES} are needed; drive longer"
+            f"camera: {stillness.frames} images {_APART_S:g} s apart, {_MIN_FRAMES} are needed; drive longer"
         )
     textured, still = stillness.textured(), stillness.still()
     moves = 1 - still.sum() / max(textured.sum(), 1)
@@ -120,7 +120,7 @@ def own_parts(stillness: Stillness) -> Marked:
     own = _solid(still | _enclosed(still, ~textured))
     if own.mean() > _MAX_SHARE:
         raise CalibrationError(
-            f"camera: {own.mean():.0%} of the picture never moved; drive past things, and turn to both sides"
+            f"camera: {own.mean():.0%} of the image never moved; drive past things, and turn to both sides"
         )
     return own
 
@@ -166,7 +166,7 @@ def _result(polygons: Sequence[Polygon], image: Grey, config: Config, findings: 
     height, width = image.shape
     scale = np.array((config.camera.width / width, config.camera.height / height))
     mask = [np.rint((np.array(each) + 0.5) * scale - 0.5).astype(int).tolist() for each in polygons]
-    words = f"px of a picture of {config.camera.width}x{config.camera.height} (camera.width, camera.height)"
+    words = f"px of an image of {config.camera.width}x{config.camera.height} (camera.width, camera.height)"
     return Result((*findings, words), "camera", {"mask": mask}, _painter(polygons, image))
 
 

@@ -21,7 +21,7 @@ AXIS_COLOURS = (RED, GREEN, BLUE)  # x, y, z
 def check_report(path: Path, suffixes: Sequence[str] = SUFFIXES) -> None:
     """Refuse a file that cannot be written, before any measurement. Raises ``UsageError``, ``SinkError``."""
     if importlib.util.find_spec("matplotlib") is None:
-        raise UsageError(f"{path}: a picture needs Matplotlib: pip install 'lcf-edge[plot]'")
+        raise UsageError(f"{path}: an image needs Matplotlib: pip install 'lcf-edge[plot]'")
     check_output(path, tuple(suffixes))
 
 

@@ -29,7 +29,7 @@ def calibrate_time(source: SensorSource, config: Config, seconds: float | None, 
             "or for longer"
         )
     findings = (
-        f"{len(alignment.camera)} intervals between pictures, {len(watched.samples)} inertial samples",
+        f"{len(alignment.camera)} intervals between images, {len(watched.samples)} inertial samples",
         f"turned {_rates(alignment)} about the camera's x, y, z (root mean square)",
         f"offset: {1000 * alignment.offset_s:.1f} ± {1000 * alignment.offset_sigma_s:.1f} ms (camera less IMU time)",
         f"correlation: {alignment.correlation:.3f}; 50 ms beside: {beside(alignment):.3f}",

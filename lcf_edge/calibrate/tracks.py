@@ -61,7 +61,7 @@ class Tracker:
             return None
         dt_s = (frame.stamp_ns - last.stamp_ns) * 1e-9
         if not 0 < dt_s <= _MAX_S:
-            self.left_out["pictures too far apart"] += 1
+            self.left_out["images too far apart"] += 1
             self._begin(frame)
             return None
         self._follow(last, frame)

@@ -84,7 +84,7 @@ class Views:
         views_in[1, 1] += 1  # the middle needs no prompt
         row, column = np.unravel_index(np.argmin(views_in), views_in.shape)
         where = f"{_SIDES[0][row]} {_SIDES[1][column]}".replace("middle middle", "middle")
-        return f"hold it in the {where} of the picture, so near that it fills a third of it"
+        return f"hold it in the {where} of the image, so near that it fills a third of it"
 
     def _outline(self, sighting: Sighting) -> Floats | None:
         """Return where the board's outer corners are, or would be, (4, 2) px; None: too few corners are seen."""

@@ -66,7 +66,9 @@ def parser() -> argparse.ArgumentParser:
     )
     replay.add_argument("recording", type=Path, metavar="RECORDING", help="ASL folder, MCAP file, video or images")
     replay.add_argument("-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output")
-    replay.add_argument("--video", type=Path, metavar="FILE.webm", help="video of what the filter saw, two panels; or .mp4")
+    replay.add_argument(
+        "--video", type=Path, metavar="FILE.webm", help="video of what the filter saw, two panels; or .mp4"
+    )
     replay.add_argument("--plot", type=Path, metavar="FILE.png", help="plot of the rows in use of each table")
     replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
     replay.add_argument("--realtime", action="store_true", help="at the recording's own pace: --speed 1")
@@ -106,8 +108,8 @@ def parser() -> argparse.ArgumentParser:
         parents=[source, settings, pace],
         help="what a running daemon sees, or a recording shows, as a table in the terminal",
         description="Shows objects, circles, figures and devices of a daemon, five times a second; q or Ctrl-C ends. "
-        "For a recording: space plays and pauses, s steps, arrows skip 5 s back or forward, p and n go to the previous and "
-        "the next alarm.",
+        "For a recording: space plays and pauses, s steps, arrows skip 5 s back or forward, p and n go to the previous "
+        "and the next alarm.",
     )
     _add_recording(watch)
     watch.add_argument("--json", action="store_true", help="one JSON line a scene instead, for pipes")
@@ -140,7 +142,7 @@ def parser() -> argparse.ArgumentParser:
         allow_abbrev=False,
         parents=[source, settings, pace],
         help="what a running daemon sees, or a recording shows, as a page for a browser",
-        description="Serves a page with picture, objects, circles, figures and devices of a daemon until Ctrl-C; of a "
+        description="Serves a page with image, objects, circles, figures and devices of a daemon until Ctrl-C; for a "
         "recording with a slider.",
     )
     _add_recording(view)
@@ -179,8 +181,8 @@ def _add_evaluate(commands: "argparse._SubParsersAction[_Parser]", settings: _Pa
         allow_abbrev=False,
         parents=[settings],
         help="replay many recordings and report what was found, false, late and slow",
-        description="Replays recordings, compares what the filter reports with the truth where it is known, and writes one "
-        "report: a page with pictures, and JSON. A recording that cannot be read is reported and left out.",
+        description="Replays recordings, compares what the filter reports with the truth where it is known, and writes "
+        "a report: a page with images, and JSON. A recording that cannot be read is reported and left out.",
     )
     evaluate.add_argument(
         "recordings", type=Path, nargs="+", metavar="RECORDING", help="a recording, or a folder with recordings in it"
@@ -201,9 +203,7 @@ def _add_evaluate(commands: "argparse._SubParsersAction[_Parser]", settings: _Pa
     work.add_argument(
         "--jobs", type=_whole(1, 1024), metavar="N", help="how many at once, on this computer (one per processor)"
     )
-    work.add_argument(
-        "--scheduler", metavar="ENDPOINT", help="run on a Dask cluster instead, as in tcp://host:8786"
-    )
+    work.add_argument("--scheduler", metavar="ENDPOINT", help="run on a Dask cluster instead, as in tcp://host:8786")
 
 
 def _pace() -> _Parser:
@@ -211,10 +211,10 @@ def _pace() -> _Parser:
     pace.add_argument(
         "--start", type=_number(0.0, 1e6), default=0.0, metavar="S", help="start so many seconds after the first frame"
     )
-    pace.add_argument("--duration", type=_positive, default=math.inf, metavar="S", help="stop so many seconds after the start")
     pace.add_argument(
-        "--speed", type=_number(SLOWEST, FASTEST), metavar="N", help="N times the recording's own pace"
+        "--duration", type=_positive, default=math.inf, metavar="S", help="stop so many seconds after the start"
     )
+    pace.add_argument("--speed", type=_number(SLOWEST, FASTEST), metavar="N", help="N times the recording's own pace")
     pace.add_argument("--loop", action="store_true", help="start over at the end, until Ctrl-C")
     pace.add_argument("--step", action="store_true", help="pause at each frame")
     return pace

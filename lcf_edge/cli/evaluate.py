@@ -81,9 +81,9 @@ def _figures(total: Numbers) -> dict[str, tuple[str, str]]:
         figures["found"] = f"{total.found} of {total.due}", "threats in view, frame by frame"
     if total.late_s is not None:
         figures["late"] = f"{total.late_s:.2f}", "s until a threat is found, median"
-    if total.false_a_picture is not None:
-        figures["false"] = f"{total.false_a_picture:.2f}", "rebels on nothing a picture"
-        figures["contact"] = f"{total.contacts} of {total.scored}", "pictures with one below 1 s that does not come"
+    if total.false_per_frame is not None:
+        figures["false"] = f"{total.false_per_frame:.2f}", "rebels on nothing a frame"
+        figures["contact"] = f"{total.contacts} of {total.scored}", "images with one below 1 s that does not come"
     if total.median_ms is not None:
-        figures["time"] = f"{total.median_ms:.2f} / {total.slow_ms:.2f}", "ms a picture, median / 99 %"
+        figures["time"] = f"{total.median_ms:.2f} / {total.slow_ms:.2f}", "ms a frame, median / 99 %"
     return figures

@@ -31,9 +31,7 @@ def gate(tls: Path | None, host: str | None, port: int, to: str | None, write_li
         )
     except (OSError, OverflowError) as error:
         reason = os.strerror(error.errno) if isinstance(error, OSError) and error.errno else str(error)
-        raise LcfError(
-            f"gate: {host}:{port}: cannot listen ({reason}); choose with --listen, --port"
-        ) from error
+        raise LcfError(f"gate: {host}:{port}: cannot listen ({reason}); choose with --listen, --port") from error
     with listening:
         write_line(f"{'tls' if tls else 'tcp'}/{host}:{listening.getsockname()[1]} leads to {leads}")
         asyncio.run(serve([listening], Gate(entrance)))

@@ -126,7 +126,7 @@ def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[F
 
 def _next_asked_for(frame: Frame) -> bool:
     """Wait for a line on standard input. Return False at its end."""
-    sys.stderr.write(f"picture {frame.seq}: Enter shows it, Ctrl-D ends\n")
+    sys.stderr.write(f"image {frame.seq}: Enter shows it, Ctrl-D ends\n")
     sys.stderr.flush()
     return sys.stdin.readline() != ""
 

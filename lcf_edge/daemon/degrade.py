@@ -11,17 +11,17 @@ _BLIND_S = 0.5  # without corners
 
 _WORDS = {
     "no imu": "no inertial samples: rotation comes from the images alone, and the flow lines are widened; check imu",
-    "imu gap": "inertial samples are missing between two pictures; check the IMU's cable and rate",
+    "imu gap": "inertial samples are missing between two images; check the IMU's cable and rate",
     "gyro stuck": "the gyro repeats one value without noise and is ignored; check imu and its wires",
     "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or show it more than a plain wall",
     "rotation from odometry": "rotation is taken from odometry",
     "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
     "speed drifts": "speed comes from the accelerometer alone and drifts",
-    "speed from ground": "nothing measures the speed: it is estimated from the ground in the images, by camera.height_m",
+    "speed from ground": "nothing measures the speed: estimated from the ground in the images and camera.height_m",
 }
 
 _WORDS_OF_A_RECORDING = {  # without mentioning a cable
-    "imu gap": "inertial samples are missing between two pictures of the recording, or where it begins again",
+    "imu gap": "inertial samples are missing between two images of the recording, or where it begins again",
     "gyro stuck": "the gyro of the recording repeats one value without noise and is ignored",
 }
 

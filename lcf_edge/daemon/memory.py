@@ -46,7 +46,7 @@ def needs_mib(config: Config) -> dict[str, float]:
     table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
     needs = {
         "the program": PROGRAM_MIB,
-        "pictures": pixels * _FRAME_BYTES_A_PIXEL / _MIB,
+        "images": pixels * _FRAME_BYTES_A_PIXEL / _MIB,
         "tables": (table_bytes + config.memory.corners * _CORNER_BYTES) / _MIB,
     }
     if config.record.when != "never":
@@ -55,7 +55,7 @@ def needs_mib(config: Config) -> dict[str, float]:
 
 
 _REMEDIES = {
-    "pictures": "lower camera.width and camera.height",
+    "images": "lower camera.width and camera.height",
     "tables": "lower the other keys of memory",
     "recording": "lower record.buffer_mib",
 }

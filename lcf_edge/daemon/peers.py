@@ -73,7 +73,9 @@ class PeersMemory:
         number = 0 if much and exceeded else self._link.cut(CUT_AT_MIB)
         if number:
             self._acted_s = now_s
-            LOGGER.warning("link: %.0f MiB are resident; cut the %d connections that filled it", self._resident_mib, number)
+            LOGGER.warning(
+                "link: %.0f MiB are resident; cut the %d connections that filled it", self._resident_mib, number
+            )
         elif much and (exceeded or not (self._acted or now_s < self._renewed_s + RENEW_EACH_S)):
             self._charged_before_mib = self._link.charged_mib
             LOGGER.warning("link: %.0f MiB are resident, filled by peers; reopened", self._resident_mib)

@@ -62,7 +62,7 @@ class Reader(threading.Thread, Generic[Record]):
         error = self._device.error
         if delivers and self.away_since_ns is not None:
             self.error = self.away_since_ns = None
-            LOGGER.info("%s: delivering", self.name)
+            LOGGER.info("%s: delivers", self.name)
         elif error is not None and str(error) != str(self.error):
             if self.away_since_ns is None:
                 self.away_since_ns = now_ns

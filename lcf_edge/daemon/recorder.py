@@ -141,7 +141,7 @@ class Recorder(Sink):
         files = "one file" if counts["files"] == 1 else f"{counts['files']} files"
         dropped = f", {self.dropped} messages dropped" if self.dropped else ""
         return (
-            f"{counts['pictures']} pictures, {counts['messages']} messages, {disk.written_bytes / MIB:.1f} MiB "
+            f"{counts['pictures']} images, {counts['messages']} messages, {disk.written_bytes / MIB:.1f} MiB "
             f"in {files}{dropped}"
         )
 

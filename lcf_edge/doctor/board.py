@@ -39,7 +39,9 @@ def _governor(context: Context) -> Iterator[Finding]:
     driver = _text(context, "devices/system/cpu/cpu0/cpufreq/scaling_driver")
     if governor == "powersave" and driver not in _OWN_GOVERNORS:
         everywhere = str(folder / "scaling_governor").replace("cpu0", "cpu*")
-        yield warn("board", "the processor is held at a low clock (powersave)", f"echo ondemand | sudo tee {everywhere}")
+        yield warn(
+            "board", "the processor is held at a low clock (powersave)", f"echo ondemand | sudo tee {everywhere}"
+        )
     elif governor:
         yield ok("board", f"processor governor: {governor}")
 

@@ -191,7 +191,7 @@ def _light(image: np.ndarray[tuple[int, ...], np.dtype[np.uint8]], config: Confi
     detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
     corners, _ = detector.detect(image)
     grey, count = float(image.mean()), len(corners.pixel)
-    summary = f"mean grey level {grey:.0f} of 255, {count} corners in a picture"
+    summary = f"mean grey level {grey:.0f} of 255, {count} corners in an image"
     if grey < DARK:
         return warn("camera", f"dark: {summary}; take off the cap, add light, or use automatic exposure")
     if grey > BRIGHT:

@@ -71,7 +71,7 @@ def _within(limit_s: float, step: Step, context: Context) -> Iterator[Finding]:
             yield finding
     except Empty:
         text = (
-            f"does not return within {limit_s:g} s: a device hangs in its driver; unplug it, or switch the power off and on"
+            f"does not return within {limit_s:g} s: a device hangs in its driver; unplug it, or switch power off and on"
         )
         yield fail(step.subject, text, "sudo dmesg | tail -n 20")
 

@@ -1,4 +1,4 @@
-"""Forward speed as the ground in the picture shows it, where nothing measures it. No clock, no I/O."""
+"""Forward speed as the ground in the image shows it, where nothing measures it. No clock, no I/O."""
 
 from math import hypot, inf, nan, sqrt
 
@@ -10,7 +10,7 @@ _SIGMA_STILL_MPS = 0.02
 
 
 class GroundBelief:
-    """The speed by the ground of the last pictures; its uncertainty grows until it is unknown."""
+    """The speed by the ground of the last images; its uncertainty grows until it is unknown."""
 
     def __init__(self) -> None:
         self.speed_mps = nan
@@ -23,7 +23,7 @@ class GroundBelief:
             self.speed_mps, self.sigma_mps = nan, inf
 
     def stand(self) -> None:
-        """The picture stands still, and so does the vehicle."""
+        """The image stands still, and so does the vehicle."""
         self.speed_mps, self.sigma_mps = 0.0, _SIGMA_STILL_MPS
 
     def see(self, ground: GroundSpeed, dt_s: float) -> None:

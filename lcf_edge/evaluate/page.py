@@ -29,14 +29,12 @@ class Measure:
 
 
 MEASURES = (
-    Measure(
-        "found, %", "threats found, of those in sight, picture by picture", lambda n: _share(n.found, n.due), 0, -1
-    ),
+    Measure("found, %", "threats found, of those in view, frame by frame", lambda n: _share(n.found, n.due), 0, -1),
     Measure("after, s", "until a threat is found, median of those found", lambda n: n.late_s, 2, 1),
-    Measure("on nothing", "rebel circles on nothing, a picture", lambda n: n.false_a_picture, 2, 1),
-    Measure("contacts", "pictures with a contact below 1 s that does not come", lambda n: n.contacts, 0, 1),
-    Measure("step, ms", "time of a picture, median", lambda n: n.median_ms, 2, 0),
-    Measure("slow, ms", "99 % of the pictures are faster", lambda n: n.slow_ms, 2, 0),
+    Measure("on nothing", "rebel circles on nothing, per frame", lambda n: n.false_per_frame, 2, 1),
+    Measure("contacts", "frames with a contact below 1 s that does not come", lambda n: n.contacts, 0, 1),
+    Measure("step, ms", "time per frame, median", lambda n: n.median_ms, 2, 0),
+    Measure("slow, ms", "99 % of the frames are faster", lambda n: n.slow_ms, 2, 0),
 )
 
 KINDS = ("found", "missed", "on nothing", "contact")
@@ -87,7 +85,7 @@ def _totals(result: Report, known: dict[str, RecordingRow]) -> str:
         now, then = report.total(rows), report.total(same) if same else None
         cells = "".join(_tile(measure, now, then) for measure in MEASURES)
         parts.append(
-            f"<h2>{title}</h2><p>{count(len(rows), 'recording')}, {count(now.pictures, 'picture')}, "
+            f"<h2>{title}</h2><p>{count(len(rows), 'recording')}, {count(now.pictures, 'frame')}, "
             f"{now.scored} of them scored</p>"
         )
         parts.append(f'<div class="tiles">{cells}</div>')
@@ -120,7 +118,7 @@ def _table(result: Report, known: dict[str, RecordingRow]) -> str:
         for number, row in enumerate(result.recordings, 1)
         if not row.error
     )
-    return f'<div class="wide"><table><tr><th>recording</th><th>pictures</th>{heads}{differ}</tr>{rows}</table></div>'
+    return f'<div class="wide"><table><tr><th>recording</th><th>frames</th>{heads}{differ}</tr>{rows}</table></div>'
 
 
 def _row(row: RecordingRow, number: int, before: RecordingRow | None, *, differing: bool) -> str:

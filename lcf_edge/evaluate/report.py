@@ -67,7 +67,7 @@ class Numbers(msgspec.Struct, frozen=True):
     slow_ms: float | None = None  # 99th percentile
 
     @property
-    def false_a_picture(self) -> float | None:
+    def false_per_frame(self) -> float | None:
         """Rebels on nothing."""
         return self.false / self.scored if self.scored else None
 

@@ -73,7 +73,7 @@ class Score:
     step_ms: list[float] = field(default_factory=list)
 
     @property
-    def false_a_picture(self) -> float:
+    def false_per_frame(self) -> float:
         """Rebels on nothing."""
         return self.false / self.scored if self.scored else math.nan
 

@@ -66,16 +66,16 @@ def read_truth(path: Path | None) -> Truth:
     try:
         if path.stat().st_size > MAX_BYTES:
             raise RecordingError(f"{path}: too large for a truth file; one line a frame is enough")
-        return Truth(_pictures(path))
+        return Truth(_frames(path))
     except OSError as error:
         raise RecordingError(f"{path}: cannot be read ({error.strerror}); name another truth file") from error
     except (msgspec.MsgspecError, UnicodeDecodeError) as error:
         raise RecordingError(f"{path}: {error}; docs/evaluate.md describes a line of truth") from error
 
 
-def _pictures(path: Path) -> dict[int, list[Known]]:
+def _frames(path: Path) -> dict[int, list[Known]]:
     decoder = msgspec.json.Decoder(_Line)
-    pictures: dict[int, list[Known]] = {}
+    frames: dict[int, list[Known]] = {}
     known = 0
     with path.open("rb") as file:
         while text := file.readline(MAX_LINE_BYTES):
@@ -84,8 +84,8 @@ def _pictures(path: Path) -> dict[int, list[Known]]:
             if not text.strip():
                 continue
             line = decoder.decode(text)
-            pictures[line.stamp_ns] = line.objects
+            frames[line.stamp_ns] = line.objects
             known += 1 + len(line.objects)
             if known > MAX_KNOWN:
-                raise RecordingError(f"{path}: more than {MAX_KNOWN} pictures and things in them; cut the recording")
-    return pictures
+                raise RecordingError(f"{path}: more than {MAX_KNOWN} images and things in them; cut the recording")
+    return frames

@@ -209,7 +209,7 @@ def make(
     seconds = seconds or (30.0 if slow else 8.0)
     fps = fps or (3.0 if slow else 20.0)
     if seed < 0 or seconds * fps < 1 or min(width, height) < 16 or focal_px <= 0:
-        raise ValueError("a drive needs a seed >= 0, at least one picture of 16x16 px, and a positive focal length")
+        raise ValueError("a drive needs a seed >= 0, at least one image of 16x16 px, and a positive focal length")
     random = np.random.default_rng([seed, zlib.crc32(kind.encode())])
     bias = random.normal(0, 0.005, 3).tolist(), random.normal(0, 0.1, 3).tolist()
     noise = SensorNoise(tuple(bias[0]), accel_bias_mps2=tuple(bias[1]), speed_scale=float(random.normal(1, 0.01)))

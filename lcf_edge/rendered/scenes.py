@@ -99,14 +99,14 @@ def write(drive: Drive, folder: Path) -> Path:
 
     A truth line is one `Truth`; a time to contact or lateral miss that never comes is null. Raises OSError.
     """
-    pictures = folder / "mav0" / "cam0" / "data"
-    pictures.mkdir(parents=True, exist_ok=True)
+    images = folder / "mav0" / "cam0" / "data"
+    images.mkdir(parents=True, exist_ok=True)
     rows = []
     with (folder / "truth.jsonl").open("wb") as lines:
         for frame, known in frames(drive):
             name = f"{frame.stamp_ns}.png"
             _, data = cv2.imencode(".png", frame.image, [cv2.IMWRITE_PNG_COMPRESSION, 1])
-            (pictures / name).write_bytes(data.tobytes())
+            (images / name).write_bytes(data.tobytes())
             rows.append(f"{frame.stamp_ns},{name}")
             lines.write(msgspec.json.encode(known) + b"\n")
     _write_sensor(folder, "cam0", "#timestamp [ns],filename", rows, _camera_yaml(drive))

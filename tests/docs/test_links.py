@@ -1,4 +1,4 @@
-"""Links and pictures of the documents lead somewhere."""
+"""Links and images of the documents lead somewhere."""
 
 import re
 from pathlib import Path
@@ -31,7 +31,7 @@ def test_links_resolve(document: Path) -> None:
 
 
 @pytest.mark.parametrize("image_path", sorted((ROOT / "docs").rglob("*.png")), ids=lambda path: path.name)
-def test_pictures_are_small_and_shown(image_path: Path) -> None:
+def test_images_are_small_and_shown(image_path: Path) -> None:
     assert image_path.stat().st_size <= MAX_IMAGE_BYTES
     assert cv2.imread(str(image_path)) is not None
     assert any(f"pictures/{image_path.name})" in document.read_text(encoding="utf-8") for document in DOCUMENTS)

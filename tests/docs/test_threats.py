@@ -62,7 +62,7 @@ def test_the_bounds_of_a_serial_imu() -> None:
 
 
 def test_the_bound_of_videos() -> None:
-    assert f"{_DECODER_BYTES // 2**20} MiB and {_BYTES_A_PIXEL} bytes for each pixel of the first picture" in DOCUMENT
+    assert f"{_DECODER_BYTES // 2**20} MiB and {_BYTES_A_PIXEL} bytes for each pixel of the first image" in DOCUMENT
 
 
 def test_every_loss_that_is_counted_is_reported() -> None:

@@ -466,7 +466,7 @@ def mcap(folder: Path) -> Iterator[Take]:
 
 @target(lambda: [messages()[5]], (b"equidistant\0", b"plumb_bob\0", b"rational_polynomial\0"))
 def camera_info(folder: Path) -> Iterator[Take]:
-    """Whatever a lens may be, a picture is seen through it."""
+    """Whatever a lens may be, an image is seen through it."""
     path = folder / "drive.mcap"
 
     def take(data: bytes) -> str:
@@ -480,7 +480,7 @@ def camera_info(folder: Path) -> Iterator[Take]:
     yield take
 
 
-# Pictures
+# Images
 
 
 def tiff() -> bytes:
@@ -515,7 +515,7 @@ TAGS = [struct.pack("<HHII", tag, 4, 1, 60_000) for tag in (256, 257, 277, 278, 
 
 @target(pictures_in_all_formats, (*MARKERS, *TAGS, b"acTL", b"zTXt", b"IHDR", b"IDAT", b"#\r", b"60000"), grows_mib=256)
 def pictures(_: Path) -> Iterator[Take]:
-    """Every format; a picture has the size that the check saw."""
+    """Every format; an image has the size that the check saw."""
 
     def take(data: bytes) -> str:
         became = ""

@@ -72,7 +72,7 @@ def test_another_seed_gives_others() -> None:
     assert digest(worlds.make(5)) != digest(worlds.make(6))
 
 
-def test_what_is_decided_changes_the_next_pictures() -> None:
+def test_what_is_decided_changes_the_next_images() -> None:
     slow, fast = Watching(0.2), Watching(1.0)
     for driver in (slow, fast):
         drive(world(body(0.0, 6.0), course=Course(1.5)), driver)
@@ -166,7 +166,7 @@ def test_the_gyro_shows_how_the_vehicle_turns_and_the_wheels_how_fast_it_is() ->
     assert ticks == pytest.approx(np.rint(ticks), abs=1e-6)
 
 
-def test_samples_come_in_order_of_time_and_some_after_the_picture() -> None:
+def test_samples_come_in_order_of_time_and_some_after_the_image() -> None:
     driver = Watching(1.0)
     ended(world(), driver, 1.0)
     drive(world(course=Course(1.0)), driver)

@@ -21,7 +21,7 @@ from lcf_edge.rendered import scenes
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A drive of 10 pictures."""
+    """A drive of 10 images."""
     path = tmp_path_factory.mktemp("drive") / "drive.npz"
     save(scenes.make("crossing", 1, seconds=0.5, fps=20.0, width=64, height=48, focal_px=50.0), path)
     return path
@@ -86,7 +86,7 @@ def test_too_little_has_no_slope() -> None:
     assert all(map(math.isnan, slope([])))
 
 
-def test_a_picture_that_nothing_tells_of_is_lost() -> None:
+def test_a_image_that_nothing_tells_of_is_lost() -> None:
     assert Balance.of(parts(100, 90, 10, 80)).lost == 0
     assert Balance.of(parts(100, 90, 9, 80)).lost == 1
 
@@ -97,14 +97,14 @@ def test_a_life_keeps_memory_and_complains() -> None:
         life.note(parts(100 * second + 1, 100 * second, 0, 80 + second, "gave up the preview"))
     assert life.memory[-1] == (900, 89.0)
     texts = complaints([life], 1.0)
-    assert [what in line for what, line in zip(("1 pictures lost", "gave up", "2.5 s", "grows"), texts, strict=True)]
+    assert [what in line for what, line in zip(("1 images lost", "gave up", "2.5 s", "grows"), texts, strict=True)]
     assert any("901 delivered, 900 put, 0 overtaken, 1 lost" in line for line in lines([life]))
 
 
 # The stand-ins.
 
 
-def test_pictures_come_as_fast_as_they_are_taken_in_their_own_time(feed: Feed) -> None:
+def test_images_come_as_fast_as_they_are_taken_in_their_own_time(feed: Feed) -> None:
     camera = FastCamera(feed)
     frames: list[Frame] = []
     for _ in range(25):
@@ -128,7 +128,7 @@ def test_none_comes_before_the_last_was_taken_nor_in_a_pause(feed: Feed, monkeyp
     assert len(camera.read()) == 1
 
 
-def test_samples_reach_beyond_each_picture_and_go_on_over_the_laps(feed: Feed) -> None:
+def test_samples_reach_beyond_each_image_and_go_on_over_the_laps(feed: Feed) -> None:
     camera, imu, speed = FastCamera(feed), FastImu(feed), FastSpeed(feed)
     stamps: list[int] = []
     for _ in range(25):

@@ -1,4 +1,4 @@
-"""A real browser, for tests of pages, pictures and videos."""
+"""A real browser, for tests of pages, images and videos."""
 
 import asyncio
 import base64

@@ -162,15 +162,15 @@ def test_an_empty_folder(replay: Callable[..., Replayed], tmp_path: Path) -> Non
     (tmp_path / "empty").mkdir()
     done = replay(tmp_path / "empty")
     assert (done.status, done.warnings, done.lines) == (1, [], None)
-    assert f"{tmp_path / 'empty'}: empty folder; wanted are pictures" in done.error
+    assert f"{tmp_path / 'empty'}: empty folder; wanted are images" in done.error
 
 
-def test_no_picture_that_can_be_read(replay: Callable[..., Replayed], drive: Drive) -> None:
+def test_no_image_that_can_be_read(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in range(FRAMES):
         drive.image_path(seq).write_bytes(b"")
     done = replay(drive.root)
     assert (done.status, done.lines) == (1, [])
-    assert f"{drive.root}: not one picture could be read ({FRAMES} times: picture empty)" in done.error
+    assert f"{drive.root}: not one image could be read ({FRAMES} times: image empty)" in done.error
     assert "record it again" in done.error
 
 
@@ -178,7 +178,7 @@ def test_no_picture_that_can_be_read(replay: Callable[..., Replayed], drive: Dri
     ("setting", "warned_of"),
     [
         ("vehicle.half_widht_m=0.6", "unknown key vehicle.half_widht_m; did you mean vehicle.half_width_m?"),
-        ("camera.intrinsics=[500, 500, 300, 300]", "camera.intrinsics: made for 640x480, the pictures are "),
+        ("camera.intrinsics=[500, 500, 300, 300]", "camera.intrinsics: made for 640x480, the images are "),
     ],
 )
 def test_a_configuration_that_does_not_fit(
@@ -191,7 +191,7 @@ def test_a_configuration_that_does_not_fit(
     assert not done.lines
 
 
-# Pictures
+# Images
 
 
 def test_a_truncated_png(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -199,11 +199,11 @@ def test_a_truncated_png(replay: Callable[..., Replayed], drive: Drive) -> None:
     victim.write_bytes(victim.read_bytes()[:2000])
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(4))
-    assert done.warned_of(str(victim), "picture damaged, skipped")
-    assert done.skipped == {"picture damaged": 1}
+    assert done.warned_of(str(victim), "image damaged, skipped")
+    assert done.skipped == {"image damaged": 1}
 
 
-def test_pictures_that_change_size(replay: Callable[..., Replayed], drive: Drive) -> None:
+def test_images_that_change_size(replay: Callable[..., Replayed], drive: Drive) -> None:
     for seq in (3, 7):
         image = cv2.imread(str(drive.image_path(seq)), cv2.IMREAD_GRAYSCALE)
         assert image is not None
@@ -211,10 +211,10 @@ def test_pictures_that_change_size(replay: Callable[..., Replayed], drive: Drive
     done = replay(drive.root)
     assert (done.status, done.sequence) == (0, without(3, 7))
     assert done.warned_of(str(drive.image_path(3)), "another size")
-    assert done.skipped == {"picture of another size than the first": 2}
+    assert done.skipped == {"image of another size than the first": 2}
 
 
-def test_a_picture_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
+def test_a_image_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
     cv2.imwrite(str(drive.image_path(5)), np.full((240, 320), 128, np.uint8))
     done = replay(drive.root)
     assert (done.status, done.warnings, done.sequence) == (0, [], without())
@@ -249,10 +249,10 @@ def test_bad_rows_of_the_camera(replay: Callable[..., Replayed], drive: Drive) -
     done = replay(drive.root)
     assert done.status == 0
     assert len(done.sequence) == FRAMES - len(rows)
-    assert done.skipped == {"picture row malformed": 4, "picture missing": 1}
+    assert done.skipped == {"image row malformed": 4, "image missing": 1}
     for line in (4, 6, 7, 8):
-        assert done.warned_of(f"{drive.csv('cam0')}:{line}: picture row malformed, skipped")
-    assert done.warned_of("missing.png: picture missing, skipped")
+        assert done.warned_of(f"{drive.csv('cam0')}:{line}: image row malformed, skipped")
+    assert done.warned_of("missing.png: image missing, skipped")
 
 
 def test_bad_samples_of_the_imu(replay: Callable[..., Replayed], drive: Drive) -> None:
@@ -290,7 +290,7 @@ def test_times_that_go_back(replay: Callable[..., Replayed], drive: Drive) -> No
     assert done.lines is not None
     stamps = [line["stamp_ns"] for line in done.lines]
     assert stamps == sorted(set(stamps))
-    assert done.skipped == {f"{kind} time that does not increase": 1 for kind in ("picture", "imu", "speed")}
+    assert done.skipped == {f"{kind} time that does not increase": 1 for kind in ("image", "imu", "speed")}
     assert done.warned_of(f"{drive.csv('cam0')}:8: ")
 
 
@@ -330,7 +330,7 @@ def test_broken_intrinsics(replay: Callable[..., Replayed], drive: Drive) -> Non
 
 
 def mcap_file(path: Path, items: list[Any]) -> list[int]:
-    """Pictures as ``ros2 bag record`` writes them. Return the size of the file after each."""
+    """Images as ``ros2 bag record`` writes them. Return the size of the file after each."""
     ros = get_typestore(Stores.ROS2_HUMBLE)
     kind = "sensor_msgs/msg/Image"
     sizes = []

@@ -23,7 +23,7 @@ from lcf_edge.devices import open_camera, open_imu, open_speed
 
 
 def write_recording(folder: Path, *, imu: bool = True) -> Path:
-    """Two pictures, and two samples of IMU and odometry, of the same times."""
+    """Two images, and two samples of IMU and odometry, of the same times."""
     times = (0, 50_000_000)
     rows = {"cam0": [f"{t},{t}.png" for t in times]}
     if imu:
@@ -71,7 +71,7 @@ def test_a_camera_that_only_libcamera_can_run_is_run_by_it(
                 pass
         assert frames[0].image.shape == (48, 64)
     else:
-        with pytest.raises(DeviceMissingError, match=r"^imx219: no camera of that name"):
+        with pytest.raises(DeviceMissingError, match=r"^imx219: no camera has this name"):
             open_camera(config)
 
 

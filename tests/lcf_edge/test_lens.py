@@ -146,7 +146,7 @@ class TestFromConfig:
             ("equidistant", [0.01, -0.02, 0.003, 0.0]),
         ],
     )
-    def test_field_of_view_spans_the_picture(self, model: Any, coefficients: list[float]) -> None:
+    def test_field_of_view_spans_the_image(self, model: Any, coefficients: list[float]) -> None:
         camera = Camera(horizontal_fov_rad=1.2, distortion_model=model, distortion=coefficients)
         lens = Lens.from_config(camera, 800, 600)
         assert (lens.cx, lens.cy, lens.fx) == (399.5, 299.5, lens.fy)
@@ -160,7 +160,7 @@ class TestFromConfig:
             Lens.from_config(camera, 640, 480)
 
     @given(st.integers(1, 4))
-    def test_smaller_picture_sees_the_same_rays(self, factor: int) -> None:
+    def test_smaller_image_sees_the_same_rays(self, factor: int) -> None:
         lens = WIDE.scaled(WIDE.width // factor, WIDE.height // factor)
         corner = np.array([[-0.5, -0.5]], np.float32)
         np.testing.assert_allclose(

@@ -1,4 +1,4 @@
-"""The pipeline: pictures and samples in, scenes out; bounded, repeatable, and honest about what it lacks."""
+"""The pipeline: images and samples in, scenes out; bounded, repeatable, and honest about what it lacks."""
 
 import gc
 import sys
@@ -33,7 +33,7 @@ LENSES = {
     "pinhole": PINHOLE,
     "barrel": Lens(320, 240, 180.0, 180.0, 150.0, 125.0, "radial-tangential", (-0.28, 0.07, 0.0002, 1.8e-5)),
     "fisheye": Lens(320, 240, 120.0, 120.0, 159.5, 119.5, "equidistant", (0.0, 0.0, 0.0, 0.0)),
-    "wider than a plane picture holds": Lens(320, 240, 90.0, 90.0, 159.5, 119.5, "equidistant", (0.0,) * 4),
+    "wider than a plane image holds": Lens(320, 240, 90.0, 90.0, 159.5, 119.5, "equidistant", (0.0,) * 4),
 }
 SMALL = Memory(
     corners=200,
@@ -146,7 +146,7 @@ class Recorded(Recording):
                 yield item
 
 
-def test_a_picture_can_be_looked_at_before_its_samples_have_come(approach: Approach) -> None:
+def test_a_image_can_be_looked_at_before_its_samples_have_come(approach: Approach) -> None:
     drive = list(approach())
     pipeline, samples, scenes = Pipeline(DEFAULTS, PINHOLE), [], []
     for item in drive:
@@ -172,7 +172,7 @@ def test_a_replay_is_the_same_as_feeding_the_pipeline_live(approach: Approach, l
     ]
 
 
-def test_the_lens_of_the_recording_fits_itself_to_the_pictures(approach: Approach) -> None:
+def test_the_lens_of_the_recording_fits_itself_to_the_images(approach: Approach) -> None:
     lens = LENSES["barrel"]
     drive = list(approach(lens=lens, frames=6))
     double = lens.scaled(640, 480)
@@ -228,7 +228,7 @@ def test_a_constant_speed_needs_no_sensor(approach: Approach) -> None:
     assert not any("no speed" in each.scene.notes for each in seen)
 
 
-def test_a_picture_without_corners_is_noted_and_the_next_goes_on(approach: Approach) -> None:
+def test_a_image_without_corners_is_noted_and_the_next_goes_on(approach: Approach) -> None:
     drive = list(approach())
     blank = [
         replace(item, image=np.zeros_like(item.image)) if isinstance(item, Frame) and item.seq == 10 else item
@@ -248,7 +248,7 @@ def test_refused_samples_are_counted_with_what_the_recording_skipped(approach: A
     assert recording.skipped == {"imu out of range": 2}  # each run counts anew
 
 
-def test_hours_of_samples_before_the_first_picture_change_nothing(approach: Approach) -> None:
+def test_hours_of_samples_before_the_first_image_change_nothing(approach: Approach) -> None:
     drive = list(approach(frames=6))
     start_ns = drive[0].stamp_ns
     before = [ImuSample(start_ns - (5000 - i) * 10_000_000, (0.0, 0.0, 0.0), (0.0, -9.81, 0.0)) for i in range(5000)]
@@ -258,7 +258,7 @@ def test_hours_of_samples_before_the_first_picture_change_nothing(approach: Appr
     assert all("no imu" not in scene.notes for scene in seen)
 
 
-def test_a_picture_that_stands_still_is_noted_although_the_odometry_goes_on(approach: Approach) -> None:
+def test_a_image_that_stands_still_is_noted_although_the_odometry_goes_on(approach: Approach) -> None:
     drive = list(approach(imu=False))
     image = next(item.image for item in drive if isinstance(item, Frame))
     frozen = [replace(item, image=image) if isinstance(item, Frame) else item for item in drive]
@@ -288,7 +288,7 @@ def test_positions_are_px_of_the_input_frame(approach: Approach, lens: Lens) -> 
         assert np.median(away) < 1.5  # most corners have their estimated edge right there
 
 
-def test_bearings_are_angles_at_the_lens_not_in_the_picture(approach: Approach) -> None:
+def test_bearings_are_angles_at_the_lens_not_in_the_image(approach: Approach) -> None:
     lens = LENSES["fisheye"]
     circles = np.concatenate([each.scene.circles for each in outcomes(approach(lens=lens), lens=lens)])
     ideal = lens.undistort(np.stack([circles["x"], circles["y"]], axis=1))

@@ -29,7 +29,7 @@ DERIVED = {"x", "y", "kind", "support", "bearing", "bearing_sigma", "elevation",
 
 
 def filled(table: Any) -> Any:
-    """Every column another number in every row; all rows in use, in the picture and beside it."""
+    """Every column another number in every row; all rows in use, in the image and beside it."""
     random = np.random.default_rng(5)
     for name, array in table.arrays.items():
         array[:] = (

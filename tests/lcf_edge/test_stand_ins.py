@@ -39,10 +39,10 @@ SHAKES = (
     scenes.Shake("roll", 0.03, 0.9, 2.0),
 )
 DRIVE = replace(scenes.make("crossing", 1, seconds=1.0), shakes=SHAKES)
-LEARNING = 10  # pictures
+LEARNING = 10  # images
 FRAMES = round(DRIVE.seconds * DRIVE.fps)
 SAMPLES, SPEEDS = scenes.imu(DRIVE), scenes.odometry(DRIVE)
-LEAD_NS = START_NS - SAMPLES[0].stamp_ns  # the samples begin before the pictures
+LEAD_NS = START_NS - SAMPLES[0].stamp_ns  # the samples begin before the images
 WARM_UP_S = 1.5  # from power-on; the rates of devices are known after that
 RATE_HZ = {"bno08x_rvc": 100.0}  # where it is not that of the recording
 FIRST_IS_NONE = ("bno08x_rvc", "csv")  # angles need a second frame, a line may have begun before
@@ -185,8 +185,8 @@ class Seen:
     """What came of a drive."""
 
     threats: dict[str, float | None]  # after how long each was found, s
-    rotations: np.ndarray  # (pictures, 3, 3) of the camera since the picture before
-    notes: set[str]  # but for the first pictures, which tell the gyro's bias
+    rotations: np.ndarray  # (images, 3, 3) of the camera since the image before
+    notes: set[str]  # but for the first images, which tell the gyro's bias
 
 
 def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) -> Seen:
@@ -207,7 +207,7 @@ def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) ->
 
 
 def live(bench: Bench, config: Config, read: Read) -> Iterator[Frame | ImuSample | SpeedSample]:
-    """Events of the devices, as the daemon hands them on: a picture when the samples of its time are there."""
+    """Events of the devices, as the daemon hands them on: an image when the samples of its time are there."""
     clock = bench.vehicle.clock
     imu = open_imu(config, clock)
     assert imu is not None
@@ -242,7 +242,7 @@ def replayed(recording: Path) -> Seen:
 
 
 def max_error_rad(seen: Seen, other: Seen) -> float:
-    """Of the rotation between two pictures."""
+    """Of the rotation between two images."""
     apart = np.einsum("nij,nkj->nik", seen.rotations[2:], other.rotations[2:])
     return float(np.arccos(np.clip((np.trace(apart, axis1=1, axis2=2) - 1) / 2, -1, 1)).max())
 

@@ -36,7 +36,7 @@ def test_the_truth_beside_it_is_that_of_the_renderer(sample: Path) -> None:
         }
 
 
-def test_every_picture_of_it_has_truth_and_the_filter_sees_what_threatens(sample: Path) -> None:
+def test_every_image_of_it_has_truth_and_the_filter_sees_what_threatens(sample: Path) -> None:
     truth = read_truth(sample.with_suffix(".truth.jsonl"))
     assert truth.is_known
     done = evaluate(Task(sample.stem, sample, load(sample), truth=sample.with_suffix(".truth.jsonl")))

@@ -1,7 +1,7 @@
 """Compares a camera's formats: ``python -m hil_mocks.vm.guest.formats DEVICE WIDTH HEIGHT``.
 
-Takes a picture in each format that can be read; a line for each: its name, and the largest difference to GREY among
-99 % of the pixels. The camera shows a still picture; that Y of colours goes from 16 to 235 is no difference.
+Takes an image in each format that can be read; a line for each: its name, and the largest difference to GREY among
+99 % of the pixels. The camera shows a still image; that Y of colours goes from 16 to 235 is no difference.
 """
 
 import sys
@@ -16,7 +16,7 @@ from drivers.camera.v4l2 import V4l2Camera
 
 
 def taken(device: str, pixel_format: str, width: int, height: int) -> Grey:
-    """The first picture in that format."""
+    """The first image in that format."""
     with closing(V4l2Camera(device, width=width, height=height, fps=25.0, pixel_format=pixel_format)) as camera:
         while not (frames := camera.read()):
             pass

@@ -119,19 +119,19 @@ def test_the_disk_fills_up_while_it_records(daemon: Daemon, subscriber: Subscrib
         daemon.machine.run(f"umount {STATE}")
 
 
-def test_a_processor_that_others_have_costs_pictures_that_are_counted(
+def test_a_processor_that_others_have_costs_images_that_are_counted(
     started: Daemon, subscriber: Subscriber, outlived: Callable[[], bool]
 ) -> None:
     quota = f"systemctl set-property --runtime {UNIT} CPUQuota="
 
     def lost() -> int:
-        """Pictures that came and were not looked at: where depends on which thread had to wait."""
+        """Images that came and were not looked at: where depends on which thread had to wait."""
         return sum(subscriber.count("camera", how) for how in ("dropped", "overtaken", "overtaken before the pipeline"))
 
     before = lost()
-    started.machine.run(quota + "10%")  # less than the pictures cost
+    started.machine.run(quota + "10%")  # less than the images cost
     try:
-        subscriber.wait_for(lambda: lost() > before, "a picture is lost and counted")
+        subscriber.wait_for(lambda: lost() > before, "an image is lost and counted")
     finally:
         started.machine.run(quota)
     subscriber.wait_for_scenes()

@@ -1,4 +1,4 @@
-"""Pixel formats as the kernel's vivid lays them out, in one memory for a picture and in one for each plane."""
+"""Pixel formats as the kernel's vivid lays them out, in one memory for an image and in one for each plane."""
 
 import pytest
 
@@ -16,7 +16,7 @@ EVERYWHERE = {"NV12", "YU12", "YUYV", "UYVY", "Y10", "Y12", "Y16", "BGR3", "XR24
     [("vivid-000-vid-cap", EVERYWHERE), ("vivid-002-vid-cap", EVERYWHERE | {"NM12", "YM12", "NM16"})],
     ids=["single-planar", "multi-planar"],
 )
-def test_all_formats_of_a_camera_show_the_same_picture(
+def test_all_formats_of_a_camera_show_the_same_image(
     machine: Machine, daemon: Daemon, name: str, least: set[str]
 ) -> None:
     daemon.stop()

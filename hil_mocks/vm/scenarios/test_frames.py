@@ -1,6 +1,6 @@
-"""Chosen pictures through real V4L2: an HDMI output feeds the capture device that the daemon reads.
+"""Chosen images through real V4L2: an HDMI output feeds the capture device that the daemon reads.
 
-What the daemon took and found is in its own recording; the pictures in it are those that were put in, and a plain
+What the daemon took and found is in its own recording; the images in it are those that were put in, and a plain
 replay of them finds the same circles.
 """
 
@@ -25,7 +25,7 @@ from lcf_edge.rendered import scenes
 
 FPS = 24.0  # a rate that HDMI has
 WIDTH, HEIGHT, FOCAL_PX = 320, 180, 250.0
-STILL = 48  # times the first picture, while the daemon looks
+STILL = 48  # times the first image, while the daemon looks
 HELD = 10  # times each: an emulated processor takes a few in a second
 CONFIG = f"""
 [camera]
@@ -62,7 +62,7 @@ def node(machine: Machine, name: str) -> str:
 
 @pytest.fixture(scope="module")
 def fed() -> list[Grey]:
-    """The pictures of a drive."""
+    """The images of a drive."""
     drive = scenes.make("crossing", 3, seconds=3.0, fps=FPS, width=WIDTH, height=HEIGHT, focal_px=FOCAL_PX)
     return [frame.image for frame, _ in scenes.frames(drive)]
 
@@ -100,7 +100,7 @@ def frames_of(recording: Path) -> list[Frame]:
     return [item for item in open_recording(recording, load(recording)) if isinstance(item, Frame)]
 
 
-def test_pictures_come_unchanged_and_in_order(recorded: Path, fed: list[Grey]) -> None:
+def test_images_come_unchanged_and_in_order(recorded: Path, fed: list[Grey]) -> None:
     numbers = {image.tobytes(): number for number, image in enumerate(fed)}
     found = [numbers.get(frame.image.tobytes()) for frame in frames_of(recorded)]
     known = [number for number in found if number is not None]

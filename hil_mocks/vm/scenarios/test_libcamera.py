@@ -21,7 +21,7 @@ fps = 1.0
 corners_target = 150
 """
     + LISTENS
-)  # an emulated processor makes one or two pictures of vimc in a second
+)  # an emulated processor makes one or two images of vimc in a second
 BY_HAND = "/opt/lcf-edge/bin/python -m drivers.camera"
 LIBCAMERA = f"{BY_HAND}.libcamera 'Sensor B' --width 160 --height 120 --fps 1"
 VIMC = "/sys/bus/platform/drivers/vimc"
@@ -85,7 +85,7 @@ def test_a_camera_that_goes_comes_back(running: Daemon, subscriber: Subscriber) 
 
 
 def test_the_process_takes_little_memory(running: Daemon) -> None:
-    """Beside the shared memory of the pictures, and the files that others map as well."""
+    """Beside the shared memory of the images, and the files that others map as well."""
     taken = running.machine.run(f"grep RssAnon /proc/{helper(running.machine)}/status")
     assert int(taken.split()[1]) < 16_000  # kB
 
@@ -101,7 +101,7 @@ def test_the_doctor_knows_it(running: Daemon) -> None:
     """First while in use by the daemon, then on its own."""
     output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
     assert "camera" in output
-    assert "in use by the daemon: delivering" in output
+    assert "in use by the daemon: delivers" in output
     running.stop()
     output = running.machine.tried("lcf-edge doctor 2>&1", 120.0).output
     assert "/dev/video0: through libcamera" in output
@@ -123,8 +123,11 @@ def test_it_has_a_name_and_an_id(free: Machine) -> None:
 @pytest.mark.parametrize(
     ("command", "output"),
     [
-        (f"{BY_HAND}.v4l2 /dev/video0", "gives pictures only through libcamera, as ribbon-cable cameras do; set cam"),
-        (f"{BY_HAND}.libcamera imx219", "imx219: libcamera has no such camera; found: Sensor B (platform/vimc.0 Sensor B)"),
+        (f"{BY_HAND}.v4l2 /dev/video0", "gives images only through libcamera, as ribbon-cable cameras do; set cam"),
+        (
+            f"{BY_HAND}.libcamera imx219",
+            "imx219: libcamera has no such camera; found: Sensor B (platform/vimc.0 Sensor B)",
+        ),
         (f"{LIBCAMERA} --width 8000", "Sensor B: no auto of 8000x120; offered: RGB3: "),
         (f"{LIBCAMERA} --gain 2", "Sensor B: the gain cannot be set; leave it unset"),
         (

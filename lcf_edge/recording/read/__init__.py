@@ -1,6 +1,6 @@
 """Reading recordings: EuRoC/ASL folders, MCAP files with ROS 2 messages, videos, folders of images.
 
-``recording`` is what they have in common; ``asl``, ``rosbag`` and ``pictures`` are the kinds. ``decoding``
+``recording`` is what they have in common; ``asl``, ``rosbag`` and ``images`` are the kinds. ``decoding``
 turns encoded images into luminance, ``mcap_file`` finds the messages of a damaged file, ``sensor_yaml`` and
 ``distortion`` read calibrations.
 """
@@ -50,5 +50,5 @@ def _open(path: Path, config: Config) -> Recording:
     if suffix in VIDEO_SUFFIXES:
         return VideoFile(path, config)
     raise RecordingError(
-        f"{path}: not a recording; name an mcap file, a video, a folder of pictures or one with mav0 in it"
+        f"{path}: not a recording; name an mcap file, a video, a folder of images or one with mav0 in it"
     )

@@ -43,11 +43,11 @@ class AslRecording(Recording):
         self._cam, self._imu, self._odom = (root / name / "data.csv" for name in ("cam0", "imu0", "odom0"))
         if not self._cam.is_file():
             raise RecordingError(
-                f"{self._cam}: missing; without stamps name the folder of pictures itself and set camera.fps"
+                f"{self._cam}: missing; without stamps name the folder of images itself and set camera.fps"
             )
         self.frame_count = _row_count(self._cam)
         if not self.frame_count:
-            raise RecordingError(f"{self._cam}: names no pictures; record it again")
+            raise RecordingError(f"{self._cam}: names no images; record it again")
         self.has_imu = self._has_rows(self._imu)
         self.has_speed = self._has_rows(self._odom)
         cam_yaml, imu_yaml = (csv.with_name("sensor.yaml") for csv in (self._cam, self._imu))
@@ -64,7 +64,7 @@ class AslRecording(Recording):
 
     def _items(self) -> Iterator[UndecodedFrame | Sample]:
         return interleave(
-            self._rows(self._cam, "picture", self._image),
+            self._rows(self._cam, "image", self._image),
             self._rows(self._imu, "imu", self._imu_sample) if self.has_imu else (),
             self._rows(self._odom, "speed", _speed_sample) if self.has_speed else (),
         )

@@ -53,8 +53,8 @@ class ImageFolder(Recording):
         self._paths = sorted((p for p in entries if is_image(p)), key=lambda p: natural_order(p.name))
         if not self._paths:
             raise RecordingError(
-                f"{path}: {'no pictures in it' if entries else 'empty folder'}; "
-                "wanted are pictures (png, jpg, bmp, pgm, tif), an mcap file or mav0/cam0/data.csv"
+                f"{path}: {'no images in it' if entries else 'empty folder'}; "
+                "wanted are images (png, jpg, bmp, pgm, tif), an mcap file or mav0/cam0/data.csv"
             )
         self.frame_count = len(self._paths)
         self._fps = config.camera.fps
@@ -83,7 +83,7 @@ class VideoFile(Recording):
         try:
             check_size(*size)
         except ImageDecodeError as error:
-            raise RecordingError(f"{path}: pictures are {error} ({size[0]}x{size[1]} px); scale the video") from error
+            raise RecordingError(f"{path}: images are {error} ({size[0]}x{size[1]} px); scale the video") from error
         self._decoder_bytes = _DECODER_BYTES + _BYTES_A_PIXEL * size[0] * size[1]
         configured_fps = config.camera.fps
         has_fps = math.isfinite(own_fps) and 0 < own_fps < FASTEST_FPS
@@ -100,17 +100,17 @@ class VideoFile(Recording):
         try:
             while _grab(capture, allowance):
                 read = partial(_retrieve, capture, allowance)
-                yield UndecodedFrame(_stamp_ns(index, self._fps), f"{self.path}: picture {index}", read)
+                yield UndecodedFrame(_stamp_ns(index, self._fps), f"{self.path}: image {index}", read)
                 index += 1
             if any(_grab(capture, allowance) for _ in range(_GRABS_BEYOND)):
-                self._warn(f"{self.path}: picture {index} is damaged, or larger than the first; the video ends there")
+                self._warn(f"{self.path}: image {index} is damaged, or larger than the first; the video ends there")
                 return
         except cv2.error as error:
-            self._warn(f"{self.path}: damaged after picture {index} ({error.err})")
+            self._warn(f"{self.path}: damaged after image {index} ({error.err})")
         finally:
             capture.release()
         if self.frame_count is not None and index < self.frame_count - 1:  # containers may count one too many
-            self._warn(f"{self.path}: damaged, ends after {index} of {self.frame_count} pictures")
+            self._warn(f"{self.path}: damaged, ends after {index} of {self.frame_count} images")
 
     def _open(self) -> cv2.VideoCapture:
         in_this_thread = [cv2.CAP_PROP_N_THREADS, 1]

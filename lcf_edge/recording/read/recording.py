@@ -87,18 +87,18 @@ class Recording(ABC):
             try:
                 image = item.decode()
             except ImageDecodeError as error:
-                self._skip(f"picture {error}", item.name)
+                self._skip(f"image {error}", item.name)
                 continue
             shape = shape or image.shape
             if image.shape == shape:
                 yield Frame(item.stamp_ns, seq, image)
             else:
-                self._skip("picture of another size than the first", item.name)
+                self._skip("image of another size than the first", item.name)
         if not begun and seq >= 0:
             raise RecordingError(f"{self.path}: ends after {last_s:.1f} s; name an earlier start than {start_s:g} s")
         if shape is None:
             why = "".join(f" ({count} times: {what})" for what, count in self.skipped.most_common(1))
-            raise RecordingError(f"{self.path}: not one picture could be read{why}; record it again")
+            raise RecordingError(f"{self.path}: not one image could be read{why}; record it again")
 
     def _warn(self, text: str) -> None:
         text = printable(text, 1000)  # names in a file may hold anything

@@ -47,15 +47,15 @@ class RosBag(Recording):
         super().__init__(path)
         self._files = self._open_files()
         self._firsts = self._survey()
-        image = self._choose("picture", IMAGE, COMPRESSED_IMAGE)
+        image = self._choose("image", IMAGE, COMPRESSED_IMAGE)
         imu = self._choose("imu", IMU)
         speed = self._choose("speed", ODOMETRY, TWIST_STAMPED)
         if image is None:
             raise RecordingError(
-                f"{path}: no picture that can be read in it (sensor_msgs/msg/Image of "
+                f"{path}: no image that can be read in it (sensor_msgs/msg/Image of "
                 f"{', '.join(RAW_ENCODINGS)}, or CompressedImage); record a camera topic"
             )
-        kinds = ((image, "picture"), (imu, "imu"), (speed, "speed"))
+        kinds = ((image, "image"), (imu, "imu"), (speed, "speed"))
         self._kinds = {topic: kind for topic, kind in kinds if topic}
         self.has_imu, self.has_speed = imu is not None, speed is not None
         counts = [file.counts[image] for file in self._files if file.counts is not None]
@@ -81,7 +81,7 @@ class RosBag(Recording):
                 self._skip(f"{kind} message malformed", where)
 
     def _late(self, item: UndecodedFrame | Sample) -> None:
-        kind = {UndecodedFrame: "picture", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
+        kind = {UndecodedFrame: "image", ImuSample: "imu", SpeedSample: "speed"}[type(item)]
         self._skip(f"{kind} time that does not increase", f"{self.path}: {kind} of {item.stamp_ns / 1e9:.3f} s")
 
     def _open_files(self) -> list[McapFile]:

@@ -1,4 +1,4 @@
-"""The libcamera driver and its process, with a stand-in for libcamera: pictures, the sensor's mode, locks, faults."""
+"""The libcamera driver and its process, with a stand-in for libcamera: images, the sensor's mode, locks, faults."""
 
 import errno
 import json
@@ -59,7 +59,7 @@ def open_camera() -> Iterator[Open]:
 
 
 def take(camera: LibcameraCamera, count: int) -> list[Frame]:
-    """The next pictures."""
+    """The next images."""
     frames: list[Frame] = []
     while len(frames) < count:
         frames += camera.read()
@@ -93,7 +93,7 @@ class TestPictures:
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420"))).mode.pixel_format == "YU12"
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420")), pixel_format="YUYV").mode.pixel_format == "YUYV"
 
-    def test_a_picture_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
+    def test_a_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         camera = open_camera()
         first = take(camera, 1)[0]
         kept = first.image.copy()
@@ -136,13 +136,13 @@ class TestPictures:
         assert newest.seq >= first.seq + 2
         assert camera.counts["overtaken"] + camera.counts["dropped"] == newest.seq - first.seq - 1
 
-    def test_lost_pictures_show_as_a_gap(self, open_camera: Open) -> None:
+    def test_lost_images_show_as_a_gap(self, open_camera: Open) -> None:
         camera = open_camera(World(skipped=2))
         numbers = [frame.seq for frame in take(camera, 5)]
         assert 2 not in numbers
         assert camera.counts["dropped"] == 1
 
-    def test_a_picture_that_is_marked_as_bad_is_refused(self, open_camera: Open) -> None:
+    def test_a_image_that_is_marked_as_bad_is_refused(self, open_camera: Open) -> None:
         camera = open_camera(World(bad=True))
         while not camera.counts["corrupt"]:  # on a slow computer a newer one may overtake it unseen
             assert not any(frame.seq % 2 for frame in camera.read())
@@ -180,13 +180,13 @@ class TestField:
         assert tuple(read_first["mode"]) == mode
         assert read_first["FrameDurationLimits"] == [round(1e6 / fps)] * 2
 
-    def test_left_alone_it_would_have_been_a_part_of_the_picture(self, open_camera: Open, tmp_path: Path) -> None:
+    def test_left_alone_it_would_have_been_a_part_of_the_image(self, open_camera: Open, tmp_path: Path) -> None:
         world = World(log_path=str(tmp_path / "started"), chooses_modes=False)
         open_camera(world, width=640, height=480)
         assert MODES[tuple(started_when_there(world)["mode"])][0] == (1280, 960)
 
     def test_a_rate_that_no_mode_has_is_refused_with_what_there_is(self, open_camera: Open) -> None:
-        with pytest.raises(UnsupportedSettingError, match=r"no 500 pictures a second .* offered: 0\.1\.\.208\.3/s"):
+        with pytest.raises(UnsupportedSettingError, match=r"no 500 frames a second .* offered: 0\.1\.\.208\.3/s"):
             open_camera(width=640, height=480, fps=500.0)
 
 
@@ -263,11 +263,13 @@ class TestNames:
     def test_by_a_node_that_belongs_to_it(self, open_camera: Open) -> None:
         world = World(names=("imx708", "imx219"), nodes=(Path("/dev/null").stat().st_rdev,))
         take(open_camera(world, "/dev/null"), 1)
-        with pytest.raises(DeviceMissingError, match=r"^/dev/zero: libcamera has no such camera; found: imx708 \(/base/"):
+        with pytest.raises(
+            DeviceMissingError, match=r"^/dev/zero: libcamera has no such camera; found: imx708 \(/base/"
+        ):
             open_camera(world, "/dev/zero")
 
     def test_a_name_that_two_have_is_refused_with_their_ids(self, open_camera: Open) -> None:
-        with pytest.raises(WrongDeviceError, match=r"take the id from: imx219 \(.*i2c@0.*\), imx219 \(.*i2c@1"):
+        with pytest.raises(WrongDeviceError, match=r"use an id from: imx219 \(.*i2c@0.*\), imx219 \(.*i2c@1"):
             open_camera(World(names=("imx219", "imx219")))
 
     def test_all_of_them_are_listed(self) -> None:
@@ -315,7 +317,7 @@ class TestFaults:
         camera = open_camera(World(silent=2), fps=30.0)
         error = read_until_error(camera)
         assert isinstance(error, DeviceStalledError)
-        assert str(error).startswith("imx219: no usable picture for 1.0 s; ")
+        assert str(error).startswith("imx219: no usable image for 1.0 s; ")
 
     def test_a_libcamera_that_hangs_is_given_up_and_killed(
         self, open_camera: Open, monkeypatch: pytest.MonkeyPatch

@@ -34,7 +34,7 @@ def test_raw_formats_give_their_luminance_to_the_bit(pixel_format: str, padding:
 
 @pytest.mark.parametrize("padding", [0, 32])
 @pytest.mark.parametrize("pixel_format", BAYER)
-def test_raw_pictures_of_a_sensor_with_colours_give_weighted_sums(pixel_format: str, padding: int) -> None:
+def test_raw_images_of_a_sensor_with_colours_give_weighted_sums(pixel_format: str, padding: int) -> None:
     """Grey stays grey, and red, green and blue weigh as in ITU-R BT.601."""
     grey = np.full((HEIGHT, WIDTH), 120, np.uint8)
     assert np.abs(read(pixel_format, encode(grey, pixel_format, padding), padding) - 120.0).max() <= 1
@@ -48,14 +48,14 @@ def test_raw_pictures_of_a_sensor_with_colours_give_weighted_sums(pixel_format: 
 
 
 @pytest.mark.parametrize("pixel_format", [name for name in RAW if name not in SEPARATE and "P" not in name[1:]])
-def test_a_picture_may_be_of_any_width(pixel_format: str) -> None:
+def test_a_image_may_be_of_any_width(pixel_format: str) -> None:
     image = IMAGE[:, :50]
     data = memoryview(encode(image, pixel_format))
     assert np.array_equal(luminance(pixel_format, data, 50, HEIGHT, min_stride(pixel_format, 50)), image)
 
 
 @pytest.mark.parametrize("reduction", [2, 4, 8])
-def test_a_jpeg_of_a_larger_picture_is_decoded_to_the_smaller_one(reduction: int) -> None:
+def test_a_jpeg_of_a_larger_image_is_decoded_to_the_smaller_one(reduction: int) -> None:
     """As if the large one were decoded and its pixels then averaged."""
     rows, columns = np.mgrid[: HEIGHT * reduction, : WIDTH * reduction] / reduction
     large = (128 + 60 * np.sin(rows / 4) * np.cos(columns / 5)).astype(np.uint8)
@@ -86,7 +86,7 @@ def test_a_jpeg_without_huffman_tables_has_the_standard_ones() -> None:
     assert np.abs(read("MJPG", bare).astype(int) - IMAGE).max() < 10
 
 
-def test_a_jpegs_orientation_does_not_turn_the_picture() -> None:
+def test_a_jpegs_orientation_does_not_turn_the_image() -> None:
     exif = bytes.fromhex("ffe1002245786966000049492a00080000000100120103000100000006000000000000000000")[:36]
     assert read("MJPG", JPEG[:2] + exif + JPEG[2:]).shape == (HEIGHT, WIDTH)
 
@@ -135,14 +135,14 @@ def test_a_jpeg_with_a_huge_size_behind_a_fill_byte_takes_no_memory() -> None:
 
 
 def test_a_progressive_jpeg_is_refused() -> None:
-    """No camera sends one, and its decoder keeps the whole picture several times."""
+    """No camera sends one, and its decoder keeps the whole image several times."""
     jpeg = cv2.imencode(".jpg", IMAGE, [cv2.IMWRITE_JPEG_PROGRESSIVE, 1])[1].tobytes()
     with pytest.raises(FrameError, match="corrupt"):
         read("MJPG", jpeg)
 
 
 @given(st.binary(max_size=400), st.integers(0, len(JPEG)), st.sampled_from(PIXEL_FORMATS))
-def test_any_bytes_are_a_picture_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
+def test_any_bytes_are_a_image_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
     try:
         outcome: object = read(pixel_format, JPEG[:at] + rubbish + JPEG[at + len(rubbish) :]).shape
     except FrameError as error:

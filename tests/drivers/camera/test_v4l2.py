@@ -62,13 +62,13 @@ def open_camera(kernel: MockKernel, clock: VirtualClock) -> Open:
 
 
 def take(camera: V4l2Camera, count: int) -> list[Frame]:
-    """The next pictures; reads at most twice as often as the camera's rate asks for."""
+    """The next images; reads at most twice as often as the camera's rate asks for."""
     frames: list[Frame] = []
     for _ in range(2 * count + 2):
         frames += camera.read()
         if len(frames) >= count:
             return frames[:count]
-    raise AssertionError(f"only {len(frames)} of {count} pictures came: {camera.counts}")
+    raise AssertionError(f"only {len(frames)} of {count} images came: {camera.counts}")
 
 
 def ribbon_camera(interface: int = v4l2.CAP_VIDEO_CAPTURE) -> MockCamera:
@@ -113,7 +113,7 @@ class TestPictures:
         frame = take(open_camera(pixel_format="MJPG"), 1)[0]
         assert np.abs(frame.image.astype(int) - drawn_image(0, 640, 480)).max() < 10
 
-    def test_a_picture_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
+    def test_a_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         frames = take(open_camera(), 2 * BUFFERS)
         assert all(np.array_equal(frame.image, drawn_image(n, 640, 480)) for n, frame in enumerate(frames))
 
@@ -174,7 +174,7 @@ class TestPictures:
 
 
 class TestMultiPlanar:
-    """A device whose pictures may lie in several memories, as on many systems on a chip."""
+    """A device whose images may lie in several memories, as on many systems on a chip."""
 
     @pytest.fixture
     def webcam(self) -> MockCamera:
@@ -196,7 +196,7 @@ class TestMultiPlanar:
         frame = take(open_camera(pixel_format="YUYV"), 1)[0]
         assert np.array_equal(frame.image, drawn_image(0, 640, 480))
 
-    def test_half_a_picture_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_half_a_image_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.short = 1
         camera = open_camera()
         assert take(camera, 1)[0].seq == 1
@@ -283,7 +283,7 @@ class TestStamps:
         assert stamps == sorted(set(stamps))
         assert counted(camera) == {"stamped at arrival": 3}
 
-    def test_a_late_picture_is_delivered_and_known_to_be_late(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_a_late_image_is_delivered_and_known_to_be_late(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera()
         take(camera, 3)
         webcam.late_s = 2.5 / 30
@@ -298,7 +298,7 @@ class TestStamps:
 class TestBadPictures:
     """Each is a counted drop, and the next good one is delivered."""
 
-    def test_lost_pictures_show_as_a_gap(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_lost_images_show_as_a_gap(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera()
         (before,) = take(camera, 1)
         webcam.drop = 3
@@ -328,15 +328,13 @@ class TestBadPictures:
         assert counted(camera) == {"corrupt": 2}
 
     @pytest.mark.parametrize(("pixel_format", "reason"), [("YUYV", "short"), ("MJPG", "corrupt")])
-    def test_half_a_picture_is_none(
-        self, open_camera: Open, webcam: MockCamera, pixel_format: str, reason: str
-    ) -> None:
+    def test_half_a_image_is_none(self, open_camera: Open, webcam: MockCamera, pixel_format: str, reason: str) -> None:
         camera = open_camera(pixel_format=pixel_format)
         webcam.short = 2
         assert take(camera, 1)
         assert counted(camera) == {reason: 2}
 
-    def test_a_picture_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_a_image_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera(pixel_format="MJPG")
         take(camera, 1)
         webcam.images = lambda seq, _width, _height: drawn_image(seq, 320, 240)
@@ -361,7 +359,7 @@ class TestSettings:
     def test_automatic_takes_jpegs_where_only_they_are_fast_enough(self, open_camera: Open) -> None:
         assert open_camera(width=1280, height=720, fps=30).mode.pixel_format == "MJPG"
 
-    def test_raw_pictures_come_last(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_raw_images_come_last(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.modes = {name: {(640, 480): (30.0,)} for name in ("RGGB", "MJPG", "Y12")}
         assert open_camera().mode.pixel_format == "Y12"
         del webcam.modes["Y12"]
@@ -422,7 +420,7 @@ class TestSettings:
         assert camera.mode.fps == 17
         assert take(camera, 3)
 
-    def test_interlaced_pictures_are_refused(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_interlaced_images_are_refused(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.field = 4  # V4L2_FIELD_INTERLACED
         with pytest.raises(UnsupportedSettingError, match="interlaced"):
             open_camera()
@@ -487,7 +485,7 @@ class TestNames:
         kernel.plug("/dev/video0", metadata)
         kernel.plug("/dev/video1", webcam)
         assert take(open_camera("Mock Webcam"), 1)
-        with pytest.raises(WrongDeviceError, match=r"/dev/video0: gives no pictures .*/dev/video1 \(Mock Webcam\)"):
+        with pytest.raises(WrongDeviceError, match=r"/dev/video0: gives no images .*/dev/video1 \(Mock Webcam\)"):
             open_camera("/dev/video0")
 
     @pytest.mark.parametrize("interface", [v4l2.CAP_VIDEO_CAPTURE, v4l2.CAP_VIDEO_CAPTURE_MPLANE])
@@ -501,7 +499,7 @@ class TestNames:
         kept.read()
         assert isinstance(kept.error, WrongDeviceError)
         assert str(kept.error) == (
-            f"{name}: gives pictures only through libcamera, as ribbon-cable cameras do;"
+            f"{name}: gives images only through libcamera, as ribbon-cable cameras do;"
             ' set camera.driver = "libcamera" (docs/raspberry-pi.md); no other camera is plugged in'
         )
         assert not kept.error.retry
@@ -542,7 +540,7 @@ class TestNames:
     ) -> None:
         """As older kernels' nodes of ribbon-cable cameras do: they grant formats, and then do not start."""
         webcam.start_error = number
-        with pytest.raises(WrongDeviceError, match=r"does not start as a camera of its own .* through libcamera"):
+        with pytest.raises(WrongDeviceError, match=r"does not start on its own .* through libcamera"):
             open_camera()
         assert kernel.open_files == 0
 
@@ -672,7 +670,7 @@ def _read_until_frame(kept: KeptOpen[Frame]) -> list[Frame]:
     for _ in range(10):
         if frames := list(kept.read()):
             return frames
-    raise AssertionError(f"no picture: {kept.error}")
+    raise AssertionError(f"no image: {kept.error}")
 
 
 class TestByHand:

@@ -123,6 +123,4 @@ def test_rates_add_up_to_the_turn_that_was_made(seed: int, max_radps: float) -> 
     for begin in range(0, 90, 10):
         window = slice(begin, begin + 5)  # a frame interval
         turned = np.sum(np.array(found)[window], axis=0) / 100
-        assert turned == pytest.approx(
-            np.sum(truth[window], axis=0) / 100, abs=math.radians(0.03) + 2e-4 * max_radps
-        )
+        assert turned == pytest.approx(np.sum(truth[window], axis=0) / 100, abs=math.radians(0.03) + 2e-4 * max_radps)

@@ -478,7 +478,7 @@ def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
     (tmp_path / "notes.txt").touch()
 
     for path in (tmp_path, tmp_path / "notes.txt"):
-        with pytest.raises(WrongDeviceError, match="is no serial port"):
+        with pytest.raises(WrongDeviceError, match="is not a serial port"):
             open_port("csv", str(path), 0, ImuSettings())
 
 

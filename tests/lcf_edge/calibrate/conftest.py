@@ -51,7 +51,7 @@ class Given:
 
 @dataclass(frozen=True)
 class Studio:
-    """Pictures of a board through a lens, anti-aliased, with noise."""
+    """Images of a board through a lens, anti-aliased, with noise."""
 
     board: Target
     lens: Lens
@@ -102,7 +102,7 @@ class Studio:
     def poses(
         self, count: int, *, tilt_rad: float = 0.6, spread: float = 1.0, seed: int = 1
     ) -> Iterator[tuple[Floats, Floats]]:
-        """The board all over the picture, tilted each way: rotation and shift of each view."""
+        """The board all over the image, tilted each way: rotation and shift of each view."""
         random = np.random.default_rng(seed)
         wide = np.ptp(self.board.places[:, 0])
         for seq in range(count):
@@ -113,14 +113,14 @@ class Studio:
             yield turn, depth * np.array([x, y, 1.0])
 
     def views(self, count: int) -> list[Frame]:
-        """Pictures of the board in different poses."""
+        """Images of the board in different poses."""
         return [
             Frame(START_NS + seq * 10**9, seq, self.image(turn, shift, seq))
             for seq, (turn, shift) in enumerate(self.poses(count))
         ]
 
     def sightings(self, count: int, noise_px: float = 0.1, **poses: float) -> Views:
-        """What would be found in such pictures, and in ones that no picture holds."""
+        """What would be found in such images, and in ones that no image holds."""
         random = np.random.default_rng(2)
         views = Views(self.board, film=False, size=(self.lens.width, self.lens.height))
         for turn, shift in self.poses(count, **poses):
@@ -163,7 +163,7 @@ class Turntable:
         return sine / (2 * np.sinc(angle / np.pi)[:, None]) / step_s
 
     def samples(self) -> list[ImuSample]:
-        """In the IMU's axes, from 1 s before the first picture to 1 s after the last."""
+        """In the IMU's axes, from 1 s before the first image to 1 s after the last."""
         random = np.random.default_rng(3)
         times_s = np.arange(-1.0, self.seconds + 1.0, 1 / self.imu_hz)
         rates = self.rates(times_s - 5e-4, 1e-3)
@@ -184,7 +184,7 @@ class Turntable:
         return [Turn(*span, rate, noise_radps) for span, rate in zip(pairwise(stamps_ns), rates, strict=True)]
 
     def frames(self) -> list[Frame]:
-        """Pictures of the room."""
+        """Images of the room."""
         times_s = np.arange(round(self.seconds * self.fps)) / self.fps
         x, y = np.meshgrid(np.arange(self.lens.width), np.arange(self.lens.height))
         ideal = self.lens.undistort_pixels(x.ravel(), y.ravel()).astype(np.float64)

@@ -36,20 +36,20 @@ def some_rotation(seed: int) -> Floats:
 
 @pytest.fixture(scope="module")
 def rendered(turntable: Make, given: Make) -> tuple[Any, Floats, float]:
-    """A source of pictures and samples, the IMU's axes, and the offset."""
+    """A source of images and samples, the IMU's axes, and the offset."""
     axes, offset_s = some_rotation(5) @ CHIP, 0.0373
     table = turntable(axes=axes, offset_s=offset_s)
     return given(table.samples(), table.frames(), lens=table.lens), axes, offset_s
 
 
-def test_pictures_tell_the_axes_within_a_degree(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
+def test_images_tell_the_axes_within_a_degree(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
     source, axes, _ = rendered
     found = calibrate_by_camera(source, Config(), None, 0.0, guide)
     assert np.degrees(angle_rad(np.array(found.values["axes"]), axes)) < 0.5
     assert any("37 ms apart, which is not configured: run lcf-edge calibrate time" in line for line in found.findings)
 
 
-def test_pictures_tell_the_offset_within_3_ms(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
+def test_images_tell_the_offset_within_3_ms(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
     source, _, offset_s = rendered
     assert calibrate_time(source, Config(), None, guide).values["time_offset_s"] == pytest.approx(offset_s, abs=0.001)
 

@@ -87,7 +87,7 @@ def test_views_of_the_middle_alone_are_refused(studio: Make) -> None:
     views = studio(Target.parse("checkerboard:5x4:25mm"), WEBCAM).sightings(9, spread=0.6)
     for view in views.kept:
         view.corners[:] = view.corners.mean(axis=0) + 0.3 * (view.corners - view.corners.mean(axis=0))
-    with pytest.raises(CalibrationError, match=r"corners were seen in \d+% of the picture"):
+    with pytest.raises(CalibrationError, match=r"corners were seen in \d+% of the image"):
         solve(views, "radial-tangential")
 
 

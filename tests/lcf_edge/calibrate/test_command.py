@@ -1,4 +1,4 @@
-"""``lcf-edge calibrate`` as a person runs it: devices or a recording in; prompts, TOML, a picture, a file out."""
+"""``lcf-edge calibrate`` as a person runs it: devices or a recording in; prompts, TOML, an image, a file out."""
 
 import os
 import pty

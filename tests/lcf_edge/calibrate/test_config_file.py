@@ -66,7 +66,7 @@ def test_what_would_not_be_valid_changes_nothing(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_none_is_refused_before_work_begins(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match=r"rover.toml: no such file to write to; name yours with -c"):
+    with pytest.raises(ConfigError, match=r"rover.toml: no such file; name yours with -c"):
         check_writable(tmp_path / "rover.toml")
     broken = tmp_path / "broken.toml"
     broken.write_text("[camera", encoding="utf-8")

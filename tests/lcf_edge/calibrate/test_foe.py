@@ -69,9 +69,9 @@ def test_what_is_no_straight_drive_is_refused(given: Make, guide: Guide, straigh
     for frames, message in (
         (turning, "the drive is not straight, it turned in"),
         (blank, "followed over 0 intervals"),
-        (standing, "next to nothing came nearer"),
-        (backwards, "it drives backwards"),
-        ([], "no pictures came"),
+        (standing, "hardly anything came nearer"),
+        (backwards, "as when reversing"),
+        ([], "no images came"),
     ):
         with pytest.raises(CalibrationError, match=message):
             calibrate_foe(given(frames, lens=PINHOLE), Config(), None, guide)

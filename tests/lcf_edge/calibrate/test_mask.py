@@ -63,7 +63,7 @@ def test_who_stands_still_is_told_to_drive() -> None:
         own_parts(watched(still))
 
 
-def test_few_pictures_tell_nothing() -> None:
+def test_few_images_tell_nothing() -> None:
     with pytest.raises(CalibrationError, match="20 are needed"):
         own_parts(watched(images_of(scenes.make("passing", 23, seconds=2.0))))
 
@@ -84,7 +84,7 @@ def test_the_proposal_is_written_in_px_of_the_configured_size(
     mask = tomllib.loads(capsys.readouterr().out)["camera"]["mask"]
     assert load(file).camera.mask == mask
     lowest = max(y for polygon in mask for _, y in polygon)
-    assert 470 <= lowest <= 480  # the pictures have 240 rows
+    assert 470 <= lowest <= 480  # the images have 240 rows
     assert cv2.imread(str(report)).shape == (600, 1300, 3)
 
 

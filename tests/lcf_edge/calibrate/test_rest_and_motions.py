@@ -102,7 +102,7 @@ def tremble(row: int, gyro: Floats, accel: Floats) -> None:  # noqa: ARG001
         ("it moved while it should rest", tip),
         ("it moved while it should rest", shake),
         (r"gravity shows as 11.7. m/s², \+20%", weigh),
-        ("too restless for the daemon to see that it stands", tremble),
+        ("too noisy for the daemon to see that it is at rest", tremble),
     ],
 )
 def test_what_is_no_rest_is_refused(at_rest: list[ImuSample], message: str, change: Any) -> None:

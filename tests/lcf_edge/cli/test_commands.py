@@ -257,7 +257,7 @@ def test_the_video_has_two_panels_and_every_frame(
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
 
 
-def test_the_plot_is_a_picture(replayed: tuple[Done, Path]) -> None:
+def test_the_plot_is_a_image(replayed: tuple[Done, Path]) -> None:
     image = cv2.imread(str(replayed[1] / "sizes.png"))
     assert image is not None
     assert image.std() > 10
@@ -339,7 +339,7 @@ def sequence(done: Done) -> list[int]:
 
 
 def test_a_part_of_a_recording_is_replayed(recording: Path) -> None:
-    """At 10 pictures a second."""
+    """At 10 frames a second."""
     assert sequence(lcf_edge("replay", recording, "-o", "-", "--start", "1", "--duration", "0.5")) == list(
         range(10, 16)
     )
@@ -377,15 +377,15 @@ def test_a_replay_goes_step_by_step(recording: Path) -> None:
         timeout=PATIENCE_S,
     )
     assert sequence(done) == [0, 1, 2]
-    assert done.stderr.startswith("picture 0: Enter shows it, Ctrl-D ends\n")
+    assert done.stderr.startswith("image 0: Enter shows it, Ctrl-D ends\n")
     assert "frames   3, 0.2 s of recording" in done.stderr
 
 
 @pytest.mark.parametrize(
     ("arguments", "parts"),
     [
-        (("watch", "--start", "3"), ("options of a recording", "RECORDING")),
-        (("view", "--set", "camera.fps=20"), ("options of a recording", "RECORDING")),
+        (("watch", "--start", "3"), ("these options need a recording", "RECORDING")),
+        (("view", "--set", "camera.fps=20"), ("these options need a recording", "RECORDING")),
         (("watch", ".", "--json"), ("--json is for a daemon", "replay RECORDING -o -")),
         (("replay", ".", "--speed", "0"), ("--speed", "between 0.01 and 100")),
         (("replay", ".", "--duration", "-1"), ("--duration", "above 0")),

@@ -87,7 +87,7 @@ def lenses(draw: st.DrawFn) -> list[str]:
 
 
 def drive(pipeline: Pipeline, approach: Callable[..., Any]) -> int:
-    """Six pictures with everything that belongs to them. Return the scenes."""
+    """Six images with everything that belongs to them. Return the scenes."""
     scenes = 0
     for item in approach(frames=6, lens=Lens(WIDTH, HEIGHT, 125.0, 125.0, 79.5, 59.5)):
         if isinstance(item, Frame):
@@ -165,7 +165,7 @@ def test_what_once_ended_a_reload_is_refused_by_its_key(setting: str) -> None:
     assert len(refused) < 200
 
 
-def test_more_pixels_than_a_picture_may_have_are_refused() -> None:
+def test_more_pixels_than_a_image_may_have_are_refused() -> None:
     refused = built(["camera.width=16384", "camera.height=16384"])
     assert isinstance(refused, str)
     assert "camera.width: more than 33554432 pixels" in refused

@@ -38,10 +38,10 @@ def test_what_can_be_an_endpoint_is_taken(endpoint: str) -> None:
         ("tcp/rover:65536", "invalid port"),
         ("tcp/rover:-1", "invalid port"),
         ("tls/rover", "no port"),
-        ("rover:7447", "no endpoint, which is protocol/address"),
-        ("tcp/", "no endpoint, which is protocol/address"),
-        ("/rover:7447", "no endpoint, which is protocol/address"),
-        ("", "no endpoint, which is protocol/address"),
+        ("rover:7447", "not an endpoint (protocol/address)"),
+        ("tcp/", "not an endpoint (protocol/address)"),
+        ("/rover:7447", "not an endpoint (protocol/address)"),
+        ("", "not an endpoint (protocol/address)"),
     ],
 )
 def test_what_can_be_none_is_reported_with_a_remedy(endpoint: str, why: str) -> None:

@@ -120,7 +120,7 @@ def manager(tmp_path: Path) -> Iterator[Manager]:
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A drive of 1.5 s with IMU and odometry, 320×240 at 20 pictures a second."""
+    """A drive of 1.5 s with IMU and odometry, 320×240 at 20 frames a second."""
     made = scenes.make("crossing", 3, seconds=1.5, fps=20.0, width=320, height=240, focal_px=250.0)
     return scenes.write(made, tmp_path_factory.mktemp("drive"))
 

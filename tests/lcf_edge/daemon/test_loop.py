@@ -199,7 +199,7 @@ def test_what_earlier_pipelines_refused_is_not_forgotten(
     assert loop.refused == {"imu not finite": 2}
 
 
-def test_pictures_of_another_size_get_a_pipeline_of_their_own(start: Start, mail: Mail, link: Any, noise: Any) -> None:
+def test_images_of_another_size_get_a_pipeline_of_their_own(start: Start, mail: Mail, link: Any, noise: Any) -> None:
     start(Config(filter=Filter()))
     for seq, (width, height) in enumerate(((640, 480), (320, 240))):
         mail.frames.put(Frame(time.monotonic_ns(), seq, noise(width=width, height=height)))

@@ -82,7 +82,7 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
     with AnyReader([file]) as reader:
         counts = Counter(connection.topic for connection, _, _ in reader.messages())
     frame_count = counts["/lcf/camera/image_raw/compressed"]
-    assert out.startswith(f"{file}: {frame_count} pictures, {counts.total()} messages, ")
+    assert out.startswith(f"{file}: {frame_count} images, {counts.total()} messages, ")
     assert frame_count == counts["/lcf/scene"] == counts["/lcf/camera/camera_info"] >= 10
     assert counts["/lcf/imu"] >= 5 * frame_count
     assert counts["/lcf/speed"] > 0
@@ -178,8 +178,8 @@ def test_what_cannot_work_ends_in_one_line(
     assert Path("there.mcap").read_text() == "precious"
 
 
-def test_without_a_picture_it_has_failed(start: Start, tmp_path: Path) -> None:
+def test_without_a_image_it_has_failed(start: Start, tmp_path: Path) -> None:
     status, out, said = ended(start(tmp_path / "drive.mcap", "--seconds", "0.2", camera="/dev/no-such-camera"))
     assert (status, out) == (1, "")
     assert any("/dev/no-such-camera" in line for line in said)
-    assert ": 0 pictures, " in said[-1]
+    assert ": 0 images, " in said[-1]

@@ -37,7 +37,7 @@ from lcf_edge.recording.write.destination import MIB, Folder
 
 PATIENCE_S = 20.0
 STEP_NS = 50_000_000
-MESSAGES_OF_ONE = 5  # of a picture: itself, its lens, its scene, what is drawn in it and in space
+MESSAGES_OF_ONE = 5  # of an image: itself, its lens, its scene, what is drawn in it and in space
 MESSAGES_OF_A_SECOND = 2  # the diagnostics, and where the camera sits
 
 Begin = Callable[..., Recorder]
@@ -77,7 +77,7 @@ def seen(
     stamp_ns: int | None = None,
     objects: npt.NDArray[np.void] | None = None,
 ) -> tuple[Frame, PipelineScene, Any]:
-    """A picture of noise, 3/4 of which is its width high, and a rebel circle, which belongs to the objects' first."""
+    """An image of noise, 3/4 of which is its width high, and a rebel circle, which belongs to the objects' first."""
     height = width * 3 // 4
     stamp_ns = 10**12 + seq * STEP_NS if stamp_ns is None else stamp_ns
     circle = np.zeros(1, CIRCLE)
@@ -193,11 +193,11 @@ def test_a_disk_that_hangs_costs_messages_that_are_counted_and_nothing_grows(tmp
 
 
 def _dropped_pictures(recorder: Recorder) -> int:
-    """Pictures that the inbox did not take: samples always fit into its reserve here."""
+    """Images that the inbox did not take: samples always fit into its reserve here."""
     return recorder._inbox.dropped
 
 
-def test_samples_still_fit_where_pictures_do_not(tmp_path: Path, begin: Begin) -> None:
+def test_samples_still_fit_where_images_do_not(tmp_path: Path, begin: Begin) -> None:
     disk = Stuck(RecordTable(folder=str(tmp_path)))
     recorder = begin(destination=disk, buffer_mib=4)
     for seq in range(200):
@@ -241,7 +241,7 @@ def test_the_seconds_before_and_after_a_threat_are_saved(tmp_path: Path, begin: 
     assert waited.message == "waits for a threat"
     assert status.values["threats"] == "2"
     assert [[scene.seq for scene in scenes] for scenes in scenes_in(tmp_path)] == [
-        list(range(9, 28)),  # half a second before the picture with the circle, a quarter after the second one
+        list(range(9, 28)),  # half a second before the image with the circle, a quarter after the second one
         list(range(49, 66)),
     ]
 
@@ -267,7 +267,7 @@ def test_where_there_is_an_object_it_tells_whether_it_threatens_and_not_its_circ
     assert len(scenes_in(tmp_path)) == files
 
 
-def test_a_threat_ends_without_pictures_too(begin: Begin) -> None:
+def test_a_threat_ends_without_images_too(begin: Begin) -> None:
     recorder = begin(when="threat", after_s=1.0)
     recorder.put(*seen(0, 0.5))
     for seq in range(5):

@@ -109,7 +109,7 @@ def test_the_watchdog_is_fed_by_the_progress_of_the_pipeline(
     manager.until("WATCHDOG=1")
 
 
-def test_a_configuration_that_does_not_fit_the_pictures_ends_it(config: Config, runs: Runs, link: Any) -> None:
+def test_a_configuration_that_does_not_fit_the_images_ends_it(config: Config, runs: Runs, link: Any) -> None:
     camera = msgspec.structs.replace(config.camera, width=640, height=640, intrinsics=[500, 500, 320, 320])
     runs.start(msgspec.structs.replace(config, camera=camera))
     failure = runs.failure()

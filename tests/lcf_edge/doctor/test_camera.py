@@ -149,9 +149,9 @@ def test_without_permission_the_group_is_named(look: Look, webcam: MockCamera) -
     assert found.remedy.startswith("sudo usermod -aG video $USER")
 
 
-def test_a_node_without_pictures_is_reported(look: Look) -> None:
+def test_a_node_without_images_is_reported(look: Look) -> None:
     found = one(look(video0=MockCamera(caps=v4l2.CAP_STREAMING), video1=MockCamera()), Severity.FAIL)
-    assert "gives no pictures" in found.text
+    assert "gives no images" in found.text
     assert "camera.device=/dev/video1" in found.remedy
 
 
@@ -196,11 +196,11 @@ def test_the_remedy_of_a_refused_mode_works(look: Look) -> None:
 def test_a_silent_camera_fails(look: Look, webcam: MockCamera) -> None:
     webcam.stalled = True
     found = one(look(), Severity.FAIL)
-    assert "no usable picture" in found.text
+    assert "no usable image" in found.text
     assert "dmesg" in found.remedy
 
 
-def test_pictures_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> None:
+def test_images_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> None:
     whole = itertools.cycle((True, False))
     webcam.spoil = lambda data: data if next(whole) else data[:9]
     found = one(look(), Severity.WARN)
@@ -226,7 +226,7 @@ def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera)
 
 
 @pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "overexposed")])
-def test_a_picture_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
+def test_a_image_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
     webcam.images = plain(grey)
     found = one(look(), Severity.WARN)
     assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")

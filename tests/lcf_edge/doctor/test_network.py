@@ -168,7 +168,7 @@ def test_a_session_that_does_not_open_fails(machine: Machine, options: Zenoh, te
 def test_an_open_port_without_encryption_is_warned_of(machine: Machine) -> None:
     found = bad(list(network.exposed(machine(), Zenoh(listen=["tcp/127.0.0.1:7447", "tcp/0.0.0.0:7448"]))))
     assert found.level is Severity.WARN
-    assert found.text.startswith("tcp/0.0.0.0:7448: whoever reaches this port reads every scene")
+    assert found.text.startswith("tcp/0.0.0.0:7448: anyone who reaches this port can read every scene")
     assert "docs/network.md" in found.text
 
 
@@ -212,7 +212,7 @@ def test_the_ports_of_the_file_are_looked_at_too(machine: Machine, endpoint: str
     file = tmp_path / "zenoh.json5"
     file.write_text(f'{{listen: {{endpoints: ["{endpoint.replace("127.0.0.1", "0.0.0.0")}"]}}}}')
     found = bad(list(network.check(machine(Config(zenoh=Zenoh(listen=[], config_file=str(file)))))))
-    assert "whoever reaches this port" in found.text
+    assert "anyone who reaches this port" in found.text
 
 
 # The daemon.

@@ -1,4 +1,4 @@
-"""Rendered drives whose gyro has a bias, dies, sticks or is missing; and a sudden shock: the pictures tell the rest."""
+"""Rendered drives whose gyro has a bias, dies, sticks or is missing; and a sudden shock: the images tell the rest."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -118,7 +118,7 @@ def test_a_bias_is_learnt_while_the_vehicle_drives(truth: list[np.ndarray], bias
     assert np.median(seen.given_mrad[10:]) < 0.5  # a quarter of a pixel
 
 
-def test_without_an_imu_the_pictures_tell_the_turn(truth: list[np.ndarray]) -> None:
+def test_without_an_imu_the_images_tell_the_turn(truth: list[np.ndarray]) -> None:
     seen = driven(truth, none)
     assert all("no imu" in notes for notes in seen.notes)
     assert np.percentile(seen.given_mrad[10:], 90) < 6.0
@@ -132,7 +132,7 @@ def hangs(samples: Sequence[ImuSample]) -> Sequence[ImuSample]:
 
 
 @pytest.mark.parametrize(("spoil", "note"), [(dies, "no imu"), (sticks, "gyro stuck"), (hangs, "gyro stuck")])
-def test_a_gyro_that_ends_in_the_middle_is_reported_and_the_pictures_go_on(
+def test_a_gyro_that_ends_in_the_middle_is_reported_and_the_images_go_on(
     truth: list[np.ndarray], spoil: Spoil, note: str
 ) -> None:
     seen = driven(truth, spoil)
@@ -143,7 +143,7 @@ def test_a_gyro_that_ends_in_the_middle_is_reported_and_the_pictures_go_on(
 
 @pytest.mark.parametrize("degrees", [-5, 3, 5])
 def test_a_sudden_shock_is_survived_in_one_frame(degrees: int) -> None:
-    """The camera, which has no gyro, is knocked aside from one picture to the next."""
+    """The camera, which has no gyro, is knocked aside from one image to the next."""
     drive = scenes.make("passing", 3, seconds=1.5, width=800)
     config = config_of(drive)
     focal = drive.lens.focal_px
@@ -151,7 +151,7 @@ def test_a_sudden_shock_is_survived_in_one_frame(degrees: int) -> None:
     pipeline = Pipeline(with_values(config, camera=camera), Lens.from_config(camera, 640, 480))
     before, shocked, after = knocked(pipeline, drive, round(focal * np.tan(np.radians(degrees))))
     assert before > 0.4
-    assert shocked > 0.4 * before  # without a look at the whole picture: 0.03
+    assert shocked > 0.4 * before  # without a look at the whole image: 0.03
     assert after > 0.8 * before
 
 

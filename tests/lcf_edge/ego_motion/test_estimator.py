@@ -93,7 +93,7 @@ class TestRotation:
         angle = (np.cos(8 * 0.1037) - np.cos(8 * 0.2512)) / 8
         assert cv2.Rodrigues(motion.rotation)[0].ravel() == pytest.approx([0.0, -angle, 0.0], rel=0.01)
 
-    def test_turning_left_is_positive_and_moves_the_picture_right(self) -> None:
+    def test_turning_left_is_positive_and_moves_the_image_right(self) -> None:
         ego = estimator()
         feed(ego, np.arange(0, 0.2, 0.01), gyro=lambda _: (0.0, -0.5, 0.0))
         ego.advance(ns(0.0))
@@ -312,7 +312,7 @@ class TestBias:
         ego.advance(ns(0.9))
         assert not ego.bias.mean_radps.any()
 
-    def test_is_not_learnt_while_the_picture_moves(self) -> None:
+    def test_is_not_learnt_while_the_image_moves(self) -> None:
         ego = estimator()
         feed(ego, np.arange(0, 1, 0.01), gyro=lambda _: BIAS)
         ego.advance(ns(0.9), still=False)
@@ -378,7 +378,7 @@ class TestBrokenGyro:
         assert after.rotation_sigma_rad > 5 * before.rotation_sigma_rad / 0.05 * 0.1
         assert after.yaw_rate_radps == pytest.approx(before.path_yaw_rate_radps, abs=0.2)  # it goes on as it went
 
-    def test_the_picture_tells_the_rotation_when_the_gyro_died(self) -> None:
+    def test_the_image_tells_the_rotation_when_the_gyro_died(self) -> None:
         ego = calibrated()
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(1.4))
@@ -389,7 +389,7 @@ class TestBrokenGyro:
         assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.1)
         assert motion.yaw_rate_radps == pytest.approx(-0.6, abs=0.02)
 
-    def test_a_picture_does_not_overrule_a_gyro_that_is_known(self) -> None:
+    def test_a_image_does_not_overrule_a_gyro_that_is_known(self) -> None:
         ego = calibrated()
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(0.5))
@@ -398,7 +398,7 @@ class TestBrokenGyro:
         np.testing.assert_array_equal(seen.rotation, rest_by.rotation)
         assert ego.bias.known
 
-    def test_a_gyro_that_pictures_refute_for_a_second_is_unknown_again(self) -> None:
+    def test_a_gyro_that_images_refute_for_a_second_is_unknown_again(self) -> None:
         ego = calibrated()
         feed(ego, np.arange(0, 3, 0.01), gyro=self.alive)
         ego.advance(ns(0.5))

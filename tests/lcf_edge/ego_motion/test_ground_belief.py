@@ -1,4 +1,4 @@
-"""The speed by the ground in the picture, where nothing measures it."""
+"""The speed by the ground in the image, where nothing measures it."""
 
 from collections.abc import Iterator
 from math import isnan
@@ -16,7 +16,7 @@ from lcf_edge.pipeline import Pipeline
 from lcf_edge.rendered import scenes
 
 FRAME_S = 0.05
-WARM_UP = 10  # pictures
+WARM_UP = 10  # images
 
 
 def shown(speed_mps: float, sigma_mps: float = 0.1) -> GroundSpeed:
@@ -33,7 +33,7 @@ def test_it_is_unknown_until_the_ground_is_seen_and_then_what_it_shows() -> None
     assert belief.speed_mps == 1.5
 
 
-def test_noise_of_single_pictures_is_averaged() -> None:
+def test_noise_of_single_images_is_averaged() -> None:
     random, belief, told = np.random.default_rng(0), GroundBelief(), []
     for _ in range(200):
         belief.advance(FRAME_S)
@@ -62,7 +62,7 @@ def test_without_ground_it_is_held_for_a_moment_and_then_unknown() -> None:
     assert isnan(belief.speed_mps)
 
 
-def test_a_picture_that_stands_still_says_that_the_vehicle_does() -> None:
+def test_a_image_that_stands_still_says_that_the_vehicle_does() -> None:
     belief = GroundBelief()
     belief.see(shown(1.5), FRAME_S)
     belief.stand()
@@ -70,7 +70,7 @@ def test_a_picture_that_stands_still_says_that_the_vehicle_does() -> None:
 
 
 def played(source: str) -> Iterator[tuple[Scene, float]]:
-    """The scenes of a rendered drive's pictures alone, and its true speed, m/s."""
+    """The scenes of a rendered drive's images alone, and its true speed, m/s."""
     drive = scenes.make("crossing", 3, seconds=3.0)
     config = config_of(drive)
     config = replace(config, vehicle=replace(config.vehicle, speed_source=source))
@@ -80,7 +80,7 @@ def played(source: str) -> Iterator[tuple[Scene, float]]:
 
 
 @pytest.mark.parametrize("source", ["auto", "imu"])
-def test_pictures_alone_tell_the_speed_and_say_so(source: str) -> None:
+def test_images_alone_tell_the_speed_and_say_so(source: str) -> None:
     after = list(played(source))[WARM_UP:]
     shares = [scene.vehicle_speed / speed_mps for scene, speed_mps in after]
     assert np.median(shares) == pytest.approx(1, abs=0.1)

@@ -1,4 +1,4 @@
-"""Rotation from the picture alone, on pictures that turned by what is known."""
+"""Rotation from the image alone, on images that turned by what is known."""
 
 import cv2
 import numpy as np
@@ -20,7 +20,7 @@ LENSES = {
     "752x480, barrel": Lens(752, 480, 460.0, 460.0, 375.5, 239.5, "radial-tangential", (-0.28, 0.07, 0.0, 0.0)),
     "640x480, fisheye": Lens(640, 480, 280.0, 280.0, 319.5, 239.5, "equidistant", (0.0,) * 4),
 }
-HUNDRED_DEGREES_PER_S = np.radians(100) / 20  # a picture, at 20 pictures a second
+HUNDRED_DEGREES_PER_S = np.radians(100) / 20  # an image, at 20 frames a second
 
 
 def sky_and_walls(seed: int = 0) -> Grey:
@@ -103,14 +103,14 @@ def test_something_large_that_moves_by_itself_is_not_followed(share: float) -> N
 def test_what_comes_nearer_turns_nothing() -> None:
     lens = LENSES["640x480"]
     whole = image(lens)
-    nearer = cv2.resize(whole[12:-12, 16:-16], (640, 480), interpolation=cv2.INTER_LINEAR)  # 5 % in one picture
+    nearer = cv2.resize(whole[12:-12, 16:-16], (640, 480), interpolation=cv2.INTER_LINEAR)  # 5 % in one image
     turn = seen(lens, whole, np.asarray(nearer, np.uint8))
     assert turn is not None
     assert (np.abs(turn.turn_rad)[:2] < turn.sigma_rad[:2]).all()
 
 
 @pytest.mark.parametrize("what", ["plain", "dark", "other noise", "another place"])
-def test_pictures_that_share_nothing_do_not_tell(what: str) -> None:
+def test_images_that_share_nothing_do_not_tell(what: str) -> None:
     lens, random = LENSES["640x480"], np.random.default_rng(0)
     before, after = {
         "plain": (np.full((480, 640), 120, np.uint8),) * 2,
@@ -128,7 +128,7 @@ def test_roll_is_not_reported() -> None:
     assert turn.sigma_rad[2] > 1
 
 
-def test_after_forgetting_one_picture_tells_nothing() -> None:
+def test_after_forgetting_one_image_tells_nothing() -> None:
     lens = LENSES["160x120"]
     rotation = ImageRotation(lens)
     rotation.turn(small(image(lens)))
@@ -139,7 +139,7 @@ def test_after_forgetting_one_picture_tells_nothing() -> None:
 
 @given(width=st.integers(8, 400), height=st.integers(8, 400))
 @settings(max_examples=30)
-def test_any_size_of_picture_works(width: int, height: int) -> None:
+def test_any_size_of_image_works(width: int, height: int) -> None:
     lens = Lens(width, height, float(width), float(width), width / 2, height / 2)
     image = np.random.default_rng(0).integers(0, 256, (height, width), np.uint8)
     turn = seen(lens, image, image)

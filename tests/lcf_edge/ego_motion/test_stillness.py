@@ -1,4 +1,4 @@
-"""Whether the picture stands still, by its corners."""
+"""Whether the image stands still, by its corners."""
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ FRAME_NS = 50_000_000
 
 
 def corners(seed: int = 0, number: int = 300) -> npt.NDArray[np.int32]:
-    """Whole px, all over the picture."""
+    """Whole px, all over the image."""
     return np.random.default_rng(seed).integers((12, 12), (WIDTH - 12, HEIGHT - 12), (number, 2)).astype(np.int32)
 
 
@@ -36,7 +36,7 @@ def test_motors_may_make_corners_jump_by_a_pixel() -> None:
 
 
 @pytest.mark.parametrize("px_a_frame", [0.5, 2.0, -7.0])
-def test_a_picture_that_moves_is_not_still(px_a_frame: float) -> None:
+def test_a_image_that_moves_is_not_still(px_a_frame: float) -> None:
     assert not any(verdicts(25, corners(), px_a_frame)[10:])
 
 

@@ -13,14 +13,14 @@ BIN = {"name": "bin", "box": [60, 45, 100, 85], "threat": True, "moving": False,
 
 @pytest.fixture(scope="session")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A recording of 13 pictures in which something stands ahead."""
+    """A recording of 13 images in which something stands ahead."""
     made = scenes.make("ahead", 1, seconds=0.9, width=160, height=120, focal_px=125.0)
     return scenes.write(made, tmp_path_factory.mktemp("drive") / "yard")
 
 
 @pytest.fixture(scope="session")
 def stamps_ns(drive: Path) -> list[int]:
-    """Of its pictures."""
+    """Of its images."""
     return [int(line.split(",")[0]) for line in (drive / "mav0/cam0/data.csv").read_text().splitlines()[1:]]
 
 
@@ -38,7 +38,7 @@ def corpus(tmp_path: Path, drive: Path, stamps_ns: list[int]) -> Path:
 
 
 def write_truth(path: Path, stamps_ns: list[int]) -> None:
-    """A bin in every picture."""
+    """A bin in every image."""
     path.write_text("".join(json.dumps({"stamp_ns": stamp, "objects": [BIN]}) + "\n" for stamp in stamps_ns))
 
 

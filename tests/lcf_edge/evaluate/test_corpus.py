@@ -89,15 +89,15 @@ def test_the_bounds_of_truth_are_those_of_the_document() -> None:
     document = " ".join((Path(__file__).parents[3] / "docs/evaluate.md").read_text(encoding="utf-8").split())
     assert f"at most {MAX_NAME} characters, a box lies within {MAX_PX:,.0f} px" in document
     assert MAX_LINE_BYTES == 2**20
-    assert f"less than 1 MiB, and there are at most {MAX_KNOWN:,} pictures and things" in document
+    assert f"less than 1 MiB, and there are at most {MAX_KNOWN:,} images and things" in document
 
 
-def test_a_high_and_narrow_picture_is_drawn_small() -> None:
+def test_a_high_and_narrow_image_is_drawn_small() -> None:
     drawn = draw(np.zeros((60_000, 2), np.uint8), [], [], "1")
     assert drawn.shape[0] == MAX_HEIGHT_PX
 
 
-def test_pictures_without_a_line_are_not_scored_and_without_a_file_nothing_is_there(tmp_path: Path) -> None:
+def test_images_without_a_line_are_not_scored_and_without_a_file_nothing_is_there(tmp_path: Path) -> None:
     path = tmp_path / "truth.jsonl"
     path.write_text('{"stamp_ns": 7, "objects": []}\n')
     truth = read_truth(path)

@@ -68,7 +68,7 @@ def test_one_report_of_many_recordings_and_the_broken_one_is_left_out(
     assert sum(line.false for line in frames) == known.numbers.false
 
 
-def test_the_page_shows_every_picture_and_refers_to_nothing_else(corpus: Path, tmp_path: Path) -> None:
+def test_the_page_shows_every_image_and_refers_to_nothing_else(corpus: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["evaluate", str(corpus), "--out", str(out), "--jobs", "1"]) == 0
     links = Links((out / "index.html").read_text())
@@ -111,7 +111,7 @@ def test_a_report_of_others_names_no_file_outside_of_it(
     against = ["--against", str(theirs), "--out", str(tmp_path / "out")]
     assert main(["evaluate", str(corpus / "with-truth"), *against, "--jobs", "1"]) == 2
     (line,) = capsys.readouterr().err.splitlines()
-    assert "is no file of frames" in line
+    assert "is not a report's file of frames" in line
 
 
 def test_frames_to_compare_with_are_a_file_of_bounded_size(
@@ -164,7 +164,7 @@ def test_truth_is_named_for_one_recording_or_as_a_folder_for_many(
     ("arguments", "output"),
     [
         (["--against", "nowhere"], "nowhere: cannot be read"),
-        (["--against", "corpus/with-truth/truth.jsonl"], "no report of lcf-edge evaluate"),
+        (["--against", "corpus/with-truth/truth.jsonl"], "not a report of lcf-edge evaluate"),
         (["--truth", "corpus/with-truth/truth.jsonl"], "truth of one recording, and 3 are named"),
         (["--set", "vehicle.half_widht_m=1"], "half_width_m"),
         (["--jobs", "2", "--scheduler", "tcp://127.0.0.1:1"], "not allowed with"),

@@ -42,7 +42,7 @@ def test_a_threat_that_is_never_found_has_no_latency() -> None:
 def test_what_is_on_nothing_is_false_and_on_a_known_thing_is_not() -> None:
     score = Score()
     score.add(0, circles((350.0, 140.0), (500.0, 140.0)), [MAN, VAN])
-    assert (score.found, score.false, score.false_a_picture) == (0, 1, 1.0)
+    assert (score.found, score.false, score.false_per_frame) == (0, 1, 1.0)
 
 
 @pytest.mark.parametrize(

@@ -28,7 +28,7 @@ LAP_NS = (FRAMES - 1) * FRAME_NS
 
 
 def write_recording(folder: Path, *, imu: bool = True, imu_ahead_ns: int = 0) -> Path:
-    """Pictures whose grey is their number, samples whose gyro x is their time in s since the start."""
+    """Images whose grey is their number, samples whose gyro x is their time in s since the start."""
     header = "#timestamp [ns],…"
     frames = [START_NS + n * FRAME_NS for n in range(FRAMES)]
     (folder / "mav0/cam0/data").mkdir(parents=True)
@@ -100,7 +100,7 @@ def read_until(device: Device[Any], clock: VirtualClock, end_ns: int) -> list[tu
 class TestTiming:
     """What was recorded comes at its time."""
 
-    def test_each_picture_comes_at_its_time(self, devices: Devices, clock: VirtualClock) -> None:
+    def test_each_image_comes_at_its_time(self, devices: Devices, clock: VirtualClock) -> None:
         start_ns = clock.monotonic_ns()
         frames = read_until(devices(RecordedCamera), clock, start_ns + LAP_NS)
         assert [frame.stamp_ns - start_ns for frame, _ in frames] == [n * FRAME_NS for n in range(FRAMES)]
@@ -148,9 +148,7 @@ class TestTiming:
         camera.close()
         imu.close()
 
-    def test_who_reads_late_gets_the_newest_picture_and_all_samples(
-        self, devices: Devices, clock: VirtualClock
-    ) -> None:
+    def test_who_reads_late_gets_the_newest_image_and_all_samples(self, devices: Devices, clock: VirtualClock) -> None:
         camera, imu = devices(RecordedCamera), devices(RecordedImu)
         clock.sleep_s(0.2)
         (frame,) = camera.read()
@@ -158,7 +156,7 @@ class TestTiming:
         assert camera.counts["overtaken"] == 4
         assert len(imu.read()) == 0.2 * IMU_HZ + 1
 
-    def test_after_a_long_pause_few_pictures_are_held_and_the_others_are_counted(
+    def test_after_a_long_pause_few_images_are_held_and_the_others_are_counted(
         self, devices: Devices, clock: VirtualClock
     ) -> None:
         camera = devices(RecordedCamera)
@@ -273,11 +271,11 @@ class TestRefusals:
         with pytest.raises(WrongDeviceError, match="silent: no "):
             kind(path, Config())
 
-    def test_pictures_that_cannot_be_read(self, recording: Path, clock: VirtualClock) -> None:
+    def test_images_that_cannot_be_read(self, recording: Path, clock: VirtualClock) -> None:
         camera = RecordedCamera(recording, Config(), clock)
         for image_path in (recording / "mav0/cam0/data").iterdir():
-            image_path.write_bytes(b"no picture")
-        with pytest.raises(DeviceLostError, match="not one picture"):
+            image_path.write_bytes(b"no image")
+        with pytest.raises(DeviceLostError, match="not one image"):
             camera.read()
         camera.close()
         with pytest.raises(DeviceLostError):

@@ -1,4 +1,4 @@
-"""Rendered drives: pictures, sensors and truth agree with each other and with independent geometry."""
+"""Rendered drives: images, sensors and truth agree with each other and with independent geometry."""
 
 import json
 import math
@@ -59,13 +59,13 @@ def corners_3d(box):
 
 
 def changed(spec):
-    """Bounds x0, y0, x1, y1 in px of what the boxes change in the first picture."""
+    """Bounds x0, y0, x1, y1 in px of what the boxes change in the first image."""
     with_boxes, without = (next(iter(scenes.frames(s)))[0].image for s in (spec, replace(spec, boxes=())))
     rows, columns = np.nonzero(cv2.absdiff(with_boxes, without) > 12)
     return np.array([columns.min(), rows.min(), columns.max(), rows.max()])
 
 
-# Pictures and truth against projection by OpenCV.
+# Images and truth against projection by OpenCV.
 
 
 @pytest.mark.parametrize(("pitch", "heading"), [(0.0, 0.0), (0.03, 0.4), (-0.05, -0.7)])
@@ -90,13 +90,13 @@ def test_box_is_the_projection_of_its_corners(pitch, heading):
     ],
     ids=["pinhole", "small", "radial-tangential", "equidistant"],
 )
-def test_picture_shows_the_box_where_the_truth_says(lens):
+def test_image_shows_the_box_where_the_truth_says(lens):
     spec = drive(standing(-1.2, 5.0, heading=0.3, grey=20.0), lens=lens, shakes=SHAKES)
     x, y, width, height = truth_at(spec)["box"].box
     np.testing.assert_allclose(changed(spec), (x, y, x + width, y + height), atol=2.0)
 
 
-def test_box_is_clipped_to_the_picture():
+def test_box_is_clipped_to_the_image():
     x, y, width, height = truth_at(drive(standing(0.0, 0.7, width=3.0, height=3.0)))["box"].box
     assert (x, y, width) == (-0.5, -0.5, 640)
     assert y + height <= 479.5
@@ -132,7 +132,7 @@ def test_nearer_box_hides_the_farther():
     assert half.visible == pytest.approx(0.5, abs=0.12)
 
 
-def test_small_in_the_picture_is_no_target():
+def test_small_in_the_image_is_no_target():
     thing = truth_at(drive(standing(0.0, 70.0), speed=30.0))["box"]
     assert thing.threat
     assert not thing.target
@@ -306,17 +306,17 @@ def test_odometry_integrates_to_the_path():
     )
 
 
-# What the camera does to the picture.
+# What the camera does to the image.
 
 
-def test_exposure_scales_the_picture():
+def test_exposure_scales_the_image():
     full, dim = (
         next(iter(scenes.frames(drive(standing(0.0, 4.0), gain=hold(g)))))[0].image.astype(float) for g in (1.0, 0.5)
     )
     np.testing.assert_allclose(dim, full / 2, atol=0.51)
 
 
-def test_noise_changes_from_picture_to_picture():
+def test_noise_changes_from_image_to_image():
     spec = drive(standing(0.0, 4.0), speed=0.0, noise=replace(SILENT, image=3.0))
     (first, _), (second, _) = islice(scenes.frames(spec), 2)
     difference = first.image.astype(float) - second.image

@@ -219,7 +219,7 @@ def test_what_is_seen_has_a_whole_box_and_what_is_not_a_dashed_and_thinner_one()
 
 @pytest.mark.parametrize("state", ObjectState)
 @pytest.mark.parametrize("grey", [0, 130, 255])
-def test_a_box_stands_out_from_any_picture(grey: int, state: ObjectState) -> None:
+def test_a_box_stands_out_from_any_image(grey: int, state: ObjectState) -> None:
     for probability in (0.0, 1.0):
         side = panels_of(objects=thing(state=state, probability=probability), grey=grey)[SIDE].astype(int)
         brightness = side.mean(axis=2)
@@ -275,7 +275,7 @@ def test_the_caption_counts_objects() -> None:
 
 @pytest.mark.parametrize(("x", "y"), [(-10, -10), (WIDTH + 5, 4), (3, HEIGHT), (WIDTH, HEIGHT)])
 def test_a_label_never_leaves_its_panel(x: float, y: float) -> None:
-    """Whole inside: as many pixels of it as in the middle of the picture."""
+    """Whole inside: as many pixels of it as in the middle of the image."""
 
     def letters(x: float, y: float) -> int:
         rebel = {"kind": Kind.REBEL, "x": x, "y": y, "radius": 1}

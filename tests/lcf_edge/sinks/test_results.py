@@ -29,7 +29,7 @@ from lcf_edge.sinks.results import ResultsSink, encode_line
 
 
 def put(sink: ResultsSink, scene: PipelineScene) -> None:
-    """Without a picture, which result lines do not need."""
+    """Without an image, which result lines do not need."""
     sink.put(Frame(scene.stamp_ns, scene.seq, np.empty((0, 0), np.uint8)), scene, lambda: pytest.fail("not looked at"))
 
 

@@ -28,7 +28,7 @@ def filled(path: Path, frames: int) -> SizePlot:
     return plot
 
 
-def test_the_picture_shows_a_curve_in_the_colour_of_each_table(tmp_path: Path) -> None:
+def test_the_image_shows_a_curve_in_the_colour_of_each_table(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     filled(path, 60).close()
     image = cv2.imread(str(path))
@@ -54,7 +54,7 @@ def test_refused_before_the_work_begins(tmp_path: Path) -> None:
         SizePlot(tmp_path / "nowhere" / "sizes.png")
 
 
-def test_a_picture_that_is_there_outlives_a_replay_without_a_frame(tmp_path: Path) -> None:
+def test_a_image_that_is_there_outlives_a_replay_without_a_frame(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     path.write_bytes(b"kept")
     SizePlot(path).close()

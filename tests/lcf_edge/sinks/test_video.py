@@ -50,13 +50,13 @@ def test_a_browser_plays_it(tmp_path: Path, suffix: str, browser: Any) -> None:
         "videoHeight, error])(document.querySelector('video'))"
     )
     ready, duration_s, *rest = browser.evaluate(video)
-    assert ready >= 2  # it has the picture of where it is
+    assert ready >= 2  # it has the image of where it is
     assert duration_s == pytest.approx(12 / 20, abs=0.06)
     assert rest == [128, 48, None]
 
 
 def test_no_file_says_what_it_begins_with(tmp_path: Path) -> None:
-    """A replay without one picture leaves nothing behind."""
+    """A replay without one image leaves nothing behind."""
     with VideoSink(tmp_path / "overlay.webm", 20):
         pass
     assert list(tmp_path.iterdir()) == []

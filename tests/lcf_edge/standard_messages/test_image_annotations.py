@@ -1,4 +1,4 @@
-"""What Foxglove draws over the picture."""
+"""What Foxglove draws over the image."""
 
 from collections.abc import Callable
 from typing import Any
@@ -23,7 +23,7 @@ def rgba(colour: Any) -> tuple[float, ...]:
     return colour.r, colour.g, colour.b, colour.a
 
 
-def test_the_stamp_is_that_of_the_picture(drawn: Callable[..., Any]) -> None:
+def test_the_stamp_is_that_of_the_image(drawn: Callable[..., Any]) -> None:
     stamp = drawn().timestamp
     assert stamp.sec * 10**9 + stamp.nanosec == 1_700_000_000_123_456_789
 

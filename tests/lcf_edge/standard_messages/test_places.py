@@ -66,7 +66,7 @@ def test_nothing_is_marked_for_what_passes_or_has_no_place(
     assert (points[:, 2] == point_cloud.CLEAR_M).all()
 
 
-def test_the_far_points_span_the_picture_and_are_level(setup: Setup, scene: Callable[..., Scene], read: Read) -> None:
+def test_the_far_points_span_the_image_and_are_level(setup: Setup, scene: Callable[..., Scene], read: Read) -> None:
     """Level on the vehicle, however the camera is tilted: an obstacle layer drops what is too high or low."""
     points = points_of(read(point_cloud.encode_point_cloud(scene(), setup), point_cloud.MESSAGE))[:, :3]
     on_vehicle = points @ setup.base_from_optical.T
@@ -100,7 +100,7 @@ def test_markers_are_box_text_and_velocity(
     np.testing.assert_allclose(setup.base_from_optical @ (end - start), (0.0, 1.0, 0.0), atol=1e-6)  # left, in ROS
 
 
-def test_detections_in_the_picture(scene: Callable[..., Scene], walker: Fields, setup: Setup, read: Read) -> None:
+def test_detections_in_the_image(scene: Callable[..., Scene], walker: Fields, setup: Setup, read: Read) -> None:
     """Also of what has no range."""
     message = read(
         detections.encode_detections_2d(scene({**walker, "range": np.nan}), setup), "vision_msgs/msg/Detection2DArray"

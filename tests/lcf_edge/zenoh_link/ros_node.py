@@ -19,7 +19,7 @@ PATIENCE_S = 20.0
 
 
 def plain(value: Any) -> Any:
-    """What JSON can hold; of pictures only the size."""
+    """What JSON can hold; of images only the size."""
     if isinstance(value, np.ndarray):
         return {"bytes": value.size} if value.dtype == np.uint8 else value.tolist()
     if isinstance(value, list):

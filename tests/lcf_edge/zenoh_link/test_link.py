@@ -22,7 +22,7 @@ from lcf_edge.zenoh_link.link import Link
 
 PATIENCE_S = 20.0
 STAMP_NS = 1_700_000_000_123_456_789
-JPEG = b"\xff\xd8\xff\xe0 a picture \xff\xd9"
+JPEG = b"\xff\xd8\xff\xe0 an image \xff\xd9"
 STATUS = (
     DeviceStatus("camera", Level.OK, "30.0 frame/s", {"rate_hz": "30.0", "größe": "640x480"}),
     DeviceStatus("imu", Level.STALE, "nothing since 3 s"),

@@ -131,7 +131,7 @@ def test_clients_that_take_nothing_do_not_fill_its_memory(endpoint: str) -> None
         finally:
             listener.undeclare()  # type: ignore[no-untyped-call]
             process.send_signal(signal.SIGTERM)
-        assert grown_mib < 60.0  # 4 clients, 64 pictures each: 24 MiB; what was sent is 143 MiB
+        assert grown_mib < 60.0  # 4 clients, 64 images each: 24 MiB; what was sent is 143 MiB
         assert process.wait(PATIENCE_S) == 0
 
 

@@ -106,7 +106,7 @@ def test_an_answer_that_is_no_configuration_leaves_it_unknown(endpoint: str, ans
             token.undeclare()
 
 
-def test_pictures_come_only_while_they_are_wanted_and_with_their_scene(rover: Any, watched: Watched) -> None:
+def test_images_come_only_while_they_are_wanted_and_with_their_scene(rover: Any, watched: Watched) -> None:
     watched.until(lambda known: known.scene)
     assert rover.previews == 0
     watched.monitor.switch_preview(True)

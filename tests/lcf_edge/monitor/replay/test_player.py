@@ -77,7 +77,7 @@ def playing(drive: Path) -> Iterator[Callable[[Pace], Playing]]:
         assert one.player.failed is None
 
 
-def test_it_stands_at_the_first_picture_and_goes_on_step_by_step(playing: Any) -> None:
+def test_it_stands_at_the_first_image_and_goes_on_step_by_step(playing: Any) -> None:
     it = playing()
     it.shows(lambda _: it.seq() == 0)
     for seq in (1, 2, 3):
@@ -208,7 +208,7 @@ def test_a_recording_that_goes_away_is_reported(drive: Path, tmp_path: Path) -> 
 @pytest.mark.parametrize(
     ("start_s", "duration_s"), [(0.0, math.inf), (1.0, math.inf), (0.0, 1.0), (1.02, 0.5), (3.9, 9)]
 )
-def test_a_part_of_a_recording_has_the_pictures_and_samples_of_that_part(
+def test_a_part_of_a_recording_has_the_images_and_samples_of_that_part(
     drive: Path, start_s: float, duration_s: float
 ) -> None:
     recording = open_recording(drive, Config())

@@ -43,7 +43,7 @@ def address(drive: Path) -> Iterator[str]:
 def test_the_slider_seeks_and_its_buttons_play_step_and_find_alarms(address: str, browser: Any) -> None:
     browser.open(address)
     browser.wait_for(f"{STATE} === 'replay, paused: drive' && {TIME}.startsWith('0.00 of 3.95 s · ')")
-    browser.wait_for("document.getElementById('picture').getAttribute('aria-label').startsWith('Camera picture')")
+    browser.wait_for("document.getElementById('picture').getAttribute('aria-label').startsWith('Camera image')")
     browser.wait_for(f"!{TIME}.includes('so far')")
     assert browser.evaluate("document.getElementById('save').hidden && document.getElementById('pause').hidden")
     browser.evaluate(CLICK.format("step"))

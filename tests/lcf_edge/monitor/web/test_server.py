@@ -58,7 +58,7 @@ def updates(address: str, work: Callable[[aiohttp.ClientWebSocketResponse], Coro
 
 
 async def update(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:
-    """Ask for one, with its picture if there is one."""
+    """Ask for one, with its image if there is one."""
     await socket.send_str("next")
     latest: dict[str, Any] = json.loads(await socket.receive_str())
     if "picture" in latest:
@@ -143,7 +143,7 @@ def test_on_the_network_the_token_is_asked_for(view: Callable[..., Any]) -> None
     assert ask(address, f"/save?token={token}").status == 404  # let in; there is nothing to save
 
 
-def test_updates_tell_all_and_pictures_are_drawn_only_meanwhile(seen: tuple[Any, Any]) -> None:
+def test_updates_tell_all_and_images_are_drawn_only_meanwhile(seen: tuple[Any, Any]) -> None:
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:

@@ -46,13 +46,13 @@ T_BS:
 
 
 def texture(index: int, width: int = 64, height: int = 48) -> npt.NDArray[np.uint8]:
-    """A picture that tells its index by its mean."""
+    """An image that tells its index by its mean."""
     return np.full((height, width), 10 * index + 5, np.uint8)
 
 
 @dataclass
 class AslFolder:
-    """A folder in the ASL layout: 5 pictures at 20/s, IMU at 100/s, odometry at 50/s."""
+    """A folder in the ASL layout: 5 images at 20/s, IMU at 100/s, odometry at 50/s."""
 
     path: Path
 

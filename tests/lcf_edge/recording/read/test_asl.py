@@ -129,10 +129,10 @@ def test_a_bad_row_is_skipped_counted_and_named(asl: Any, read: Read, sensor: st
 
 
 @pytest.mark.parametrize("name", ["../../secret.png", "/etc/hostname", "data/0.png", "\0.png"])
-def test_a_name_that_no_picture_in_the_folder_can_have_is_a_bad_row(asl: Any, read: Read, name: str) -> None:
+def test_a_name_that_no_image_in_the_folder_can_have_is_a_bad_row(asl: Any, read: Read, name: str) -> None:
     asl.edit("cam0", 3, f"50000000,{name}")
     recording, _ = read(asl.path)
-    assert recording.skipped == {"picture row malformed": 1}
+    assert recording.skipped == {"image row malformed": 1}
 
 
 @pytest.mark.parametrize("value", ["nan", "inf", "-inf"])
@@ -185,7 +185,7 @@ def test_rows_without_numbers_at_all_and_very_long_ones(asl: Any, read: Read) ->
     [("missing", "missing"), ("empty", "empty"), ("cut", "damaged"), ("flipped", "damaged"),
      ("text", "of unknown format"), ("folder", "unreadable")],
 )  # fmt: skip
-def test_a_bad_picture_is_skipped_and_the_rest_is_read(
+def test_a_bad_image_is_skipped_and_the_rest_is_read(
     asl: Any, read: Read, capfd: pytest.CaptureFixture[str], fault: str, reason: str
 ) -> None:
     path = asl.image_path(FRAMES[2])
@@ -200,28 +200,28 @@ def test_a_bad_picture_is_skipped_and_the_rest_is_read(
     recording, items = read(asl.path)
     assert frames(items) == FRAMES[:2] + FRAMES[3:]
     assert [frame.seq for frame in of(Frame, items)] == [0, 1, 3, 4], "the gap tells the drop"
-    assert recording.skipped == {f"picture {reason}": 1}
-    assert recording.warnings == [f"{path}: picture {reason}, skipped"]
+    assert recording.skipped == {f"image {reason}": 1}
+    assert recording.warnings == [f"{path}: image {reason}, skipped"]
     assert capfd.readouterr() == ("", ""), "nobody else writes about it"
 
 
-def test_pictures_of_another_size_are_skipped(asl: Any, read: Read) -> None:
+def test_images_of_another_size_are_skipped(asl: Any, read: Read) -> None:
     cv2.imwrite(str(asl.image_path(FRAMES[1])), np.zeros((24, 32), np.uint8))
     recording, items = read(asl.path)
     assert frames(items) == FRAMES[:1] + FRAMES[2:]
-    assert recording.skipped == {"picture of another size than the first": 1}
+    assert recording.skipped == {"image of another size than the first": 1}
 
 
-def test_the_first_good_picture_tells_the_size(asl: Any, read: Read) -> None:
+def test_the_first_good_image_tells_the_size(asl: Any, read: Read) -> None:
     asl.image_path(FRAMES[0]).write_bytes(b"")
     _, items = read(asl.path)
     assert frames(items) == FRAMES[1:]
 
 
-def test_no_good_picture_at_all_is_an_error(asl: Any, read: Read) -> None:
+def test_no_good_image_at_all_is_an_error(asl: Any, read: Read) -> None:
     for stamp in FRAMES:
         asl.image_path(stamp).write_bytes(b"")
-    with pytest.raises(RecordingError, match=r"not one picture could be read \(5 times: picture empty\)"):
+    with pytest.raises(RecordingError, match=r"not one image could be read \(5 times: image empty\)"):
         read(asl.path)
 
 
@@ -239,7 +239,7 @@ def test_without_its_csv_a_folder_is_refused(asl: Any) -> None:
     with pytest.raises(RecordingError, match=r"cam0/data\.csv: missing; .*camera\.fps"):
         open_recording(asl.path, Config())
     asl.write("cam0", "#timestamp [ns],filename", [])
-    with pytest.raises(RecordingError, match=r"cam0/data\.csv: names no pictures"):
+    with pytest.raises(RecordingError, match=r"cam0/data\.csv: names no images"):
         open_recording(asl.path, Config())
 
 

@@ -1,4 +1,4 @@
-"""Decoding: sizes are known before memory is taken, damage is found before it is shown as a picture."""
+"""Decoding: sizes are known before memory is taken, damage is found before it is shown as an image."""
 
 import resource
 import struct
@@ -61,7 +61,7 @@ def test_an_absurd_size_is_refused_by_its_header(suffix: str) -> None:
         image_from_bytes(_huge(suffix))
 
 
-# Headers that could be read in two ways: a small picture for the check, a large one for the decoder.
+# Headers that could be read in two ways: a small image for the check, a large one for the decoder.
 
 SIDE = 20_000
 
@@ -195,7 +195,7 @@ def chunk(kind: bytes, data: bytes) -> bytes:
     ],
     ids=["texts that unpack to megabytes", "a profile that makes the decoder complain", "an animation"],
 )
-def test_of_a_png_only_the_picture_is_decoded(extra: bytes, capfd: pytest.CaptureFixture[str]) -> None:
+def test_of_a_png_only_the_image_is_decoded(extra: bytes, capfd: pytest.CaptureFixture[str]) -> None:
     png = encoded(".png")
     before_kib = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     np.testing.assert_array_equal(image_from_bytes(png[:33] + extra + png[33:]), IMAGE)
@@ -225,7 +225,7 @@ def test_the_decoder_has_the_limit_too_in_the_whole_program() -> None:
 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
-def test_a_cut_picture_is_damaged(suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_cut_image_is_damaged(suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
     data = encoded(suffix)
     for end in (1, 9, len(data) // 2, len(data) - 5):
         with pytest.raises(ImageDecodeError):
@@ -235,22 +235,22 @@ def test_a_cut_picture_is_damaged(suffix: str, capfd: pytest.CaptureFixture[str]
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @given(data=st.data())
-def test_any_damage_gives_a_picture_or_a_picture_error(suffix: str, data: st.DataObject) -> None:
+def test_any_damage_gives_a_image_or_a_image_error(suffix: str, data: st.DataObject) -> None:
     content = bytearray(encoded(suffix))
     for _ in range(data.draw(st.integers(1, 3))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
-    said = "a picture"
+    said = "an image"
     try:
         got = image_from_bytes(bytes(content[: data.draw(st.integers(0, len(content)))]))
     except ImageDecodeError as error:
         said = str(error)
     else:
         assert (got.dtype, got.ndim) == (np.uint8, 2)
-    assert said in {"a picture", "damaged", "empty", "too large", "of unknown format"}
+    assert said in {"an image", "damaged", "empty", "too large", "of unknown format"}
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_give_a_picture_error(content: bytes) -> None:
+def test_any_bytes_give_a_image_error(content: bytes) -> None:
     with pytest.raises(ImageDecodeError):
         image_from_bytes(content)
 
@@ -264,7 +264,7 @@ LEVELS = np.arange(0, 200, 25, np.uint8).reshape(2, 4)
 
 @pytest.mark.parametrize("padding", [0, 5])
 @pytest.mark.parametrize("encoding", ["mono8", "8UC1", "rgb8", "bgr8", "yuyv", "yuv422_yuy2", "uyvy", "yuv422"])
-def test_raw_pictures_with_and_without_padded_rows(encoding: str, padding: int) -> None:
+def test_raw_images_with_and_without_padded_rows(encoding: str, padding: int) -> None:
     chroma = np.full_like(LEVELS, 128)
     layout = {
         "m": LEVELS, "8": LEVELS, "r": np.repeat(LEVELS, 3, axis=1), "b": np.repeat(LEVELS, 3, axis=1),
@@ -297,9 +297,7 @@ def test_order_of_colours(encoding: str, grey: int) -> None:
         ("32FC1", (4, 2), 16, 32, "of unsupported encoding"),
     ],
 )
-def test_raw_pictures_that_are_refused(
-    encoding: str, size: tuple[int, int], step: int, length: int, reason: str
-) -> None:
+def test_raw_images_that_are_refused(encoding: str, size: tuple[int, int], step: int, length: int, reason: str) -> None:
     assert MAX_PIXELS < 8001**2
     with pytest.raises(ImageDecodeError, match=f"^{reason}$"):
         image_from_message(image(encoding, step, bytes(length), *size))

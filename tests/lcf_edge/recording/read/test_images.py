@@ -1,4 +1,4 @@
-"""Folders of pictures and videos: order, stamps, and what is refused."""
+"""Folders of images and videos: order, stamps, and what is refused."""
 
 import struct
 import subprocess
@@ -25,7 +25,7 @@ MAX_MIB = 110
 
 @pytest.fixture
 def video(tmp_path: Path) -> Path:
-    """40 pictures of 64x48 at 25/s, whose brightness rises."""
+    """40 images of 64x48 at 25/s, whose brightness rises."""
     path = tmp_path / "drive.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25, (64, 48))
     for index in range(40):
@@ -35,10 +35,10 @@ def video(tmp_path: Path) -> Path:
 
 
 @pytest.mark.parametrize("suffix", [".png", ".jpg", ".jpeg", ".bmp", ".pgm", ".tif", ".tiff", ".PNG"])
-def test_a_folder_of_pictures_is_read_in_natural_order(tmp_path: Path, read: Read, suffix: str) -> None:
+def test_a_folder_of_images_is_read_in_natural_order(tmp_path: Path, read: Read, suffix: str) -> None:
     for index in (1, 2, 10):
         cv2.imwrite(str(tmp_path / f"ga_{index}{suffix}"), np.full((48, 64), 10 * index, np.uint8))
-    (tmp_path / "notes.txt").write_text("not a picture")
+    (tmp_path / "notes.txt").write_text("not an image")
     recording, items = read(tmp_path, fps=4.0)
     assert [frame.stamp_ns for frame in items] == [0, 250_000_000, 500_000_000]
     assert [round(float(frame.image.mean()), -1) for frame in items] == [10, 20, 100]
@@ -57,7 +57,7 @@ def test_colour_becomes_luminance(tmp_path: Path, read: Read) -> None:
     assert (frame.image.shape, frame.image.dtype, frame.image[0, 0]) == ((4, 4), np.uint8, 76)
 
 
-def test_sixteen_bit_pictures_become_eight_bit(tmp_path: Path, read: Read) -> None:
+def test_sixteen_bit_images_become_eight_bit(tmp_path: Path, read: Read) -> None:
     cv2.imwrite(str(tmp_path / "1.png"), np.full((4, 4), 0x80FF, np.uint16))
     _, (frame,) = read(tmp_path)
     assert (frame.image.dtype, frame.image[0, 0]) == (np.uint8, 0x80)
@@ -72,13 +72,13 @@ def test_numbers_in_names_count_as_numbers(names: list[tuple[str, int]]) -> None
             assert numbers == sorted(numbers)
 
 
-def test_a_broken_picture_is_skipped_and_keeps_its_time(tmp_path: Path, read: Read) -> None:
+def test_a_broken_image_is_skipped_and_keeps_its_time(tmp_path: Path, read: Read) -> None:
     for index in range(3):
         cv2.imwrite(str(tmp_path / f"{index}.png"), np.zeros((48, 64), np.uint8))
     (tmp_path / "1.png").write_bytes((tmp_path / "1.png").read_bytes()[:40])
     recording, items = read(tmp_path, fps=10.0)
     assert [(frame.seq, frame.stamp_ns) for frame in items] == [(0, 0), (2, 200_000_000)]
-    assert recording.skipped == {"picture damaged": 1}
+    assert recording.skipped == {"image damaged": 1}
 
 
 def test_a_video_has_its_own_rate(video: Path, read: Read) -> None:
@@ -107,7 +107,7 @@ def test_a_damaged_video_is_read_up_to_the_damage(video: Path, read: Read, capfd
     video.write_bytes(data[: len(data) // 2])
     recording, items = read(video)
     assert 0 < len(items) < 40
-    assert recording.warnings[-1] == f"{video}: damaged, ends after {len(items)} of 40 pictures"
+    assert recording.warnings[-1] == f"{video}: damaged, ends after {len(items)} of 40 images"
     assert capfd.readouterr() == ("", "")
 
 
@@ -142,14 +142,14 @@ def test_a_header_that_claims_gigabytes_takes_none(video: Path) -> None:
     assert peak_mib < MAX_MIB
 
 
-def test_pictures_larger_than_the_header_says_are_refused_before_they_take_memory(tmp_path: Path) -> None:
+def test_images_larger_than_the_header_says_are_refused_before_they_take_memory(tmp_path: Path) -> None:
     path = tmp_path / "drive.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25, (9000, 4000))
     writer.write(np.zeros((4000, 9000, 3), np.uint8))
     writer.release()
     lying(path, 64, 48)
     status, peak_mib, said = replayed(path)
-    assert (status, said) == (1, f"lcf-edge: {path}: pictures are too large (9000x4000 px); scale the video\n\n")
+    assert (status, said) == (1, f"lcf-edge: {path}: images are too large (9000x4000 px); scale the video\n\n")
     assert peak_mib < MAX_MIB
 
 
@@ -163,7 +163,7 @@ def filmed(path: Path, size: tuple[int, int], frames: int) -> bytes:
 
 
 @pytest.mark.parametrize("suffix", [".ts", ".mpg"])
-def test_a_later_picture_that_is_larger_than_the_first_takes_no_memory(
+def test_a_later_image_that_is_larger_than_the_first_takes_no_memory(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], suffix: str
 ) -> None:
     small, large = (filmed(tmp_path / f"{n}{suffix}", *one) for n, one in enumerate([((64, 48), 6), ((4000, 3000), 3)]))
@@ -175,11 +175,11 @@ def test_a_later_picture_that_is_larger_than_the_first_takes_no_memory(
     path.write_bytes(small + large)
     status, peak_mib, said = replayed(path)
     assert status == 0
-    assert f"{path}: picture 5 is damaged, or larger than the first; the video ends there" in said
+    assert f"{path}: image 5 is damaged, or larger than the first; the video ends there" in said
     assert peak_mib < small_peak_mib + 40
 
 
-def test_later_pictures_of_another_size_are_scaled_to_the_first(
+def test_later_images_of_another_size_are_scaled_to_the_first(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], read: Read
 ) -> None:
     path = tmp_path / "drive.mpg"
@@ -207,10 +207,10 @@ def test_what_is_no_video_is_refused(
     [
         (Path.exists, "no such file or folder"),
         (Path.mkdir, "empty folder"),
-        (lambda path: (path.mkdir(), (path / "notes.txt").write_text("")), "no pictures in it"),
+        (lambda path: (path.mkdir(), (path / "notes.txt").write_text("")), "no images in it"),
         (lambda path: path.write_text("hello"), "not a recording"),
     ],
-    ids=["missing", "empty folder", "no pictures", "text"],
+    ids=["missing", "empty folder", "no images", "text"],
 )
 def test_what_is_no_recording_is_refused_in_one_line(tmp_path: Path, make: Callable[[Path], Any], message: str) -> None:
     path = tmp_path / "drive"
@@ -227,7 +227,7 @@ def test_a_path_that_cannot_be_is_refused(tmp_path: Path, name: str) -> None:
         open_recording(tmp_path / name, Config())
 
 
-def test_real_pictures(data_folder: Path, read: Read) -> None:
+def test_real_images(data_folder: Path, read: Read) -> None:
     recording, items = read(data_folder / "authors-rig-2020")
     assert len(items) == recording.frame_count == 37
     assert {frame.image.shape for frame in items} == {(480, 640)}

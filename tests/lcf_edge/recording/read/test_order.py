@@ -35,7 +35,7 @@ def speed(stamp_ns: int) -> SpeedSample:
 
 
 def check_delivery(items: Sequence[UndecodedFrame | Sample], kinds: Sequence[type] = (ImuSample, SpeedSample)) -> None:
-    """Each kind in its order; before each picture exactly the samples up to the first at or after it."""
+    """Each kind in its order; before each image exactly the samples up to the first at or after it."""
     for kind in (UndecodedFrame, ImuSample, SpeedSample):
         own = [item.stamp_ns for item in items if isinstance(item, kind)]
         assert own == sorted(set(own))
@@ -72,7 +72,7 @@ def test_a_shuffled_stream_is_put_in_order(
 
 
 def test_a_long_stream_is_put_in_order_and_little_of_it_is_held() -> None:
-    """Pictures arrive 40 ms late, at 20/s, next to an IMU at 200/s: as a camera driver delivers them."""
+    """Images arrive 40 ms late, at 20/s, next to an IMU at 200/s: as a camera driver delivers them."""
     arrivals = [(t + 40, camera_frame(t)) for t in range(0, 20_000, 50)] + [(t, imu(t)) for t in range(3, 20_000, 5)]
     arrivals.sort(key=lambda arrival: arrival[0])
     taken = delivered = max_held = 0

@@ -171,7 +171,7 @@ def pixels(index: int) -> Any:
 
 @pytest.fixture
 def drive(bag: Bag, make: Messages) -> Bag:
-    """20 pictures at 20/s that are recorded 30 ms late, IMU at 100/s, odometry at 50/s, and other things."""
+    """20 images at 20/s that are recorded 30 ms late, IMU at 100/s, odometry at 50/s, and other things."""
     arrivals: list[tuple[int, str, tuple[str, bytes]]] = []
     for index in range(20):
         stamp = START_NS + index * STEP_NS
@@ -265,13 +265,13 @@ def test_an_empty_last_file_of_a_bag_is_passed_over(tmp_path: Path, make: Messag
 
 
 @pytest.mark.parametrize("suffix", [".jpg", ".png"])
-def test_compressed_pictures(bag: Bag, make: Messages, read: Read, suffix: str) -> None:
+def test_compressed_images(bag: Bag, make: Messages, read: Read, suffix: str) -> None:
     good = cv2.imencode(suffix, pixels(20))[1].tobytes()
     for index, data in enumerate((good, good[:-20], b"", good)):
         bag.add("/image/compressed", make.compressed(START_NS + index, data))
     recording, items = read(bag.write())
     assert [(frame.seq, int(frame.image.mean())) for frame in items] == [(0, 100), (3, 100)]
-    assert recording.skipped == {"picture damaged": 1, "picture empty": 1}
+    assert recording.skipped == {"image damaged": 1, "image empty": 1}
 
 
 def test_colour(bag: Bag, make: Messages, read: Read) -> None:
@@ -300,12 +300,12 @@ def test_the_first_of_several_topics_is_read(bag: Bag, make: Messages, read: Rea
     bag.add("/right/camera_info", make.camera_info())
     recording, items = read(bag.write())
     assert {int(frame.image.mean()) for frame in items} == {5}
-    assert "several picture topics, /left/image is read and /right/image not" in recording.warnings[0]
+    assert "several image topics, /left/image is read and /right/image not" in recording.warnings[0]
     assert recording.lens is None, "the other camera's lens is not this one's"
 
 
 def test_topics_that_cannot_be_used_are_not_chosen(bag: Bag, make: Messages, read: Read) -> None:
-    """Depth pictures, and an IMU whose gyro and accelerometer are apart."""
+    """Depth images, and an IMU whose gyro and accelerometer are apart."""
     bag.add("/depth", make.image(START_NS, np.zeros((4, 8), np.uint8), "16UC1", width=4))
     bag.add("/depth/compressed", make.compressed(START_NS, b"", "16UC1; compressedDepth png"))
     bag.add("/gyro", make.imu(START_NS, unknown=-1))
@@ -442,11 +442,11 @@ def test_what_is_wrong_with_single_messages_is_counted(bag: Bag, make: Messages,
     recording, items = read(bag.write())
     assert (len(of(Frame, items)), len(of(ImuSample, items)), len(of(SpeedSample, items))) == (4, 4, 4)
     assert recording.skipped == {
-        "picture shorter than its size": 1,
-        "picture too large": 1,
-        "picture of another size than the first": 1,
-        "picture message malformed": 1,
-        "picture time that does not increase": 1,
+        "image shorter than its size": 1,
+        "image too large": 1,
+        "image of another size than the first": 1,
+        "image message malformed": 1,
+        "image time that does not increase": 1,
         "imu message with NaN or inf": 1,
         "imu message without angular velocity or acceleration": 1,
         "imu message malformed": 1,
@@ -564,7 +564,7 @@ def test_names_of_topics_are_kept_only_as_far_as_topics_are_called(bag: Bag, mak
         tracemalloc.stop()
 
 
-def test_dark_pictures_that_compress_well_are_read(bag: Bag, make: Messages, read: Read) -> None:
+def test_dark_images_that_compress_well_are_read(bag: Bag, make: Messages, read: Read) -> None:
     for index in range(10):
         bag.add("/image", make.image(START_NS + index, np.zeros((1080, 1440), np.uint8)), START_NS + index)
     recording, items = read(bag.write(compression=CompressionType.ZSTD, chunk_size=4 * MIB))
@@ -694,13 +694,13 @@ def test_garbage_is_refused_in_one_line(bag: Bag, content: bytes) -> None:
     assert "\n" not in str(caught.value)
 
 
-@pytest.mark.parametrize("fault", ["no pictures", "only depth", "ros1"])
-def test_a_file_without_pictures_is_refused(bag: Bag, make: Messages, fault: str) -> None:
+@pytest.mark.parametrize("fault", ["no images", "only depth", "ros1"])
+def test_a_file_without_images_is_refused(bag: Bag, make: Messages, fault: str) -> None:
     bag.add("/imu", make.imu(START_NS))
     if fault == "only depth":
         bag.add("/depth", make.image(START_NS, pixels(1), "16UC1", width=32))
     elif fault == "ros1":
         bag.add("/image", make.image(START_NS, pixels(1)))
     bag.write(encoding="ros1" if fault == "ros1" else "cdr")
-    with pytest.raises(RecordingError, match=r"no picture that can be read in it.*record a camera topic"):
+    with pytest.raises(RecordingError, match=r"no image that can be read in it.*record a camera topic"):
         open_recording(bag.path, Config())

@@ -39,7 +39,7 @@ def scene(stamp_ns: int, seq: int, circles: int = 3) -> Scene:
 
 
 def recorded(count: int, start_ns: int = 10**9, encoder: Encoder | None = None) -> Iterator[RecordedMessage]:
-    """``count`` pictures of 32×24 with all that comes with them."""
+    """``count`` images of 32×24 with all that comes with them."""
     encoder = encoder or Encoder(Config(), lambda *_: None)
     for seq in range(count):
         stamp_ns = start_ns + seq * STEP_NS

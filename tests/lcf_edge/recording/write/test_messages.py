@@ -62,7 +62,7 @@ def test_speeds(ros: Any) -> None:
     assert math.isnan(twist.angular.z)
 
 
-def test_pictures_lossless_or_nearly(ros: Any) -> None:
+def test_images_lossless_or_nearly(ros: Any) -> None:
     for kind, most in (("png", 0), ("jpeg", 40)):
         config = Config(record=Record(format=kind, jpeg_quality=95))  # type: ignore[arg-type]
         message = decoded(ros, SEEN, config)[IMAGES.name]
@@ -72,7 +72,7 @@ def test_pictures_lossless_or_nearly(ros: Any) -> None:
         assert np.abs(image - IMAGE).max() <= most
 
 
-def test_the_scene_of_the_picture(ros: Any) -> None:
+def test_the_scene_of_the_image(ros: Any) -> None:
     message = decoded(ros, SEEN)[SCENE.name]
     assert (message.frame_seq, message.vehicle_speed, len(message.circles), len(message.psi)) == (7, 1.5, 2, 1)
     assert [(thing.class_id, thing.ttc_sigma) for thing in message.objects] == [(1, 1.0)] * 3

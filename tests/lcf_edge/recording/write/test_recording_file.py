@@ -29,7 +29,7 @@ def begun(path: Path) -> RecordingFile:
 
 @pytest.fixture
 def whole(tmp_path: Path, recorded: Any) -> Path:
-    """Six pictures in three chunks, and their summary."""
+    """Six images in three chunks, and their summary."""
     file = begun(tmp_path / "whole.mcap")
     for index, message in enumerate(recorded(6)):
         file.add(message)
