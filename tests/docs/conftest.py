@@ -48,8 +48,8 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     subprocess.run(demo, cwd=place, check=True, capture_output=True)
     (place / "samples").symlink_to(ROOT / "samples")
     (place / "drive").symlink_to(place / "demo-out/recording")
-    (place / "pictures").symlink_to(place / "drive/mav0/cam0/data")
-    files = sorted((place / "pictures").iterdir())[::4]
+    (place / "images").symlink_to(place / "drive/mav0/cam0/data")
+    files = sorted((place / "images").iterdir())[::4]
     pictures = [np.asarray(cv2.imread(str(file))) for file in files]
     height, width, _ = pictures[0].shape
     video = cv2.VideoWriter(str(place / "drive.mp4"), cv2.VideoWriter.fourcc(*"mp4v"), 5.0, (width, height))

@@ -36,7 +36,7 @@ def test_what_a_party_may_say() -> None:
     assert f"more than {key_limits.MAX_DECLARED_BYTES // 1024} KiB of keys on one connection" in DOCUMENT
     most, per_s = key_limits.MAX_NEW_LEVELS, key_limits.NEW_LEVELS_PER_S
     assert f"different keys of one name may have {most} levels in all, and {per_s} more a second" in DOCUMENT
-    assert f"hears of it after {'a second' if gate.PENALTY_S == 1 else gate.PENALTY_S}" in DOCUMENT
+    assert f"they notice after {'a second' if gate.PENALTY_S == 1 else gate.PENALTY_S}" in DOCUMENT
     assert f"the gate reads {pace.MAX_PER_S} messages a second" in DOCUMENT
 
 
@@ -88,5 +88,5 @@ def test_what_a_local_program_may_do() -> None:
     taken = {
         key for rule in access_control("lcf")["rules"] if rule["flows"] == ["ingress"] for key in rule["key_exprs"]
     }
-    local = DOCUMENT.partition("Whoever can run a program")[2].partition("What else it sends")[0]
+    local = DOCUMENT.partition("Any program on the computer")[2].partition("Anything else it sends")[0]
     assert taken == set(re.findall(r"`(lcf/[^`]+|\*\*)`", local))

@@ -50,7 +50,7 @@ def test_a_file_of_another_size_is_reported(rig: RigMaker, tmp_path: Path, size:
     bench = rig("bmi270")
     bench.firmware = tmp_path / "other.fw"
     bench.firmware.write_bytes(bytes(size))
-    with pytest.raises(FirmwareError, match=r"other\.fw: not the 8192 bytes that a BMI270 wants"):
+    with pytest.raises(FirmwareError, match=r"other\.fw: not the 8192 bytes that a BMI270 needs"):
         bench.open()
 
 

@@ -24,13 +24,13 @@ def refusal(setting: str) -> str:
     [
         (
             "camera.driver=v4l",
-            '"v4l" is not possible; did you mean v4l2? write one of auto, libcamera, recording, v4l2',
+            '"v4l" is not allowed; did you mean v4l2? write one of auto, libcamera, recording, v4l2',
         ),
-        ("camera.power_line_hz=55", "55 is not possible; write one of 0, 50, 60"),
-        ("log.level=LOUD", '"LOUD" is not possible; write one of debug, error, info, warning'),
-        ("log.level=INFO", '"INFO" is not possible; did you mean info? write one of debug, error, info, warning'),
-        ("imu.gyro_range_dps=333", "333 is not possible; write one of 250, 500, 1000, 2000"),
-        ('imu.gyro_range_dps="500"', '"500" is not possible; did you mean 500? write one of 250, 500, 1000, 2000'),
+        ("camera.power_line_hz=55", "55 is not allowed; write one of 0, 50, 60"),
+        ("log.level=LOUD", '"LOUD" is not allowed; write one of debug, error, info, warning'),
+        ("log.level=INFO", '"INFO" is not allowed; did you mean info? write one of debug, error, info, warning'),
+        ("imu.gyro_range_dps=333", "333 is not allowed; write one of 250, 500, 1000, 2000"),
+        ('imu.gyro_range_dps="500"', '"500" is not allowed; did you mean 500? write one of 250, 500, 1000, 2000'),
         ("vehicle.half_width_m=wide", 'a number (at least 0.001, at most 10000) is needed, not "wide"'),
         ("camera.width=99999", "a whole number (at least 1, at most 16384) is needed, not 99999"),
         ("camera.width=640.5", "a whole number (at least 1, at most 16384) is needed, not 640.5"),
@@ -38,8 +38,8 @@ def refusal(setting: str) -> str:
         ("camera.pitch_rad=2", "a number (above -1.5, below 1.5) is needed, not 2"),
         ("camera.exposure_s=auto", 'a number (at least 1e-06, at most 100) is needed, not "auto"'),
         ("publish.ros2=yes", 'true or false is needed, not "yes"'),
-        ("camera.device=0", "a text in quotes is needed, not 0"),
-        ("camera.device=2026-01-01", "a text in quotes is needed, not 2026-01-01"),
+        ("camera.device=0", "a string in quotes is needed, not 0"),
+        ("camera.device=2026-01-01", "a string in quotes is needed, not 2026-01-01"),
         ("imu=mpu6050", 'a table of keys is needed, not "mpu6050"'),
         ("zenoh.gossip=[]", "true or false is needed, not a list"),
     ],
@@ -60,7 +60,7 @@ def test_the_place_in_a_list_is_reported() -> None:
 
 def test_keys_in_an_endpoint_are_not_reported() -> None:
     assert refusal('zenoh.listen="tls/rover:7447#connect_private_key_base64=c2VjcmV0"') == (
-        ": a list in brackets is needed, not a text"
+        ": a list in brackets is needed, not a string"
     )
 
 

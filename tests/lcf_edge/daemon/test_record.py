@@ -78,7 +78,7 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
     file = tmp_path / "drive.mcap"
     status, out, said = ended(start(file, "--seconds", "1.5"))
     assert status == 0
-    assert "lcf-edge: stopping: 1.5 s are over" in said
+    assert "lcf-edge: stopping: 1.5 s have passed" in said
     with AnyReader([file]) as reader:
         counts = Counter(connection.topic for connection, _, _ in reader.messages())
     frame_count = counts["/lcf/camera/image_raw/compressed"]

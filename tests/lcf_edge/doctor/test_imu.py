@@ -256,7 +256,7 @@ def test_a_noisy_wire_is_reported(machine: Machine, clock: VirtualClock, write: 
         (resting(gravity_mps2=9.2), Severity.WARN, "gravity 9.20 m/s² (x, y, z: +0.00, +0.00, +9.20) instead of 9.81"),
         (resting(gravity_mps2=1.0), Severity.FAIL, "gravity 1.00 m/s²"),
         (resting(turn_radps=0.3), Severity.WARN, "gyro at rest 0.3"),
-        (lambda t: ((t % 1, 0.0, 0.0), (0.0, 0.0, 9.81)), Severity.WARN, "moves"),
+        (lambda t: ((t % 1, 0.0, 0.0), (0.0, 0.0, 9.81)), Severity.WARN, "moving"),
     ],
 )
 def test_what_no_imu_at_rest_tells(look: Look, motion: Motion, level: Severity, text: str) -> None:
@@ -360,7 +360,7 @@ def test_an_imu_that_the_daemon_has_is_not_opened_but_asked_for(
     process(7, "lcf-edge", "run", opened=(str(tmp_path / "dev/i2c-1"),))
     context = machine(Config(imu=Imu(driver="mpu6050")), open_imu=untouched)
     found = only(list(imu.check(context)))
-    assert found.text.startswith("not opened, since lcf-edge run, process 7 may have it")
+    assert found.text.startswith("not opened: lcf-edge run, process 7 may be using it")
     status = DeviceStatus("imu", Level.OK, "delivers", {"rate_hz": "200.00"})
     context.__dict__["daemon"] = Daemon("tcp/127.0.0.1:7447", {"imu": status}, "")
     found = only(list(imu.check(context)))

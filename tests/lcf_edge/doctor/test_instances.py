@@ -59,7 +59,7 @@ def test_a_configuration_belongs_to_the_instance_of_its_name_where_those_of_unit
 
 def test_two_that_share_nothing_are_reported(front: Callable[[str, str], Context]) -> None:
     (found,) = instances.check(front(REAR, "UnitFileState=enabled"))
-    assert (found.level, found.text) == (Severity.OK, "nothing of lcf-edge@front collides with lcf-edge@rear")
+    assert (found.level, found.text) == (Severity.OK, "lcf-edge@front and lcf-edge@rear do not conflict")
 
 
 def test_two_with_the_same_port_and_prefix_fail_with_the_file_to_edit(front: Callable[[str, str], Context]) -> None:

@@ -248,7 +248,7 @@ def test_a_running_daemon_is_asked(machine: Machine, running: Config) -> None:
     context = machine(running)
     context.__dict__["daemon"] = found
     answers, pipeline = health.check(context)
-    assert answers.text.endswith("has no scene (no scene yet)")
+    assert answers.text.endswith("has no scenes (no scene yet)")
     assert (pipeline.level, pipeline.text) == (
         Severity.WARN,
         "pipeline: dark (latency_p50_ms 3.2, gyro_bias_sigma_radps 0.2000)",
@@ -277,4 +277,4 @@ def test_a_daemon_that_does_not_answer_is_reported(machine: Machine, process: Ca
 
 def test_no_daemon_is_no_trouble(machine: Machine) -> None:
     (found,) = health.check(machine())
-    assert (found.level, found.text) == (Severity.OK, "does not run")
+    assert (found.level, found.text) == (Severity.OK, "not running")
