@@ -162,7 +162,7 @@ def _read_away(descriptor: int) -> None:
         try:
             while terminal.read(2**16):
                 pass
-        except OSError:  # how the end of a terminal is told
+        except OSError:  # how a terminal reports its end
             return
 
 
@@ -228,7 +228,7 @@ def _served(
 def _until_cancelled(loop: asyncio.AbstractEventLoop, task: "asyncio.Task[None]") -> None:
     try:
         loop.run_until_complete(task)
-    except (asyncio.CancelledError, OSError, aiohttp.ClientError):  # whoever waits for it tells
+    except (asyncio.CancelledError, OSError, aiohttp.ClientError):  # whoever waits for it reports it
         pass
     finally:
         loop.close()

@@ -85,7 +85,7 @@ def of_a_frame(count: Callable[[str, int], Cost], part: str) -> Cost:
 
 
 def frames_run(drive: Path, part: str, frames: int) -> tuple[str, ...]:
-    """What Python is told to run; ``-P``: else ``benchmarks/drivers.py`` would be imported for ``drivers``."""
+    """What Python runs; ``-P``: else ``benchmarks/drivers.py`` would be imported for ``drivers``."""
     return "-P", str(HERE / "cost_of_frames.py"), str(drive), part, str(frames)
 
 

@@ -32,7 +32,7 @@ class Method(Protocol):
         """Take a sample, in stamp order."""
 
     def process(self, frame: Frame) -> PipelineScene:
-        """Circles (and ψ) of one frame; ``timing`` tells how long it took."""
+        """Circles (and ψ) of one frame; ``timing``: how long it took."""
 
 
 class FilterMethod:

@@ -359,7 +359,7 @@ _BAUDS = [int(name[1:]) for name in dir(termios) if name[0] == "B" and name[1:].
 
 
 def yaw_pitch_roll(turn: Rotation) -> tuple[float, float, float]:
-    """The angles that a BNO08x tells of ``turn`` = Rz(-yaw) Rx(pitch) Ry(roll), rad."""
+    """The angles that a BNO08x reports for ``turn`` = Rz(-yaw) Rx(pitch) Ry(roll), rad."""
     pitch = math.asin(min(max(turn[2, 1], -1.0), 1.0))
     return math.atan2(turn[0, 1], turn[1, 1]), pitch, math.atan2(-turn[2, 0], turn[2, 2])
 

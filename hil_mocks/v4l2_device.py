@@ -55,7 +55,7 @@ def webcam_controls() -> dict[int, MockControl]:
 
 
 def drawn_image(seq: int, width: int, height: int) -> Grey:
-    """A slope of grey whose brightness tells ``seq`` (modulo 128)."""
+    """A slope of grey whose brightness encodes ``seq`` (modulo 128)."""
     ramp = np.linspace(0, 100, width, dtype=np.uint8)[None, :]
     return np.repeat(ramp + np.uint8(seq % 128), height, axis=0)
 

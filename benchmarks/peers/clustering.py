@@ -60,7 +60,7 @@ def cluster(points: Residual, *, least: int, link_px: float, share: float) -> Cl
     spread = mean(dx * dx + dy * dy)
     down = points.down_then[flagged]
     lever = np.maximum(mean(down * down), 1)
-    growth = mean(down * vy) / lever  # what drives on the ground moves along it, so its rise and fall tell Z'/Z
+    growth = mean(down * vy) / lever  # what drives on the ground moves along it, so its rise and fall give Z'/Z
     radius = np.clip(1.5 * np.sqrt(spread), _MIN_RADIUS_PX, _MAX_RADIUS_PX).astype(np.float32)
     threat = mean(points.threat[flagged]) >= 0.5
     sigma = _VELOCITY_SIGMA_PXPS / np.sqrt(lever * count)

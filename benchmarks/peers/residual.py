@@ -21,8 +21,8 @@ _FOCUS_SIGMA_PX = 6.0
 _ASKEW = 0.25  # share of its way that a corner between two things drifts
 _CERTAIN = 1.0  # standard deviations that a threat's flow must exceed
 _BIAS_SIGMA_RADPS = 0.006
-_LEFT_SHARE, _LEFT_PX = 0.4, 1.0  # of the gyro's uncertainty, once the flow has told its bias
-_MIN_BIAS = 40  # points that tell the gyro's bias
+_LEFT_SHARE, _LEFT_PX = 0.4, 1.0  # of the gyro's uncertainty, once the flow has shown its bias
+_MIN_BIAS = 40  # points that show the gyro's bias
 
 
 @dataclass(frozen=True, slots=True)

@@ -115,7 +115,7 @@ PIXEL_FORMATS = (
     "MJPG",
     *(name for _, names in _BAYER for name in names),
 )
-"""What can be read, by the four letters of V4L2: the cheapest first, raw images last, which nobody has exposed."""
+"""What can be read, by V4L2's four-character code: the cheapest first, raw images, which nothing has exposed, last."""
 
 
 class FrameError(DriverError):

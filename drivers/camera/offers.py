@@ -64,7 +64,7 @@ class RateOffer:
 
 
 def formats(node: Node) -> list[str]:
-    """Pixel formats by their four letters. Raises ``OSError``."""
+    """Pixel formats by four-character code. Raises ``OSError``."""
     listed = _enumerate(node, ENUM_FMT, lambda index: FormatDescription(index=index, type=node.buffer_type))
     return [fourcc_text(description.pixelformat) for description in listed]
 

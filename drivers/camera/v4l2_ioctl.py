@@ -282,12 +282,12 @@ ENUM_FRAMEINTERVALS = _request(_READ | _WRITE, 75, FrameInterval)
 
 
 def fourcc(text: str) -> int:
-    """The number of a pixel format's four letters; blanks at the end may be left out."""
+    """The number of a pixel format's four-character code; trailing blanks may be omitted."""
     return int.from_bytes(text.ljust(4).encode("ascii"), "little")
 
 
 def fourcc_text(number: int) -> str:
-    """The four letters of a pixel format's number without blanks at the end; a question mark: cannot be printed."""
+    """A pixel format's four-character code without trailing blanks; a question mark: cannot be printed."""
     return "".join(chr(byte) if 32 <= byte < 127 else "?" for byte in number.to_bytes(4, "little")).rstrip()
 
 
@@ -400,7 +400,7 @@ class Node:
 
     @property
     def is_signal_processor(self) -> bool:
-        """Whether it works on the images of others; it need not tell so, and is there without a camera as well."""
+        """Whether it works on the images of others; it need not report it, and exists without a camera too."""
         return self._driver in _SIGNAL_PROCESSORS
 
     @property

@@ -118,7 +118,7 @@ class SerialImu:
         return data[:within]
 
     def _newest(self, readings: Sequence[Reading], now_ns: int) -> list[Reading]:
-        """As many as are within the allowance; the first of them tells how many were passed over."""
+        """As many as are within the allowance; the first of them says how many were skipped."""
         within = self._samples.take(len(readings), now_ns)
         excess, kept = readings[: len(readings) - within], list(readings[len(readings) - within :])
         if excess:

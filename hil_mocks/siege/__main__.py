@@ -1,4 +1,4 @@
-"""``python -m hil_mocks.siege``: besiege, and tell what it did."""
+"""``python -m hil_mocks.siege``: besiege, and report what it did."""
 
 import argparse
 import socket
@@ -238,7 +238,7 @@ def wait_for_planner(endpoint: str, settings: str, patience_s: float) -> float:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Besiege, and tell."""
+    """Besiege, and report."""
     parser = argparse.ArgumentParser(
         prog="python -m hil_mocks.siege",
         description="The daemon, its gate and its page under attack, on loopback.",

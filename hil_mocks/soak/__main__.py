@@ -199,7 +199,7 @@ def soak(frame_limit: int, seconds: float, lives: int, seed: int, folder: Path) 
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Soak, and tell."""
+    """Soak, and report."""
     parser = argparse.ArgumentParser(
         prog="python -m hil_mocks.soak", description="The daemon at full speed, with random faults.", allow_abbrev=False
     )

@@ -25,7 +25,7 @@ class Balance:
 
     @classmethod
     def of(cls, parts: Parts) -> "Balance":
-        """As the diagnostics tell it."""
+        """As the diagnostics report it."""
         camera = parts["camera"].values
         return cls(
             int(camera.get("delivered", 0)),

@@ -227,8 +227,8 @@ def _beside(
     if not np.less(np.abs(around), _FARTHEST_PX).all():
         return
     x, y, across, down = map(round, map(float, around))
-    letters = lettering(text)
-    height, width = letters.shape
+    mask = lettering(text)
+    height, width = mask.shape
     gap = 2
     places = (
         (x - width // 2, y - down - gap - height),
@@ -248,23 +248,23 @@ def _beside(
         return
     box = (free or boxes)[0]
     taken.append(box)
-    _write(panel, letters, box[:2], colour)
+    _write(panel, mask, box[:2], colour)
 
 
 def _overlap(a: _Box, b: _Box) -> bool:
     return a[0] < b[2] and b[0] < a[2] and a[1] < b[3] and b[1] < a[3]
 
 
-def _write(panel: Image, letters: Mask, left_top: tuple[int, int], colour: Colour) -> None:
+def _write(panel: Image, mask: Mask, left_top: tuple[int, int], colour: Colour) -> None:
     """Text with a dark halo; what would lie outside the image is cut."""
-    letters = np.pad(letters, _HALO_PX)
+    mask = np.pad(mask, _HALO_PX)
     left, top = (max(at - _HALO_PX, 0) for at in left_top)
-    place = panel[top : top + letters.shape[0], left : left + letters.shape[1]]
-    letters = letters[: place.shape[0], : place.shape[1], None]
-    if letters.size:
-        halo = cv2.dilate(letters, _HALO)[..., None]
+    place = panel[top : top + mask.shape[0], left : left + mask.shape[1]]
+    mask = mask[: place.shape[0], : place.shape[1], None]
+    if mask.size:
+        halo = cv2.dilate(mask, _HALO)[..., None]
         dark = place * (1 - halo / np.float32(255))
-        place[...] = dark + (letters / np.float32(255)) * (np.array(colour, np.float32) - dark)
+        place[...] = dark + (mask / np.float32(255)) * (np.array(colour, np.float32) - dark)
 
 
 def _caption(panel: Image, parts: tuple[tuple[str, Colour], ...]) -> None:
@@ -275,10 +275,10 @@ def _caption(panel: Image, parts: tuple[tuple[str, Colour], ...]) -> None:
     margin, gap = 5, 10
     texts = [(lettering(text), colour) for text, colour in parts if text]
     room = columns - 2 * margin - gap * len(texts)
-    scale = min(1.0, max(room, 1) / max(sum(letters.shape[1] for letters, _ in texts), 1))
+    scale = min(1.0, max(room, 1) / max(sum(mask.shape[1] for mask, _ in texts), 1))
     x = margin
-    for letters, colour in texts:
-        height, width = (max(round(side * scale), 1) for side in letters.shape)
-        fitted = np.asarray(cv2.resize(letters, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
+    for mask, colour in texts:
+        height, width = (max(round(side * scale), 1) for side in mask.shape)
+        fitted = np.asarray(cv2.resize(mask, (width, height), interpolation=cv2.INTER_AREA), np.uint8)
         _write(panel, fitted, (x, rows - (_STRIP_PX + height) // 2), colour)
         x += width + gap

@@ -60,7 +60,7 @@ class Sink(ABC):
         """Give up memory, because the budget is nearly used up."""
 
     def status(self) -> DeviceStatus | None:
-        """Return how it is, for the diagnostics; None: nothing to tell."""
+        """Return how it is, for the diagnostics; None: nothing to report."""
         return None
 
     def join(self, timeout_s: float) -> bool:  # noqa: ARG002

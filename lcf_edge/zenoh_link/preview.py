@@ -19,7 +19,7 @@ PREVIEW = ZenohTopic(
 )
 
 
-ASKED_EACH_NS = 200_000_000  # whether somebody subscribes: Zenoh takes 0.1 ms to tell
+ASKED_EACH_NS = 200_000_000  # whether somebody subscribes: Zenoh takes 0.1 ms to answer
 
 
 class PreviewPublisher:

@@ -61,7 +61,7 @@ def test_a_sink_of_one_s_own_has_a_row_for_each_frame_with_objects(drive: Path, 
     assert numbers == sorted(set(numbers))
 
 
-def test_a_replay_tells_how_many_objects_there_were_and_keeps_a_image(drive: Path, tmp_path: Path) -> None:
+def test_a_replay_tells_how_many_objects_there_were_and_keeps_an_image(drive: Path, tmp_path: Path) -> None:
     output = output_of("replay", drive / "recording", drive / "config.toml", tmp_path / "frame.png")
     assert re.fullmatch(r"40 frames, \d+\.\d\d objects a frame, at most \d+: .*frame\.png\n", output)
     assert (tmp_path / "frame.png").stat().st_size > 10_000

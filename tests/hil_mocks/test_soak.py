@@ -86,7 +86,7 @@ def test_too_little_has_no_slope() -> None:
     assert all(map(math.isnan, slope([])))
 
 
-def test_a_image_that_nothing_tells_of_is_lost() -> None:
+def test_an_image_that_nothing_tells_of_is_lost() -> None:
     assert Balance.of(parts(100, 90, 10, 80)).lost == 0
     assert Balance.of(parts(100, 90, 9, 80)).lost == 1
 

@@ -214,7 +214,7 @@ def test_images_that_change_size(replay: Callable[..., Replayed], drive: Drive) 
     assert done.skipped == {"image of another size than the first": 2}
 
 
-def test_a_image_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
+def test_an_image_without_a_corner(replay: Callable[..., Replayed], drive: Drive) -> None:
     cv2.imwrite(str(drive.image_path(5)), np.full((240, 320), 128, np.uint8))
     done = replay(drive.root)
     assert (done.status, done.warnings, done.sequence) == (0, [], without())

@@ -146,7 +146,7 @@ class Recorded(Recording):
                 yield item
 
 
-def test_a_image_can_be_looked_at_before_its_samples_have_come(approach: Approach) -> None:
+def test_an_image_can_be_looked_at_before_its_samples_have_come(approach: Approach) -> None:
     drive = list(approach())
     pipeline, samples, scenes = Pipeline(DEFAULTS, PINHOLE), [], []
     for item in drive:
@@ -228,7 +228,7 @@ def test_a_constant_speed_needs_no_sensor(approach: Approach) -> None:
     assert not any("no speed" in each.scene.notes for each in seen)
 
 
-def test_a_image_without_corners_is_noted_and_the_next_goes_on(approach: Approach) -> None:
+def test_an_image_without_corners_is_noted_and_the_next_goes_on(approach: Approach) -> None:
     drive = list(approach())
     blank = [
         replace(item, image=np.zeros_like(item.image)) if isinstance(item, Frame) and item.seq == 10 else item
@@ -258,7 +258,7 @@ def test_hours_of_samples_before_the_first_image_change_nothing(approach: Approa
     assert all("no imu" not in scene.notes for scene in seen)
 
 
-def test_a_image_that_stands_still_is_noted_although_the_odometry_goes_on(approach: Approach) -> None:
+def test_an_image_that_stands_still_is_noted_although_the_odometry_goes_on(approach: Approach) -> None:
     drive = list(approach(imu=False))
     image = next(item.image for item in drive if isinstance(item, Frame))
     frozen = [replace(item, image=image) if isinstance(item, Frame) else item for item in drive]

@@ -93,7 +93,7 @@ class TestPictures:
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420"))).mode.pixel_format == "YU12"
         assert open_camera(World(formats=("BGR888", "YUYV", "YUV420")), pixel_format="YUYV").mode.pixel_format == "YUYV"
 
-    def test_a_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
+    def test_an_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         camera = open_camera()
         first = take(camera, 1)[0]
         kept = first.image.copy()
@@ -142,7 +142,7 @@ class TestPictures:
         assert 2 not in numbers
         assert camera.counts["dropped"] == 1
 
-    def test_a_image_that_is_marked_as_bad_is_refused(self, open_camera: Open) -> None:
+    def test_an_image_that_is_marked_as_bad_is_refused(self, open_camera: Open) -> None:
         camera = open_camera(World(bad=True))
         while not camera.counts["corrupt"]:  # on a slow computer a newer one may overtake it unseen
             assert not any(frame.seq % 2 for frame in camera.read())

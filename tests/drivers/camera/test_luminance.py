@@ -48,7 +48,7 @@ def test_raw_images_of_a_sensor_with_colours_give_weighted_sums(pixel_format: st
 
 
 @pytest.mark.parametrize("pixel_format", [name for name in RAW if name not in SEPARATE and "P" not in name[1:]])
-def test_a_image_may_be_of_any_width(pixel_format: str) -> None:
+def test_an_image_may_be_of_any_width(pixel_format: str) -> None:
     image = IMAGE[:, :50]
     data = memoryview(encode(image, pixel_format))
     assert np.array_equal(luminance(pixel_format, data, 50, HEIGHT, min_stride(pixel_format, 50)), image)
@@ -142,7 +142,7 @@ def test_a_progressive_jpeg_is_refused() -> None:
 
 
 @given(st.binary(max_size=400), st.integers(0, len(JPEG)), st.sampled_from(PIXEL_FORMATS))
-def test_any_bytes_are_a_image_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
+def test_any_bytes_are_an_image_or_refused(rubbish: bytes, at: int, pixel_format: str) -> None:
     try:
         outcome: object = read(pixel_format, JPEG[:at] + rubbish + JPEG[at + len(rubbish) :]).shape
     except FrameError as error:

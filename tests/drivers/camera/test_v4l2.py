@@ -113,7 +113,7 @@ class TestPictures:
         frame = take(open_camera(pixel_format="MJPG"), 1)[0]
         assert np.abs(frame.image.astype(int) - drawn_image(0, 640, 480)).max() < 10
 
-    def test_a_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
+    def test_an_image_keeps_its_content_when_its_buffer_is_filled_again(self, open_camera: Open) -> None:
         frames = take(open_camera(), 2 * BUFFERS)
         assert all(np.array_equal(frame.image, drawn_image(n, 640, 480)) for n, frame in enumerate(frames))
 
@@ -196,7 +196,7 @@ class TestMultiPlanar:
         frame = take(open_camera(pixel_format="YUYV"), 1)[0]
         assert np.array_equal(frame.image, drawn_image(0, 640, 480))
 
-    def test_half_a_image_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_half_an_image_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.short = 1
         camera = open_camera()
         assert take(camera, 1)[0].seq == 1
@@ -328,13 +328,13 @@ class TestBadPictures:
         assert counted(camera) == {"corrupt": 2}
 
     @pytest.mark.parametrize(("pixel_format", "reason"), [("YUYV", "short"), ("MJPG", "corrupt")])
-    def test_half_a_image_is_none(self, open_camera: Open, webcam: MockCamera, pixel_format: str, reason: str) -> None:
+    def test_half_an_image_is_none(self, open_camera: Open, webcam: MockCamera, pixel_format: str, reason: str) -> None:
         camera = open_camera(pixel_format=pixel_format)
         webcam.short = 2
         assert take(camera, 1)
         assert counted(camera) == {reason: 2}
 
-    def test_a_image_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
+    def test_an_image_of_another_size_is_none(self, open_camera: Open, webcam: MockCamera) -> None:
         camera = open_camera(pixel_format="MJPG")
         take(camera, 1)
         webcam.images = lambda seq, _width, _height: drawn_image(seq, 320, 240)

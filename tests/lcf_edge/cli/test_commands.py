@@ -257,7 +257,7 @@ def test_the_video_has_two_panels_and_every_frame(
     assert cv2.VideoCapture(str(video)).get(cv2.CAP_PROP_FPS) == pytest.approx(10.0)
 
 
-def test_the_plot_is_a_image(replayed: tuple[Done, Path]) -> None:
+def test_the_plot_is_an_image(replayed: tuple[Done, Path]) -> None:
     image = cv2.imread(str(replayed[1] / "sizes.png"))
     assert image is not None
     assert image.std() > 10

@@ -165,7 +165,7 @@ def test_what_once_ended_a_reload_is_refused_by_its_key(setting: str) -> None:
     assert len(refused) < 200
 
 
-def test_more_pixels_than_a_image_may_have_are_refused() -> None:
+def test_more_pixels_than_an_image_may_have_are_refused() -> None:
     refused = built(["camera.width=16384", "camera.height=16384"])
     assert isinstance(refused, str)
     assert "camera.width: more than 33554432 pixels" in refused

@@ -178,7 +178,7 @@ def test_what_cannot_work_ends_in_one_line(
     assert Path("there.mcap").read_text() == "precious"
 
 
-def test_without_a_image_it_has_failed(start: Start, tmp_path: Path) -> None:
+def test_without_an_image_it_has_failed(start: Start, tmp_path: Path) -> None:
     status, out, said = ended(start(tmp_path / "drive.mcap", "--seconds", "0.2", camera="/dev/no-such-camera"))
     assert (status, out) == (1, "")
     assert any("/dev/no-such-camera" in line for line in said)

@@ -226,7 +226,7 @@ def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera)
 
 
 @pytest.mark.parametrize(("grey", "word"), [(8, "dark"), (120, "blind"), (250, "overexposed")])
-def test_a_image_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
+def test_an_image_without_use_is_reported(look: Look, webcam: MockCamera, grey: int, word: str) -> None:
     webcam.images = plain(grey)
     found = one(look(), Severity.WARN)
     assert found.text.startswith(f"{word}: mean grey level {grey} of 255, 0 corners")

@@ -389,7 +389,7 @@ class TestBrokenGyro:
         assert motion.rotation_sigma_rad == pytest.approx(0.002, rel=0.1)
         assert motion.yaw_rate_radps == pytest.approx(-0.6, abs=0.02)
 
-    def test_a_image_does_not_overrule_a_gyro_that_is_known(self) -> None:
+    def test_an_image_does_not_overrule_a_gyro_that_is_known(self) -> None:
         ego = calibrated()
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(0.5))

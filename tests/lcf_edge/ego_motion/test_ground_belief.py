@@ -62,7 +62,7 @@ def test_without_ground_it_is_held_for_a_moment_and_then_unknown() -> None:
     assert isnan(belief.speed_mps)
 
 
-def test_a_image_that_stands_still_says_that_the_vehicle_does() -> None:
+def test_an_image_that_stands_still_says_that_the_vehicle_does() -> None:
     belief = GroundBelief()
     belief.see(shown(1.5), FRAME_S)
     belief.stand()

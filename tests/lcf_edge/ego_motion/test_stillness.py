@@ -36,7 +36,7 @@ def test_motors_may_make_corners_jump_by_a_pixel() -> None:
 
 
 @pytest.mark.parametrize("px_a_frame", [0.5, 2.0, -7.0])
-def test_a_image_that_moves_is_not_still(px_a_frame: float) -> None:
+def test_an_image_that_moves_is_not_still(px_a_frame: float) -> None:
     assert not any(verdicts(25, corners(), px_a_frame)[10:])
 
 

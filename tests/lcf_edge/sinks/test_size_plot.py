@@ -54,7 +54,7 @@ def test_refused_before_the_work_begins(tmp_path: Path) -> None:
         SizePlot(tmp_path / "nowhere" / "sizes.png")
 
 
-def test_a_image_that_is_there_outlives_a_replay_without_a_frame(tmp_path: Path) -> None:
+def test_an_image_that_is_there_outlives_a_replay_without_a_frame(tmp_path: Path) -> None:
     path = tmp_path / "sizes.png"
     path.write_bytes(b"kept")
     SizePlot(path).close()

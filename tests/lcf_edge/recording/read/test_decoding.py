@@ -235,7 +235,7 @@ def test_a_cut_image_is_damaged(suffix: str, capfd: pytest.CaptureFixture[str]) 
 
 @pytest.mark.parametrize("suffix", SUFFIXES)
 @given(data=st.data())
-def test_any_damage_gives_a_image_or_a_image_error(suffix: str, data: st.DataObject) -> None:
+def test_any_damage_gives_an_image_or_an_image_error(suffix: str, data: st.DataObject) -> None:
     content = bytearray(encoded(suffix))
     for _ in range(data.draw(st.integers(1, 3))):
         content[data.draw(st.integers(0, len(content) - 1))] = data.draw(st.integers(0, 255))
@@ -250,7 +250,7 @@ def test_any_damage_gives_a_image_or_a_image_error(suffix: str, data: st.DataObj
 
 
 @given(st.binary(max_size=200))
-def test_any_bytes_give_a_image_error(content: bytes) -> None:
+def test_any_bytes_give_an_image_error(content: bytes) -> None:
     with pytest.raises(ImageDecodeError):
         image_from_bytes(content)
 
