@@ -1,6 +1,6 @@
 """Draw docs/pictures/shape.svg, and write the table of columns in docs/developing.md: ``python docs/shape.py``.
 
-The image shows which parts of the project import which. An arrow is left out where a longer way leads there as well.
+The drawing shows which parts of the project import which. An arrow is left out where a longer way leads there as well.
 Arrows go down; one that goes up is red.
 """
 
@@ -34,6 +34,7 @@ LAYERS = (
 TABLES = {
     "edges (E_n, E_r, α)": tables.EDGE_COLUMNS,
     "circles (C_n, C_r)": tables.CIRCLE_COLUMNS,
+    "objects": tables.OBJECT_COLUMNS,
     "ψ": tables.PSI_COLUMNS,
     "groups (λ)": tables.GROUP_COLUMNS,
     "corners of the frame": tables.CORNER_COLUMNS,
@@ -119,13 +120,18 @@ def svg() -> str:
 
 
 def owners() -> str:
-    """Return the table of columns as Markdown."""
-    lines = ["| table | column | meaning | unit | written by |", "|---|---|---|---|---|"]
+    """Return the tables of columns as Markdown; of a table with one writer only its name."""
+    lines = []
     for name, columns in TABLES.items():
+        if len(writers := {writer for column in columns for writer in column.writers}) == 1:
+            lines += [f"**{name}**: only `{writers.pop()}`.", ""]
+            continue
+        lines += [f"**{name}**", "", "| column | meaning | unit | written by |", "|---|---|---|---|"]
         for column in columns:
-            writers = ", ".join(f"`{writer}`" for writer in column.writers)
-            lines.append(f"| {name} | `{column.name}` | {column.meaning} | {column.unit} | {writers} |")
-    return "\n".join(lines) + "\n"
+            modules = ", ".join(f"`{writer}`" for writer in column.writers)
+            lines.append(f"| `{column.name}` | {column.meaning} | {column.unit} | {modules} |")
+        lines.append("")
+    return "\n".join(lines)
 
 
 def page() -> str:

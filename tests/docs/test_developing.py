@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 PAGE = shape.PAGE.read_text(encoding="utf-8")
 
 
-def test_the_image_is_up_to_date() -> None:
+def test_the_drawing_is_up_to_date() -> None:
     assert shape.DRAWING.read_text(encoding="utf-8") == shape.svg(), "run python docs/shape.py"
 
 
@@ -19,7 +19,7 @@ def test_the_table_of_columns_is_up_to_date() -> None:
     assert shape.page() == PAGE, "run python docs/shape.py"
 
 
-def test_every_part_of_the_code_is_in_the_image() -> None:
+def test_every_part_of_the_code_is_in_the_drawing() -> None:
     drawn = {part for layer in shape.LAYERS for part in layer}
     packages = {path.parent.name for path in (ROOT / "lcf_edge").glob("*/__init__.py")}
     assert packages <= drawn

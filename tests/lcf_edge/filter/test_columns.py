@@ -13,6 +13,7 @@ FILTER = Path(tables.__file__).parent
 COLUMNS: dict[str, tuple[Column, ...]] = {
     "EdgeColumns": tables.EDGE_COLUMNS,
     "CircleColumns": tables.CIRCLE_COLUMNS,
+    "ObjectColumns": tables.OBJECT_COLUMNS,
     "PsiColumns": tables.PSI_COLUMNS,
     "GroupColumns": tables.GROUP_COLUMNS,
     "CornerColumns": tables.CORNER_COLUMNS,
