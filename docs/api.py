@@ -44,8 +44,8 @@ def page() -> str:
 def _entry(module: ModuleType, name: str) -> str:
     thing = getattr(module, name)
     if isinstance(thing, np.dtype):
-        return "\n".join(
-            [f"### {name}", "", _text(_doc_of_constant(module, name)), "", *_fields_of_dtype(module, name)]
+        return (
+            f"### {name}\n\n{_text(_doc_of_constant(module, name))} Its fields: [wire format](wire-format.md#messages)."
         )
     lines = [f"### {name}", ""]
     if not isinstance(thing, type):
@@ -86,18 +86,6 @@ def _fields_of_class(thing: type) -> Iterator[str]:
             "|---|---|---|",
             *rows,
         )
-
-
-def _fields_of_dtype(module: ModuleType, name: str) -> Iterator[str]:
-    """Rows of a table: name, type, and the comment behind it, where there is one."""
-    dtype: np.dtype[Any] = getattr(module, name)
-    source = inspect.getsource(module)
-    block = source[source.index(f"\n{name} = ") :].partition("\n)\n")[0]
-    comments = {found[1]: _comment(found[0]) for found in re.finditer(r'^ *\("(\w+)",.*$', block, re.M)}
-    yield from ("| field | type | at byte |  |", "|---|---|--:|---|")
-    for field in dtype.names or ():
-        kind, at = dtype.fields[field][:2]  # type: ignore[index]
-        yield f"| `{field}` | {kind.name} | {at} | {comments.get(field, '')} |"
 
 
 def _comment(line: str) -> str:
