@@ -373,7 +373,7 @@ def test_a_full_disk_is_reported_once_and_the_file_goes_on_when_there_is_room(
         assert final.seq == last
     logged = [record.getMessage() for record in caplog.records]
     assert len([line for line in logged if "cannot be written" in line]) == 1
-    assert [line.split()[1] for line in logged] == ["records", str(disk / logged[0].split("/")[-1]) + ":", "goes"]
+    assert [line.split()[1] for line in logged] == ["records", str(disk / logged[0].split("/")[-1]) + ":", "continues"]
 
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="only root can mount a disk")
