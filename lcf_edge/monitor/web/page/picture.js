@@ -75,11 +75,11 @@ export class Picture {
     if (!this.#image && !this.#scene) return;
     this.why.hidden = !alone || performance.now() - this.#began < FRESH_MS;
     this.why.textContent = this.#gaveUp
-      ? "No pictures: the daemon gave up the preview to save memory (memory.budget_mib)."
-      : "No pictures come (is publish.preview_hz 0?). Drawn from the scene alone.";
+      ? "No images: the daemon gave up the preview to save memory (memory.budget_mib)."
+      : "No images arrive (is publish.preview_hz 0?). Drawn from the scene alone.";
     const behind_s = this.#image && live && !alone ? (this.#scene.stamp_ns - this.#from.stamp_ns) / 1e9 : 0;
     this.behind.hidden = behind_s < BEHIND_S;
-    this.behind.textContent = `picture ${behind_s.toFixed(1)} s behind`;
+    this.behind.textContent = `image ${behind_s.toFixed(1)} s behind`;
     this.#label();
   }
 
@@ -114,7 +114,7 @@ export class Picture {
     const rebels = this.#scene.circles.filter(({ kind }) => kind === "rebel").length;
     const normal = this.#scene.circles.length - rebels;
     const objects = this.#scene.objects.length;
-    this.canvas.setAttribute("aria-label", `Camera picture with ${objects} objects, ${rebels} rebel and ${normal} normal circles`);
+    this.canvas.setAttribute("aria-label", `Camera image with ${objects} objects, ${rebels} rebel and ${normal} normal circles`);
   }
 }
 
