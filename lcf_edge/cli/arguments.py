@@ -68,6 +68,9 @@ def parser() -> argparse.ArgumentParser:
     replay.add_argument("-o", dest="results", metavar="FILE", help="one JSON line a frame; - is standard output")
     replay.add_argument("--video", type=Path, metavar="FILE.webm", help="what the filter saw, two panels; or .mp4")
     replay.add_argument("--plot", type=Path, metavar="FILE.png", help="rows in use of each table")
+    replay.add_argument(
+        "--mcap", type=Path, metavar="FILE.mcap", help="a recording with what was found in it, for Foxglove and ROS 2"
+    )
     replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
     replay.add_argument("--realtime", action="store_true", help="as slow as the recording was made: --speed 1")
 
