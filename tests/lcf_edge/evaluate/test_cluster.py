@@ -6,7 +6,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -97,11 +97,10 @@ def test_so_it_does_when_one_is_killed_at_the_beginning(
     mark = tmp_path / "killed"
 
     def version() -> str:
-        try:
+        with suppress(FileExistsError):
             mark.touch(exist_ok=False)
-        except FileExistsError:
-            return __version__
-        os.kill(os.getpid(), signal.SIGKILL)
+            os.kill(os.getpid(), signal.SIGKILL)
+        return __version__
 
     monkeypatch.setattr("lcf_edge.evaluate.workers._version", version)
     ((_, done),) = by_cluster([Task("drive", drive, Config())], cluster.endpoint, quiet)
