@@ -6,7 +6,8 @@ Every length is compared with the bytes that are left before memory is taken for
 """
 
 import struct
-from collections.abc import Sequence
+from array import array
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, Literal
@@ -21,6 +22,8 @@ from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Cause, Kind, ObjectCla
 Vector = tuple[float, float, float]
 
 LITTLE_ENDIAN = b"\x00\x01\x00\x00"
+FIRST = (len(LITTLE_ENDIAN),)
+"""Where the stamp is of a message that begins with one, or with a header."""
 
 _TWIST_BYTES = 7 + 48  # with padding
 
@@ -265,12 +268,17 @@ def encode_camera_info(info: CameraInfo) -> bytes:
     return writer.payload()
 
 
-def restamped(payload: bytes, stamp_ns: int) -> bytes:
-    """A little-endian message, whose type begins with a stamp or a header, with another stamp. Raises ``CdrError``."""
-    stamp = Writer()
-    stamp.stamp(stamp_ns)
-    start = stamp.payload()
-    return b"".join((start, memoryview(payload)[len(start) :]))
+def restamped(payload: bytes, stamp_ns: int, at: Iterable[int] = FIRST) -> bytes:
+    """A little-endian message with another stamp where its stamps are, ``at`` these bytes. Raises ``CdrError``."""
+    writer = Writer()
+    writer.stamp(stamp_ns)
+    stamp = writer.payload()[len(LITTLE_ENDIAN) :]
+    pieces: list[bytes | memoryview] = []
+    end = 0
+    for start in at:
+        pieces += (memoryview(payload)[end:start], stamp)
+        end = start + len(stamp)
+    return b"".join((*pieces, memoryview(payload)[end:]))
 
 
 def decode_scene(payload: bytes | memoryview) -> Scene:
@@ -313,9 +321,13 @@ def _float_words(dtype: np.dtype[np.void]) -> list[int]:
 
 
 class Writer:
-    """A payload that grows. Raises ``CdrError`` for a value that does not fit its field."""
+    """A payload that grows. Raises ``CdrError`` for a value that does not fit its field.
+
+    ``stamps``: where in the payload each stamp begins.
+    """
 
     def __init__(self) -> None:
+        self.stamps = array("I")
         self._body = bytearray()
 
     def payload(self) -> bytes:
@@ -330,6 +342,7 @@ class Writer:
     def stamp(self, stamp_ns: int) -> None:
         """``builtin_interfaces/msg/Time``."""
         self.scalars("iI", *divmod(stamp_ns, 1_000_000_000))
+        self.stamps.append(len(LITTLE_ENDIAN) + len(self._body) - 8)
 
     def scalars(self, fields: str, *values: float) -> None:
         """Fields in the notation of ``struct``, none of which is wider than the one before it."""

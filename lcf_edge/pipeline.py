@@ -279,8 +279,17 @@ def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:
     return np.stack(coordinates, axis=1).astype(np.float32)
 
 
-def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome]]:
-    """Feed a recording through the pipeline. Yield each frame with its outcome.
+def lens_of(recording: "Recording", config: Config, width: int, height: int) -> Lens | None:
+    """Return the calibrated lens for images of that size: configured, else the recording's own; None: it is unknown."""
+    if config.camera.intrinsics:
+        return Lens.from_config(config.camera, width, height)
+    return recording.lens and recording.lens.scaled(width, height)
+
+
+def run(
+    recording: "Recording", config: Config, take: Callable[[ImuSample | SpeedSample], None] | None = None
+) -> Iterator[tuple[Frame, Outcome]]:
+    """Feed a recording through the pipeline. Yield each frame with its outcome; ``take`` gets each sample.
 
     At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises
     ``RecordingError``, ``ConfigError``.
@@ -291,16 +300,16 @@ def run(recording: "Recording", config: Config) -> Iterator[tuple[Frame, Outcome
         if isinstance(event, Frame):
             if pipeline is None:
                 height, width = event.image.shape
-                if recording.lens is None or config.camera.intrinsics:
-                    lens = Lens.from_config(config.camera, width, height)
-                else:
-                    lens = recording.lens.scaled(width, height)
+                lens = lens_of(recording, config, width, height) or Lens.from_config(config.camera, width, height)
                 pipeline = Pipeline(config, lens)
                 for sample in waiting:
                     pipeline.add(sample)
                 waiting.clear()
             yield event, Outcome(pipeline.process(event), pipeline.view)
-        elif pipeline is None:
+            continue
+        if take is not None:
+            take(event)
+        if pipeline is None:
             waiting.append(event)
         else:
             pipeline.add(event)

@@ -1,6 +1,7 @@
 """Running a camera from the command line: the arguments that all kinds of cameras share."""
 
 import argparse
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -9,6 +10,11 @@ from drivers.by_hand import describe_frame, watch
 from drivers.device import Device
 from drivers.errors import DriverError
 from drivers.samples import Frame
+
+
+def list_command(prog: str) -> str:
+    """What lists cameras of another kind, by the Python that runs now; another may not have the program."""
+    return f"{shlex.quote(sys.executable)} -m {prog} --list"
 
 
 def run(

@@ -340,7 +340,8 @@ def _list() -> int:
     """Cameras that libcamera finds. Return the exit status: 1, with a line on stderr, for none."""
     found = cameras()
     if not found:
-        sys.stderr.write("libcamera finds no camera; those at USB: python -m drivers.camera.v4l2 --list\n")
+        usb = by_hand.list_command("drivers.camera.v4l2")
+        sys.stderr.write(f"libcamera finds no camera; those at USB: {usb}\n")
         return 1
     sys.stdout.writelines(f"{camera.name}: {camera.id}\n" for camera in found)
     return 0

@@ -243,7 +243,7 @@ def _list() -> int:
             if others := sorted(set(offered) - set(readable)):
                 sys.stdout.write(f"  not read: {', '.join(others)}\n")
     if not listed:
-        ribbon = "those at a ribbon cable: python -m drivers.camera.libcamera --list"
+        ribbon = f"those at a ribbon cable: {by_hand.list_command('drivers.camera.libcamera')}"
         sys.stderr.write(f"no camera can be opened; lcf-edge doctor says why; {ribbon}\n")
     return 0 if listed else 1
 

@@ -70,6 +70,9 @@ def parser() -> argparse.ArgumentParser:
         "--video", type=Path, metavar="FILE.webm", help="video of what the filter saw, two panels; or .mp4"
     )
     replay.add_argument("--plot", type=Path, metavar="FILE.png", help="plot of the rows in use of each table")
+    replay.add_argument(
+        "--mcap", type=Path, metavar="FILE.mcap", help="a recording with what was found in it, for Foxglove and ROS 2"
+    )
     replay.add_argument("--publish", action="store_true", help="publish each scene over Zenoh")
     replay.add_argument("--realtime", action="store_true", help="at the recording's own pace: --speed 1")
 

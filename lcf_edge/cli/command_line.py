@@ -150,7 +150,7 @@ def _replay(arguments: argparse.Namespace) -> None:
     config = _load(arguments)
     from lcf_edge.cli.replay import Outputs, replay  # noqa: PLC0415
 
-    outputs = Outputs(arguments.results, arguments.video, arguments.plot, arguments.publish)
+    outputs = Outputs(arguments.results, arguments.video, arguments.plot, arguments.publish, arguments.mcap)
     pace = _pace(arguments)
     if arguments.realtime and pace.speed is None:
         pace = replace(pace, speed=1.0)

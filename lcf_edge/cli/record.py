@@ -6,9 +6,9 @@ from pathlib import Path
 from lcf_edge.cli.run import run
 from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.recorder import Recorder
-from lcf_edge.errors import LcfError, RecordingError, UsageError
+from lcf_edge.errors import LcfError, RecordingError
 from lcf_edge.recording.write.destination import Bag, Named
-from lcf_edge.sinks import cannot_write, check_output
+from lcf_edge.sinks import cannot_write, check_output, refuse_existing
 
 
 def record(file: Path, seconds: float | None, path: Path | None, settings: Sequence[str]) -> str:
@@ -18,8 +18,7 @@ def record(file: Path, seconds: float | None, path: Path | None, settings: Seque
     name that exists or cannot be used, ``SinkError`` for one that cannot be written, ``LcfError`` when no image was
     recorded, and what ``run`` raises.
     """
-    if file.exists():
-        raise UsageError(f"{file}: already exists; name another file, or remove it")
+    refuse_existing(file)
     is_bag = not file.suffix
     if is_bag:
         _make(file)

@@ -4,20 +4,21 @@ import math
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 from itertools import count, islice
 from pathlib import Path
 
 import numpy as np
 from tqdm import tqdm
 
-from drivers.samples import Frame
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.cli.summary import Summary
 from lcf_edge.config import Config
 from lcf_edge.errors import UsageError
-from lcf_edge.pipeline import Outcome, run
+from lcf_edge.pipeline import Outcome, lens_of, run
 from lcf_edge.recording.pace import Pace
 from lcf_edge.recording.read import Recording, open_recording
 from lcf_edge.sinks.results import ResultsSink
@@ -38,14 +39,15 @@ class Outputs:
     video: Path | None = None
     plot: Path | None = None
     publish: bool = False
+    recording: Path | None = None
 
 
 def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) -> list[str]:
     """Run the pipeline over a recording. Return the summary, line by line.
 
-    ``warn`` gets the recording's warnings, also when the replay fails. Raises ``RecordingError`` for a
-    recording without a usable frame, ``SinkError`` for an output that cannot be written,
-    ``PublishError``, ``UsageError``.
+    ``outputs.recording`` is a new MCAP file, with pictures, samples and what was found. ``warn`` gets the recording's
+    warnings, also when the replay fails. Raises ``RecordingError`` for a recording without a usable frame,
+    ``SinkError`` for an output that cannot be written, ``CdrError``, ``PublishError``, ``UsageError``.
     """
     recording = open_recording(path, config)
     recording.start_s, recording.duration_s = pace.start_s, pace.duration_s
@@ -61,11 +63,13 @@ def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) 
 def _run(recording: Recording, config: Config, outputs: Outputs, pace: Pace, summary: Summary) -> None:
     for output in (outputs.results, outputs.video, outputs.plot):
         _refuse_input(recording.path, output)
+    if outputs.recording is not None and pace.loop:
+        raise UsageError(f"{outputs.recording}: holds a drive once; leave --loop or --mcap out")
     with ExitStack() as stack:
         sinks = [stack.enter_context(sink) for sink in _sinks(recording, config, outputs)]
         whole = pace.start_s == 0 and pace.duration_s == math.inf and not pace.loop
         steps = tqdm(
-            _paced(recording, config, pace),
+            _paced(recording, config, pace, sinks),
             total=recording.frame_count if whole else None,
             unit="frame",
             disable=pace.step or None,  # unless standard error is a terminal
@@ -90,6 +94,10 @@ def _sinks(recording: Recording, config: Config, outputs: Outputs) -> Iterator[S
         yield VideoSink(outputs.video, frame_rate(recording, config))
     if outputs.plot is not None:
         yield SizePlot(outputs.plot)
+    if outputs.recording is not None:
+        from lcf_edge.sinks.recording import RecordingSink  # noqa: PLC0415  # loads the writer, so only when wanted
+
+        yield RecordingSink(outputs.recording, config, partial(lens_of, recording))
 
 
 def _terminal_columns() -> int:
@@ -108,13 +116,21 @@ def frame_rate(recording: Recording, config: Config) -> float:
     return float(np.clip(rate, _SLOWEST_VIDEO, _FASTEST_VIDEO))
 
 
-def _paced(recording: Recording, config: Config, pace: Pace) -> Iterator[tuple[Frame, Outcome]]:
-    """Yield each frame with its outcome, when it is due; in a loop lap after lap, each with an empty filter."""
+def _paced(recording: Recording, config: Config, pace: Pace, sinks: Sequence[Sink]) -> Iterator[tuple[Frame, Outcome]]:
+    """Yield each frame with its outcome, when it is due; in a loop lap after lap, each with an empty filter.
+
+    ``sinks`` get each sample.
+    """
+
+    def take(sample: ImuSample | SpeedSample) -> None:
+        for sink in sinks:
+            sink.put_sample(sample)
+
     for lap in count():
         if lap and not pace.loop:
             return
         begun: tuple[float, int] | None = None
-        for frame, outcome in run(recording, config):
+        for frame, outcome in run(recording, config, take):
             if pace.step and not _next_asked_for(frame):
                 return
             if pace.speed is not None and not pace.step:

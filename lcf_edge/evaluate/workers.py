@@ -115,10 +115,12 @@ def by_cluster(tasks: Sequence[Task], endpoint: str, say: Say) -> Iterator[Outco
 
 
 def _refuse_strangers(client: "Client", endpoint: str) -> None:
-    """Refuse workers of another version, whose results would differ."""
-    if not client.nthreads():
+    """Refuse workers of another version, whose results would differ. One that is lost meanwhile is not asked again."""
+    answers = client.run(_version, on_error="return")
+    versions = {worker: answer for worker, answer in answers.items() if not isinstance(answer, OSError)}
+    if not versions:
         raise LcfError(f"{endpoint}: the scheduler has no workers; start one: dask worker {endpoint}")
-    for worker, version in client.run(_version, on_error="return").items():
+    for worker, version in versions.items():
         if version != __version__:
             found = f"lcf-edge {version}" if isinstance(version, str) else "no working lcf-edge"
             raise LcfError(f"{worker}: {found} there, {__version__} here; install the same version on all workers")

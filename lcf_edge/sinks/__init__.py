@@ -1,8 +1,8 @@
 """Where scenes go: each output is a ``Sink`` (``sink``), used by ``replay`` and by the daemon alike.
 
-JSON lines (``results``), Zenoh (``scenes``), a video (``video``) of the two panels that ``overlay`` draws, a plot of
-the tables' sizes (``size_plot``). Sinks that only a running daemon has are in ``lcf_edge/daemon``: ``preview`` and
-``recorder``.
+JSON lines (``results``), Zenoh (``scenes``), MCAP (``recording``), a video (``video``) of the two panels that
+``overlay`` draws, a plot of the tables' sizes (``size_plot``). Sinks that only a running daemon has are in
+``lcf_edge/daemon``: ``preview`` and ``recorder``.
 """
 
 from pathlib import Path
@@ -12,6 +12,12 @@ from lcf_edge.errors import LcfError, UsageError
 
 class SinkError(LcfError):
     """An output that cannot be written."""
+
+
+def refuse_existing(path: Path) -> None:
+    """Raise ``UsageError`` for a name that is taken, where nothing may be overwritten."""
+    if path.exists():
+        raise UsageError(f"{path}: already exists; name another file, or remove it")
 
 
 def check_output(path: Path, suffixes: tuple[str, ...] = ()) -> None:

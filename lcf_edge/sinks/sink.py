@@ -48,7 +48,11 @@ class Sink(ABC):
         """Start threads, if it has some."""
 
     def put_sample(self, sample: ImuSample | SpeedSample) -> None:
-        """Take a sample that the pipeline got, stamped by the monotonic clock. Never wait, never raise."""
+        """Take a sample that the pipeline got.
+
+        In the daemon it is stamped by the monotonic clock; never wait, never raise. Raises ``SinkError``, ``CdrError``
+        in a replay.
+        """
 
     def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
         """Take how each part of the daemon is, once a second, as of ``stamp_ns`` of the monotonic clock."""

@@ -40,24 +40,31 @@ Label = tuple[float, float, str, Colour]
 
 
 def encode_image_annotations(scene: Scene) -> bytes:
+    """Encode what ``write_image_annotations`` writes. Raises ``CdrError``."""
+    return write_image_annotations(scene).payload()
+
+
+def write_image_annotations(scene: Scene) -> Writer:
     """Normal circles green, rebels red, ψ yellow; objects orange (will probably be met) or light blue, with text.
 
-    The stamp is that of the scene and comes first, as in messages that begin with a header. What has no finite
-    position is left out. Raises ``CdrError``.
+    The stamp is that of the scene. It comes first, as in messages that begin with a header; programs older than that
+    field go by the stamp of each annotation, which is the same. What has no finite position is left out. Raises
+    ``CdrError``.
     """
     rings, boxes, labels = _shapes(scene)
     writer = Writer()
     writer.stamp(scene.stamp_ns)
     writer.scalars("I", len(rings))
     for x, y, radius, colour, thickness in rings:
-        writer.scalars("iI", 0, 0)  # the stamp of the whole message counts
+        writer.stamp(scene.stamp_ns)
         writer.scalars("12d", x + CENTRE_PX, y + CENTRE_PX, 2 * radius, thickness, *NOTHING, *colour)
         writer.scalars("I", 0)  # metadata: none
     writer.scalars("I", len(boxes))
     for x, y, width, height, colour, thickness in boxes:
         left, right = x + CENTRE_PX - width / 2, x + CENTRE_PX + width / 2
         top, bottom = y + CENTRE_PX - height / 2, y + CENTRE_PX + height / 2
-        writer.scalars("iIB", 0, 0, _LINE_LOOP)
+        writer.stamp(scene.stamp_ns)
+        writer.scalars("B", _LINE_LOOP)
         writer.scalars("I", 4)
         writer.scalars("12d", left, top, right, top, right, bottom, left, bottom, *colour)
         writer.scalars("I", 0)  # a colour of each line: none
@@ -65,13 +72,13 @@ def encode_image_annotations(scene: Scene) -> bytes:
         writer.scalars("I", 0)
     writer.scalars("I", len(labels))
     for x, y, text, colour in labels:
-        writer.scalars("iI", 0, 0)
+        writer.stamp(scene.stamp_ns)
         writer.scalars("2d", x + CENTRE_PX, y + CENTRE_PX - LETTERS_ABOVE_PX)
         writer.string(text)
         writer.scalars("9d", FONT_PX, *colour, *SHADE)
         writer.scalars("I", 0)
     writer.scalars("I", 0)
-    return writer.payload()
+    return writer
 
 
 def _shapes(scene: Scene) -> tuple[list[Ring], list[Box], list[Label]]:

@@ -35,6 +35,15 @@ def test_every_topic_is_one_that_is_recorded_or_published() -> None:
     assert {"/lcf/annotations", "/lcf/markers", "/lcf/diagnostics", "/lcf/scene"} <= named
 
 
+def test_a_picture_waits_for_nothing_else() -> None:
+    """A lens may be unknown, and programs that pair by the stamps of annotations have none where nothing is found."""
+    images = [panel["imageMode"] for name, panel in PANELS.items() if name.startswith("Image!")]
+    assert [(each["imageTopic"], each["synchronize"], "calibrationTopic" in each) for each in images] == [
+        ("/lcf/camera/image_raw/compressed", False, False),
+        ("/lcf/preview/compressed", False, False),
+    ]
+
+
 @pytest.mark.parametrize("path", [one["value"] for panel in PANELS.values() for one in panel.get("paths", [])])
 def test_every_plot_shows_a_field_that_there_is(path: str) -> None:
     ros = get_typestore(Stores.EMPTY)

@@ -3,7 +3,7 @@
 A message waits with a stamp of the monotonic clock, which the file replaces by one of the system clock.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -17,7 +17,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.messages import PipelineScene
 from lcf_edge.standard_messages import camera_transform, image_annotations, markers
 from lcf_edge.standard_messages.camera_transform import encode_camera_transform
-from lcf_edge.standard_messages.image_annotations import encode_image_annotations
+from lcf_edge.standard_messages.image_annotations import write_image_annotations
 from lcf_edge.standard_messages.markers import encode_markers
 from lcf_edge.standard_messages.positions import Setup
 
@@ -62,6 +62,7 @@ class RecordedMessage:
     topic: RecordedTopic
     stamp_ns: int  # monotonic
     payload: bytes
+    stamps: Iterable[int] = cdr.FIRST  # where in the payload its stamp is, of topics that are stamped
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,7 +75,7 @@ class FrameAndScene:
 
 @dataclass(frozen=True, slots=True)
 class Statuses:
-    """The state of each part of the program."""
+    """The state of each part of the program; of none in a replay."""
 
     stamp_ns: int  # monotonic
     statuses: Sequence[DeviceStatus]
@@ -102,7 +103,8 @@ class Encoder:
                 )
                 yield RecordedMessage(IMAGES, frame.stamp_ns, self._image(frame))
                 yield RecordedMessage(SCENE, frame.stamp_ns, cdr.encode_scene(scene, publish.frame_id))
-                yield RecordedMessage(ANNOTATIONS, frame.stamp_ns, encode_image_annotations(scene))
+                drawn = write_image_annotations(scene)
+                yield RecordedMessage(ANNOTATIONS, frame.stamp_ns, drawn.payload(), drawn.stamps)
                 setup = self._setup(scene.image_width, scene.image_height)
                 yield RecordedMessage(MARKERS, frame.stamp_ns, encode_markers(replace(scene, stamp_ns=0), setup))
             case ImuSample():
@@ -114,7 +116,8 @@ class Encoder:
                     SPEED, stamp_ns, cdr.encode_twist_stamped(0, "base_link", speed_mps, yaw_rate_radps)
                 )
             case Statuses(stamp_ns, statuses):
-                yield RecordedMessage(DIAGNOSTICS, stamp_ns, cdr.encode_diagnostics(0, publish.robot, statuses))
+                if statuses:
+                    yield RecordedMessage(DIAGNOSTICS, stamp_ns, cdr.encode_diagnostics(0, publish.robot, statuses))
                 camera = self.config.camera
                 place = Setup.from_config(self.config, Lens.from_config(camera, camera.width, camera.height))
                 yield RecordedMessage(TRANSFORM, stamp_ns, encode_camera_transform(0, place))

@@ -69,7 +69,9 @@ class RecordingFile:
     def add(self, message: RecordedMessage) -> None:
         """Append a message. Raises ``CdrError`` for an invalid stamp."""
         stamp_ns = message.stamp_ns + self._offset_ns
-        payload = restamped(message.payload, stamp_ns) if message.topic.is_stamped else message.payload
+        payload = message.payload
+        if message.topic.is_stamped:
+            payload = restamped(payload, stamp_ns, message.stamps)
         self._writer.add_message(self._channels[message.topic], _written(stamp_ns), payload, _written(stamp_ns))
         self._in_chunk_bytes += len(payload)
 

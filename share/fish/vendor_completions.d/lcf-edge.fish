@@ -51,7 +51,7 @@ function _shtab_lcf_edge_using
 end
 
 set -g _shtab_lcf_edge_commands demo bench replay evaluate run record watch foxglove gate view doctor calibrate 'calibrate camera' 'calibrate imu' 'calibrate foe' 'calibrate time' 'calibrate mask' config
-set -g _shtab_lcf_edge_opts_with_value --against --board --config --connect --duration --from --jobs --listen --model --out --plot --polygon --port --prefix --print-board --report --scheduler --seconds --set --snap --speed --start --tls --to --truth --video --views --zenoh-config -c -o
+set -g _shtab_lcf_edge_opts_with_value --against --board --config --connect --duration --from --jobs --listen --mcap --model --out --plot --polygon --port --prefix --print-board --report --scheduler --seconds --set --snap --speed --start --tls --to --truth --video --views --zenoh-config -c -o
 
 complete -c lcf-edge -e
 complete -c lcf-edge -f
@@ -77,6 +77,7 @@ complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l step -d 'pause at each
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -s o -x -d 'one JSON line a frame; - is standard output'
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l video -xka "(__fish_complete_path (commandline -ct))" -d 'video of what the filter saw, two panels; or .mp4'
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l plot -xka "(__fish_complete_path (commandline -ct))" -d 'plot of the rows in use of each table'
+complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l mcap -xka "(__fish_complete_path (commandline -ct))" -d 'a recording with what was found in it, for Foxglove and ROS 2'
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l publish -d 'publish each scene over Zenoh'
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay' -l realtime -d 'at the recording'"'"'s own pace: --speed 1'
 complete -c lcf-edge -n '_shtab_lcf_edge_using replay; and test $_shtab_lcf_edge_npos -eq 0' -ka "(__fish_complete_path (commandline -ct))" -d 'ASL folder, MCAP file, video or images'

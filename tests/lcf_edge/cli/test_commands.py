@@ -22,12 +22,15 @@ import cv2
 import numpy as np
 import pytest
 import zenoh
+from rosbags.highlevel import AnyReader
 
+from drivers.samples import Frame
 from lcf_edge.cdr import decode_scene
 from lcf_edge.cli.command_line import main
 from lcf_edge.cli.findings import findings
-from lcf_edge.config import Publish, Zenoh, load
+from lcf_edge.config import Config, Publish, Zenoh, load
 from lcf_edge.messages import CIRCLE, PSI_REGION, Cause, Scene
+from lcf_edge.recording.read import open_recording
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.scenes import ObjectTruth, Truth
 from lcf_edge.zenoh_link import ScenePublisher, open_session
@@ -229,6 +232,10 @@ def replayed(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
         "overlay.webm",
         "--plot",
         "sizes.png",
+        "--mcap",
+        "found.mcap",
+        "--set",
+        "record.format=png",
         cwd=folder,
     )
     return done, folder
@@ -267,6 +274,58 @@ def without_timing(line: bytes) -> dict[str, object]:
     return {name: value for name, value in json.loads(line).items() if name != "timing_us"}
 
 
+def test_the_recording_of_a_replay_holds_all_that_went_in_and_what_was_found(
+    recording: Path, replayed: tuple[Done, Path]
+) -> None:
+    """To a reader that knows nothing of this program; picture, scene and annotations by the same stamp."""
+    stamps_ns: dict[str, list[int]] = {}
+    drawn = 0
+    with AnyReader([replayed[1] / "found.mcap"]) as reader:
+        for connection, log_time_ns, raw in reader.messages():
+            stamps_ns.setdefault(connection.topic, []).append(log_time_ns)
+            if connection.topic == "/lcf/annotations":
+                message: Any = reader.deserialize(raw, connection.msgtype)
+                drawn += len(message.circles)
+                assert message.timestamp.sec * 10**9 + message.timestamp.nanosec == log_time_ns
+    seen = [item for item in open_recording(recording, Config()) if isinstance(item, Frame)]
+    for topic in ("camera/image_raw/compressed", "camera/camera_info", "scene", "annotations", "markers"):
+        assert stamps_ns.pop(f"/lcf/{topic}") == [frame.stamp_ns for frame in seen]
+    assert stamps_ns.pop("/tf_static") == [frame.stamp_ns for frame in seen[::10]]
+    folder = recording / "mav0"
+    for topic, samples in (("imu", folder / "imu0/data.csv"), ("speed", folder / "odom0/data.csv")):
+        rows = [line for line in samples.read_text().splitlines() if line[0].isdigit()]
+        assert stamps_ns.pop(f"/lcf/{topic}") == [int(row.partition(",")[0]) for row in rows]
+    assert (stamps_ns, drawn > 0) == ({}, True)
+
+
+def test_replayed_itself_it_gives_the_same(replayed: tuple[Done, Path]) -> None:
+    found = replayed[1] / "found.mcap"
+    again = lcf_edge("replay", found, "-c", found, "-o", "-").stdout.encode().splitlines()
+    written = (replayed[1] / "results.jsonl").read_bytes().splitlines()
+    assert list(map(without_timing, again)) == list(map(without_timing, written))
+
+
+def test_a_recording_that_is_there_is_kept(refused: Refused, recording: Path, replayed: tuple[Done, Path]) -> None:
+    found = replayed[1] / "found.mcap"
+    kept = found.read_bytes()
+    refused("replay", recording, "--mcap", found, status=2, parts=("found.mcap: already exists",))
+    assert found.read_bytes() == kept
+
+
+def test_a_disk_that_takes_no_more_of_a_recording_is_one_line(recording: Path, tmp_path: Path) -> None:
+    done = subprocess.run(
+        ["sh", "-c", 'ulimit -f 1; exec "$@"', "sh", *COMMAND, "replay", str(recording), "--mcap", "found.mcap"],
+        capture_output=True,
+        text=True,
+        timeout=PATIENCE_S,
+        check=False,
+        cwd=tmp_path,
+        env={**os.environ, "PYTHONDONTWRITEBYTECODE": "1"},
+    )
+    assert (done.returncode, done.stdout) == (1, "")
+    assert is_one_line(done.stderr, "found.mcap: cannot be written (File too large)")
+
+
 def test_results_on_standard_output_are_the_same_and_the_summary_steps_aside(
     recording: Path, replayed: tuple[Done, Path]
 ) -> None:
@@ -291,6 +350,9 @@ def test_settings_reach_the_filter(recording: Path) -> None:
         (("{recording}", "--video", "x.xyz"), 2, ("x.xyz", ".webm")),
         (("{recording}", "--plot", "nowhere/x.png"), 1, ("nowhere/x.png: cannot be written",)),
         (("{recording}", "--plot", "x.txt"), 2, ("x.txt", ".png")),
+        (("{recording}", "--mcap", "nowhere/x.mcap"), 1, ("nowhere/x.mcap: cannot be written",)),
+        (("{recording}", "--mcap", "x.txt"), 2, ("x.txt", ".mcap")),
+        (("{recording}", "--mcap", "x.mcap", "--loop"), 2, ("x.mcap", "--loop")),
         (("{recording}", "--set", "filter.tr_max=1"), 2, ("filter.tr_s",)),
         (("{recording}", "--publish", "--set", 'zenoh.listen=["bogus/1"]'), 1, ("bogus/1",)),
     ],

@@ -1,16 +1,19 @@
 """A corpus on a Dask cluster: a scheduler and two workers, each a process of its own."""
 
+import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
 from distributed import Client
 
+from lcf_edge import __version__
 from lcf_edge.cli.command_line import main
 from lcf_edge.config import Config
 from lcf_edge.errors import LcfError
@@ -85,6 +88,24 @@ def test_when_a_worker_is_killed_in_the_middle_the_other_does_its_part(cluster: 
     assert isinstance(here, Done)
     assert set(outcomes) == {task.name for task in tasks}
     assert all(isinstance(done, Done) and done.frames == here.frames for done in outcomes.values())
+
+
+def test_so_it_does_when_one_is_killed_at_the_beginning(
+    monkeypatch: pytest.MonkeyPatch, cluster: Cluster, drive: Path, tmp_path: Path
+) -> None:
+    """While the workers are asked for their version."""
+    mark = tmp_path / "killed"
+
+    def version() -> str:
+        with suppress(FileExistsError):
+            mark.touch(exist_ok=False)
+            os.kill(os.getpid(), signal.SIGKILL)
+        return __version__
+
+    monkeypatch.setattr("lcf_edge.evaluate.workers._version", version)
+    ((_, done),) = by_cluster([Task("drive", drive, Config())], cluster.endpoint, quiet)
+    assert isinstance(done, Done)
+    assert mark.exists()
 
 
 def test_the_command_writes_the_same_report_as_without_a_cluster(

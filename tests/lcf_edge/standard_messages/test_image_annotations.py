@@ -28,6 +28,13 @@ def test_the_stamp_is_that_of_the_image(drawn: Callable[..., Any]) -> None:
     assert stamp.sec * 10**9 + stamp.nanosec == 1_700_000_000_123_456_789
 
 
+def test_so_is_that_of_each_annotation(drawn: Callable[..., Any]) -> None:
+    """Programs that do not know the stamp of the whole message pair picture and annotations by these."""
+    message = drawn()
+    stamps = {(one.timestamp.sec, one.timestamp.nanosec) for one in (*message.circles, *message.points, *message.texts)}
+    assert stamps == {(message.timestamp.sec, message.timestamp.nanosec)}
+
+
 def test_circles_lie_at_their_centre_in_pixels_that_begin_at_the_corner(drawn: Callable[..., Any]) -> None:
     """Our pixel 100 is from 100 to 101 for Foxglove, its centre 100.5."""
     normal, incoming, crossing, psi = drawn().circles

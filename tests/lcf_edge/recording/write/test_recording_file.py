@@ -50,6 +50,11 @@ def test_independent_readers_find_all_messages(whole: Path, recorded: Any, by_ro
             continue
         stamp = one.message.header.stamp if hasattr(one.message, "header") else one.message.timestamp
         assert stamp.sec * 10**9 + stamp.nanosec == one.log_time_ns
+    drawn = [(one.log_time_ns, one.message) for one in read if one.topic == "/lcf/annotations"]
+    for log_time_ns, message in drawn:
+        for each in (*message.circles, *message.points, *message.texts):
+            assert each.timestamp.sec * 10**9 + each.timestamp.nanosec == log_time_ns
+    assert all(message.circles and message.points and message.texts for _, message in drawn)
     with whole.open("rb") as file:
         reader = make_reader(file)
         assert reader.get_header().profile == "ros2"
