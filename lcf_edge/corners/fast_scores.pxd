@@ -1,7 +1,7 @@
 cimport cython
 
 cdef int REACH_PX, BLOCK
-cdef unsigned long long LOW_BITS, HIGH_BITS, ONES
+cdef unsigned long long LOW_BITS, HIGH_BITS, ONES, PLACES
 
 cdef class Scores:
     cdef int width, dark
@@ -12,9 +12,9 @@ cdef class Scores:
     cdef unsigned char[:, ::1] around, least, best
 
 @cython.locals(at=cython.Py_ssize_t, down=cython.Py_ssize_t, one=cython.uchar, other=cython.uchar, grey=cython.uchar,
-               bright=cython.uchar, dark=cython.uchar)
+               bright=cython.uchar, dark=cython.uchar, above=cython.uchar, below=cython.uchar)
 cpdef void bound(Scores scores, const unsigned char[::1] image) noexcept nogil
-@cython.locals(i=cython.int, part=cython.int, above=cython.int, start=cython.int, corners=cython.int, x=cython.int,
+@cython.locals(i=cython.int, part=cython.int, above=cython.int, start=cython.int, corners=cython.int, row=cython.int,
                y=cython.int, at=cython.int, least=cython.int, left=cython.int, top=cython.int, right=cython.int, bottom=cython.int)
 cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int on_dark,
                const int[:, ::1] parts, int[:, ::1] pixel, float[::1] strength) noexcept nogil
@@ -22,7 +22,7 @@ cpdef int find(Scores scores, const unsigned char[::1] image, int threshold, int
 cdef bint is_dark(Scores scores, const unsigned char[::1] image, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(y=cython.int, first=cython.int, last=cython.int, w=cython.int, at=cython.int, count=cython.int,
                word=cython.ulonglong, next_word=cython.ulonglong, high=cython.ulonglong,
-               add=cython.ulonglong, hits=cython.int, k=cython.int, start=cython.int)
+               lowest=cython.ulonglong, add=cython.ulonglong, hits=cython.int, k=cython.int)
 cdef int list_above(Scores scores, int threshold, int left, int top, int right, int bottom) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, k=cython.Py_ssize_t, at=cython.Py_ssize_t, first=cython.Py_ssize_t,
                second=cython.Py_ssize_t, third=cython.Py_ssize_t, fourth=cython.Py_ssize_t, count=cython.Py_ssize_t,

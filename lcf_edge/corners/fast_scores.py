@@ -25,6 +25,7 @@ RING_PX = (
 REACH_PX = 3
 BLOCK = 256  # pixels scored at once
 LOW_BITS, HIGH_BITS, ONES = 0x7F7F7F7F7F7F7F7F, 0x8080808080808080, 0x0101010101010101  # of 8 octets in a word
+PLACES = 0x0001020304050607  # times the lowest bit of an octet: which octet it is, in the highest one
 
 
 class Scores:
@@ -63,7 +64,8 @@ def bound(scores: Scores, image: Column) -> None:
         one, other = image[at - 2 * down + 2], image[at + 2 * down - 2]
         bright, dark = min(bright, max(one, other)), max(dark, min(one, other))
         grey = image[at]
-        plane[at] = max(max(bright, grey) - grey, grey - min(dark, grey))
+        above, below = max(bright, grey) - grey, grey - min(dark, grey)  # in variables of 8 bits: 16 px at once
+        plane[at] = max(above, below)
 
 
 def find(
@@ -87,14 +89,15 @@ def find(
         while start < above:
             corners = score_block(scores, image, least, start, min(start + BLOCK, above), corners)
             start += BLOCK
+        y, row = top, top * scores.width
         for i in range(corners):
             at = scores.above[i]
+            while at >= row + scores.width:
+                y, row = y + 1, row + scores.width
             if scores.plane[at] <= threshold and image[at] >= scores.dark:
                 continue
-            y = at // scores.width
-            x = at - y * scores.width
-            if is_peak(scores, x, y, left, top, right, bottom):
-                pixel[found, 0], pixel[found, 1] = x, y
+            if is_peak(scores, at - row, y, left, top, right, bottom):
+                pixel[found, 0], pixel[found, 1] = at - row, y
                 strength[found] = scores.plane[at] - 1
                 found += 1
     return found
@@ -112,25 +115,29 @@ def is_dark(scores: Scores, image: Column, left: int, top: int, right: int, bott
 
 
 def list_above(scores: Scores, threshold: int, left: int, top: int, right: int, bottom: int) -> int:
-    """List the pixels of a part that are above the threshold in ``above``. Return how many there are.
+    """List the pixels of a part that are above the threshold, or above 127, in ``above``. Return how many there are.
 
     Entries are written before it is known whether they stay: a branch that cannot be guessed would take longer.
     """
-    count, words, plane, found, some = 0, scores.words, scores.plane, scores.above, scores.some
-    add = ONES * (127 - min(threshold, 127))
+    count, add = 0, ONES * (127 - min(threshold, 127))
     for y in range(top, bottom):
         first, last = y * scores.width + left, y * scores.width + right
         hits = 0
         for w in range(first // 8, (last + 7) // 8, 2):
-            word, next_word = words[w], words[w + 1]
-            some[hits] = w
+            word, next_word = scores.words[w], scores.words[w + 1]
+            scores.some[hits] = w
             high = ((word & LOW_BITS) + add) | word | ((next_word & LOW_BITS) + add) | next_word
             hits += high & HIGH_BITS != 0  # one of the 16 is above min(threshold, 127)
         for k in range(hits):
-            start = 8 * some[k]
-            for at in range(max(start, first), min(start + 16, last)):
-                found[count] = at
-                count += plane[at] > threshold
+            for w in range(scores.some[k], scores.some[k] + 2):
+                word = scores.words[w]
+                high = (((word & LOW_BITS) + add) | word) & HIGH_BITS
+                while high:  # its highest bit is set in each octet that is above
+                    lowest = high & -high
+                    at = 8 * w + (((lowest >> 7) * PLACES >> 56) & 7)
+                    scores.above[count] = at
+                    count += (at >= first) & (at < last)
+                    high ^= lowest
     return count
 
 

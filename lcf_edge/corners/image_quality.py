@@ -3,7 +3,7 @@
 import numpy as np
 import numpy.typing as npt
 
-from lcf_edge.corners.image_sums import brightness, fine_share
+from lcf_edge.corners.image_sums import brightness, fine_share_of_columns, fine_share_of_rows
 
 FEW_CORNERS = 40
 DARK = 25  # mean grey level
@@ -54,10 +54,9 @@ def sharpness(image: Grey) -> float:
     """
     height, width = image.shape
     pixels, first = np.ascontiguousarray(image).reshape(-1).data, LINE_STEP_PX // 2
-    rows, columns = len(range(first, height, LINE_STEP_PX)), len(range(first, width, LINE_STEP_PX))
     along = across = 1.0
-    if rows and width > FAR_PX:
-        along = fine_share(pixels, first * width, rows, LINE_STEP_PX * width, 1, width, FAR_PX)
-    if columns and height > FAR_PX:
-        across = fine_share(pixels, first, columns, LINE_STEP_PX, width, height, FAR_PX)
+    if height > first and width > FAR_PX:
+        along = fine_share_of_rows(pixels, width, height, first, LINE_STEP_PX, FAR_PX)
+    if width > first and height > FAR_PX:
+        across = fine_share_of_columns(pixels, width, height, first, LINE_STEP_PX, FAR_PX)
     return min(along, across)

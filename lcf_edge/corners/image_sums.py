@@ -40,22 +40,52 @@ def brightness(image: Column, width: int, height: int, step: int, least: int, in
     into[0], into[1] = total, bright
 
 
-def fine_share(image: Column, first: int, lines: int, between: int, step: int, length: int, far: int) -> float:
-    """Mean square difference of neighbours as a share of that of pixels ``far`` apart; of the latter at least 1.
+def fine_share_of_rows(image: Column, width: int, height: int, first: int, between: int, far: int) -> float:
+    """Mean square difference of neighbours in a row as a share of that of pixels ``far`` apart, which is at least 1.
 
-    Of ``lines`` lines that begin ``between`` px after each other, each of ``length`` pixels ``step`` px apart.
+    Of row ``first`` and every ``between``-th after it.
     """
     near_sum, far_sum = 0, 0
+    lines = (height - first + between - 1) // between
     for line in range(lines):
-        at = first + line * between
-        for _ in range(length - far):
-            near, away = image[at + step] - image[at], image[at + far * step] - image[at]
-            near_sum += near * near
-            far_sum += away * away
-            at += step
-        for _ in range(far - 1):
-            near = image[at + step] - image[at]
-            near_sum += near * near
-            at += step
-    near_mean = float(near_sum) / (lines * (length - 1))
-    return near_mean / max(float(far_sum) / (lines * (length - far)), 1.0)
+        at = (first + line * between) * width
+        near_sum += squares_along(image, at, at + 1, width - 1)
+        far_sum += squares_along(image, at, at + far, width - far)
+    return fine_share(near_sum, lines * (width - 1), far_sum, lines * (width - far))
+
+
+def fine_share_of_columns(image: Column, width: int, height: int, first: int, between: int, far: int) -> float:
+    """The same of column ``first`` and every ``between``-th after it, row by row as they lie in memory."""
+    near_sum, far_sum = 0, 0
+    lines = (width - first + between - 1) // between
+    for y in range(height - 1):
+        at = y * width + first
+        near_sum += squares_across(image, at, at + width, lines, between)
+        if y < height - far:
+            far_sum += squares_across(image, at, at + far * width, lines, between)
+    return fine_share(near_sum, lines * (height - 1), far_sum, lines * (height - far))
+
+
+def squares_along(image: Column, at: int, other: int, count: int) -> int:
+    """Sum of square differences of two runs of pixels."""
+    total = 0
+    for k in range(count):
+        difference = image[other + k] - image[at + k]
+        total += difference * difference
+    return total
+
+
+def squares_across(image: Column, at: int, other: int, count: int, between: int) -> int:
+    """The same of pixels that stand ``between`` px apart."""
+    total = 0
+    for _ in range(count):
+        difference = image[other] - image[at]
+        total += difference * difference
+        at += between
+        other += between
+    return total
+
+
+def fine_share(near_sum: int, near_count: int, far_sum: int, far_count: int) -> float:
+    """One mean as a share of the other, which is at least 1."""
+    return float(near_sum) / near_count / max(float(far_sum) / far_count, 1.0)

@@ -12,6 +12,7 @@ cdef double MIN_R_PX
 cdef class Baselines:
     cdef readonly double[:, ::1] h, rate_covariance
     cdef readonly double[::1] focus_x, focus_y, depth_m, elapsed_s, sigma_px
+    cdef double[::1] turned
     cdef public bint is_fitted
 
 cpdef void measure(Baselines baselines, KeyFrames keys, Homography h, Pinhole pinhole, Situation around) noexcept nogil
@@ -19,5 +20,5 @@ cpdef double then_x(Baselines baselines, Py_ssize_t slot, double x, double y) no
 cpdef double then_y(Baselines baselines, Py_ssize_t slot, double x, double y) noexcept nogil
 cpdef void turn(Baselines baselines, Py_ssize_t k, Pinhole pinhole, double x, double y, double z) noexcept nogil
 cpdef double turn_px(Pinhole pinhole, int axis, double x, double y, double cos, double sin) noexcept nogil
-@cython.locals(one=double, other=double, variance=double, i=int, j=int, t=double, own=double)
+@cython.locals(variance=double, i=int, j=int, t=double, own=double)
 cpdef double sigma_along(Baselines baselines, Pinhole pinhole, Py_ssize_t slot, double x, double y) noexcept nogil

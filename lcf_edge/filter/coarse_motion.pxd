@@ -52,13 +52,13 @@ cdef class CoarseMotion:
     cdef double[:, ::1] shares
     cdef double[::1] vx, vy, elapsed_s
 
-@cython.locals(k=cython.Py_ssize_t, i=int, j=int)
+@cython.locals(k=cython.Py_ssize_t, pixels=cython.Py_ssize_t, i=int, j=int)
 cpdef void take(CoarseMotion coarse, const unsigned char[::1] small) noexcept nogil
 @cython.locals(x=int, y=int, word=cython.ulonglong, grey=cython.ulonglong)
 cdef void lay_out(CoarseMotion coarse, const unsigned char[::1] picture, int first, unsigned long long[::1] words) noexcept nogil
 @cython.locals(i=int, j=int)
 cpdef void turn(CoarseMotion coarse, const double[:, :, ::1] rotation) noexcept nogil
-@cython.locals(k=cython.Py_ssize_t)
+@cython.locals(k=cython.Py_ssize_t, first=cython.Py_ssize_t, pixels=cython.Py_ssize_t)
 cpdef void keep(CoarseMotion coarse, int slot) noexcept nogil
 @cython.locals(i=int, j=int)
 cdef void turn_back(CoarseMotion coarse, Pinhole pinhole, const double[:, :, ::1] rotation, int k, KeyFrames keys) noexcept nogil

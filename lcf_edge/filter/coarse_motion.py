@@ -106,8 +106,9 @@ class CoarseMotion:
 
 def take(coarse: CoarseMotion, small: Bytes) -> None:
     """Take the next picture in small, row after row."""
-    for k in range(coarse.width * coarse.height):
-        coarse.now[k] = small[k]
+    now, pixels = coarse.now, coarse.width * coarse.height
+    for k in range(pixels):
+        now[k] = small[k]
     for k in range(coarse.words.shape[0]):
         coarse.words_last[k] = coarse.words[k]
     lay_out(coarse, coarse.now, 0, coarse.words)
@@ -139,8 +140,10 @@ def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
 def keep(coarse: CoarseMotion, slot: int) -> None:
     """This picture is that of the key frame in ``slot``."""
     coarse.keys = min(coarse.keys + 1, KEYS)
-    for k in range(coarse.width * coarse.height):
-        coarse.kept[slot * coarse.width * coarse.height + k] = coarse.now[k]
+    now, kept, pixels = coarse.now, coarse.kept, coarse.width * coarse.height
+    first = slot * pixels
+    for k in range(pixels):
+        kept[first + k] = now[k]
 
 
 def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int, keys: KeyFrames) -> None:

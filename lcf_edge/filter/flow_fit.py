@@ -213,7 +213,7 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
     for k in range(fit.count):
         fit.rest[k] = fit.drift[k]
     width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5, False, 0.0))
-    for _ in range(ROUNDS):
+    for turn in range(ROUNDS):
         least_squares.begin(fit.equations, UNKNOWNS)
         for i in range(3):
             least_squares.add_prior(fit.equations, i, NOISE_PX * NOISE_PX / (sigma_radps * sigma_radps))
@@ -221,12 +221,14 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
         least_squares.add_prior(fit.equations, FOCUS_Y, NOISE_PX * NOISE_PX / (fit.prior_y * fit.prior_y))
         for k in range(fit.count):
             set_row(fit, k)
+            if turn > 0:
+                fit.rest[k] = fit.drift[k] - explained(fit)  # by the round before
             least_squares.add(fit.equations, fit.share[k] * weight_of(fit.rest[k], width), fit.drift[k])
         least_squares.solve(fit.equations)
-        for k in range(fit.count):
-            set_row(fit, k)
-            fit.rest[k] = fit.drift[k] - explained(fit)
         width = max(MIN_WIDTH_PX, NARROWING * width)
+    for k in range(fit.count):
+        set_row(fit, k)
+        fit.rest[k] = fit.drift[k] - explained(fit)
 
 
 def turn_slot(

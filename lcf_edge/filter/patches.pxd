@@ -44,7 +44,7 @@ cdef class Patches:
     cdef readonly double[::1] x, y, scale, sigma, elapsed_s, depth_m, inverse, doubt
     cdef double[::1] first_x, first_y, half_px
     cdef readonly double[::1] contrast, unit
-    cdef double[::1] weight, sampled
+    cdef double[::1] weight, sampled, offset
     cdef readonly double[:, ::1] grey, across, down, inverted
     cdef double[:, ::1] growing, stretching, sums, coupled
     cdef readonly double[::1] alone, stretch
@@ -52,7 +52,6 @@ cdef class Patches:
 
 @cython.locals(k=int)
 cdef void weigh(Patches patches) noexcept nogil
-cdef double offset(int k) noexcept nogil
 cpdef void derotate(Patches patches, Homography h) noexcept nogil
 cpdef void predict(Patches patches, Situation around) noexcept nogil
 cdef bint locate(Patches patches, ImagePlane plane, double x, double y, double half) noexcept nogil

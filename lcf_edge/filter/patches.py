@@ -62,8 +62,8 @@ class Patches:
     ``alone``: what of the square of that they leave; ``contrast``: 1 sigma of ``grey``; ``unit``: sigma of the scale
     for a noise of one grey level.
 
-    ``weight`` of the samples. ``tried``: how far from the path a place was tried, px. The rest is what one comparison
-    gives.
+    ``weight`` of the samples; ``offset``: of a row or column of them from the middle, half sides. ``tried``: how far
+    from the path a place was tried, px. The rest is what one comparison gives.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -79,7 +79,7 @@ class Patches:
         self.sums, self.inverted = doubles(max(capacity, 1), 8), doubles(max(capacity, 1), 9)
         self.coupled = doubles(max(capacity, 1), 3)
         self.alone, self.stretch = [doubles(max(capacity, 1)) for _ in range(2)]
-        self.weight, self.sampled = doubles(SAMPLES), doubles(SAMPLES)
+        self.weight, self.sampled, self.offset = doubles(SAMPLES), doubles(SAMPLES), doubles(SIDE)
         self.u = self.v = self.right_u = self.right_v = self.down_u = self.down_v = 0.0
         self.mean = self.square = self.shared = 0.0
         self.on_across = self.on_down = self.on_growing = self.on_stretching = 0.0
@@ -89,18 +89,15 @@ class Patches:
 
 def weigh(patches: Patches) -> None:
     """A bell over the samples, their sum 1."""
+    for k in range(SIDE):
+        patches.offset[k] = (2.0 * k - (SIDE - 1)) / (SIDE - 1)
     total = 0.0
     for k in range(SAMPLES):
-        x, y = offset(k % SIDE), offset(k // SIDE)
+        x, y = patches.offset[k % SIDE], patches.offset[k // SIDE]
         patches.weight[k] = math.exp(-SHARPNESS * (x * x + y * y))
         total += patches.weight[k]
     for k in range(SAMPLES):
         patches.weight[k] /= total
-
-
-def offset(k: int) -> float:
-    """Place of a row or column of samples, in half sides from the middle."""
-    return (2.0 * k - (SIDE - 1)) / (SIDE - 1)
 
 
 # Where patches are
@@ -158,12 +155,13 @@ def locate(patches: Patches, plane: ImagePlane, x: float, y: float, half: float)
 
 def look(patches: Patches, image: Bytes, width: int) -> None:
     """The samples where the patch was placed, between four pixels each."""
+    middle_u, right_u, down_u = patches.u, patches.right_u, patches.down_u
+    middle_v, right_v, down_v = patches.v, patches.right_v, patches.down_v
     for row in range(SIDE):
-        y = offset(row)
+        y = patches.offset[row]
         for column in range(SIDE):
-            x = offset(column)
-            u = patches.u + x * patches.right_u + y * patches.down_u
-            v = patches.v + x * patches.right_v + y * patches.down_v
+            x = patches.offset[column]
+            u, v = middle_u + x * right_u + y * down_u, middle_v + x * right_v + y * down_v
             left, top = rounding.whole(u), rounding.whole(v)
             at = top * width + left
             share, below = u - left, v - top
@@ -357,8 +355,8 @@ def set_template(patches: Patches, p: int) -> bool:
         row, column = k // SIDE, k % SIDE
         weight, grey = patches.weight[k], patches.grey[p, k]
         x, y = slope(patches, p, k, column, 1) / spacing, slope(patches, p, k, row, SIDE) / spacing
-        grows = half * (x * offset(column) + y * offset(row))
-        stretches = half * (x * offset(column) - y * offset(row))
+        grows = half * (x * patches.offset[column] + y * patches.offset[row])
+        stretches = half * (x * patches.offset[column] - y * patches.offset[row])
         square += weight * grey * grey
         xx += weight * x * x
         xy += weight * x * y

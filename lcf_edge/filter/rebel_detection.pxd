@@ -34,6 +34,7 @@ cdef class Verdicts:
     cdef readonly int[::1] row, slot, near
     cdef int[::1] oldest
     cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
+    cdef double[::1] near_x, near_y, weight
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
     cdef double shared, ground, total
@@ -45,7 +46,8 @@ cdef double ground_outward(double y, double lever, Situation around) noexcept no
 cdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Situation around) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
 cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+@cython.locals(total=double, shared=double, ground=double)
+cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, Situation around, Settings settings) noexcept nogil
 cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef void find_incoming(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines, Settings settings) noexcept nogil

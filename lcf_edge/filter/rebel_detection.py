@@ -47,9 +47,9 @@ class Verdicts:
     it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
     per second, 1/s. ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
 
-    ``near``: rows that may stand near the path, with the inverse range of each (``inverse``, 1/m) and its sigma
-    (``doubt``). ``shared``, ``ground``, ``total``: what the neighbours of one of them tell together, see
-    ``ask_neighbours``.
+    ``near``: rows that may stand near the path, with the place of each (``near_x``, ``near_y``, px), its inverse range
+    (``inverse``, 1/m) and the sigma of that (``doubt``; ``weight``: 1/σ²). ``shared``, ``ground``,
+    ``total``: what the neighbours of one of them tell together, see ``ask_neighbours``.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -59,6 +59,7 @@ class Verdicts:
         self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
         self.mover, self.incoming = [octets(capacity) for _ in range(2)]
         self.sigma, self.inverse, self.doubt = [doubles(capacity) for _ in range(3)]
+        self.near_x, self.near_y, self.weight = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
 
@@ -147,30 +148,29 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
         verdicts.near[a] = j
         verdicts.inverse[a] = verdicts.outward[j] / lever
         verdicts.doubt[a] = sigma_px(verdicts, j, around) / lever
+        verdicts.weight[a] = 1 / (verdicts.doubt[a] * verdicts.doubt[a])
+        verdicts.near_x[a], verdicts.near_y[a] = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
 
 
-def ask_neighbours(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Settings) -> None:
     """1/Z of a candidate, and of the ground below, by least squares over its neighbours at a like depth.
 
     ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
     """
-    i = verdicts.row[verdicts.near[a]]
+    x, y, inverse, doubt = verdicts.near_x[a], verdicts.near_y[a], verdicts.inverse[a], verdicts.doubt[a]
     lowest_y = around.horizon_y - around.pinhole.focal * around.horizon_sigma_rad
-    verdicts.total = verdicts.shared = verdicts.ground = 0.0
+    reach2 = settings.neighbour_px * settings.neighbour_px
+    total = shared = ground = 0.0
     for b in range(verdicts.near_count):
-        k = verdicts.row[verdicts.near[b]]
-        dx, dy = edges.x[i] - edges.x[k], edges.y[i] - edges.y[k]
-        if dx * dx + dy * dy >= settings.neighbour_px * settings.neighbour_px:
+        dx, dy = x - verdicts.near_x[b], y - verdicts.near_y[b]
+        if dx * dx + dy * dy >= reach2:
             continue
-        apart = math.fabs(verdicts.inverse[a] - verdicts.inverse[b])
-        if apart >= ALIKE_SIGMAS * (verdicts.doubt[a] + verdicts.doubt[b]):
+        if math.fabs(inverse - verdicts.inverse[b]) >= ALIKE_SIGMAS * (doubt + verdicts.doubt[b]):
             continue
-        weight = 1 / (verdicts.doubt[b] * verdicts.doubt[b])
-        verdicts.total += weight
-        verdicts.shared += weight * verdicts.inverse[b]
-        verdicts.ground += weight * max(edges.y[k] - lowest_y, 0.0)
-    verdicts.shared /= verdicts.total
-    verdicts.ground /= verdicts.total
+        total += verdicts.weight[b]
+        shared += verdicts.weight[b] * verdicts.inverse[b]
+        ground += verdicts.weight[b] * max(verdicts.near_y[b] - lowest_y, 0.0)
+    verdicts.total, verdicts.shared, verdicts.ground = total, shared / total, ground / total
 
 
 def will_be_met(
@@ -211,7 +211,7 @@ def find_incoming(
         return
     near_path(verdicts, edges, baselines, around)
     for a in range(verdicts.near_count):
-        ask_neighbours(verdicts, a, edges, around, settings)
+        ask_neighbours(verdicts, a, around, settings)
         verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, baselines, around, settings) else 0
 
 

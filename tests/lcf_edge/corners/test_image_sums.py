@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from lcf_edge.corners.image_sums import brightness, compare, fine_share
+from lcf_edge.corners.image_sums import brightness, compare, fine_share_of_columns, fine_share_of_rows
 
 Grey = npt.NDArray[np.uint8]
 
@@ -36,9 +36,10 @@ def test_the_fine_share_is_that_of_rows_or_columns(noise: Callable[..., Grey]) -
     rows, columns = image[5::9].astype(float), image[:, 5::9].T.astype(float)
     shares = [(np.diff(each) ** 2).mean() / ((each[:, 4:] - each[:, :-4]) ** 2).mean() for each in (rows, columns)]
     flat = image.ravel().data
-    assert fine_share(flat, 5 * 61, len(rows), 9 * 61, 1, 61, 4) == pytest.approx(shares[0])
-    assert fine_share(flat, 5, len(columns), 9, 61, 47, 4) == pytest.approx(shares[1])
+    assert fine_share_of_rows(flat, 61, 47, 5, 9, 4) == pytest.approx(shares[0])
+    assert fine_share_of_columns(flat, 61, 47, 5, 9, 4) == pytest.approx(shares[1])
 
 
 def test_in_a_plain_picture_no_share_is_fine() -> None:
-    assert fine_share(np.full(100, 9, np.uint8).data, 0, 10, 10, 1, 10, 4) == 0
+    plain = np.full(100, 9, np.uint8).data
+    assert fine_share_of_rows(plain, 10, 10, 0, 1, 4) == fine_share_of_columns(plain, 10, 10, 0, 1, 4) == 0
