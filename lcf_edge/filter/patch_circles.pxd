@@ -43,11 +43,12 @@ cdef bint is_upright(Patches patches, Py_ssize_t p, Situation around) noexcept n
 cdef bint is_in_way(PatchGroups groups, Py_ssize_t g, Patches patches, bint is_known, Situation around) noexcept nogil
 cdef bint agree(Patches patches, Py_ssize_t p, Py_ssize_t q) noexcept nogil
 cdef void add(PatchGroups groups, Py_ssize_t g, Patches patches, Py_ssize_t p) noexcept nogil
-cdef bint gather(PatchGroups groups, Py_ssize_t p, Patches patches) noexcept nogil
+cdef void gather(PatchGroups groups, Py_ssize_t p, Patches patches) noexcept nogil
 cdef bint grows_evenly(PatchGroups groups) noexcept nogil
 cdef void claim(PatchGroups groups, Py_ssize_t p, Patches patches, int circle) noexcept nogil
 @cython.locals(nearest=int, least=double)
 cdef int circle_of(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint continues(PatchGroups groups, CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void tell(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 @cython.locals(seen=bint, is_shown=bint, is_known=bint, evicted=int, c=int)
 cdef int update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

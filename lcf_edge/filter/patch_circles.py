@@ -1,6 +1,7 @@
 """C_r from patches: what stands in the way and grows, though no corner of it tells so.
 
-Two patches at least must agree. Their circle is *incoming*; one that rebels show already is left to them.
+Two patches at least must agree to found a circle; one is enough to confirm it. It is *incoming*; one that rebels show
+already is left to them.
 """
 
 import math
@@ -148,8 +149,8 @@ def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
     groups.uneven += weight * patches.stretch[p] / patches.depth_m[p]
 
 
-def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
-    """The group of a patch and those that agree with it; False: none does."""
+def gather(groups: PatchGroups, p: int, patches: Patches) -> None:
+    """The group of a patch and those that agree with it."""
     shared.clear(groups.members, p)
     groups.left = groups.top = INFINITY
     groups.right = groups.bottom = -INFINITY
@@ -157,8 +158,6 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
     for q in range(patches.capacity):
         if agree(patches, p, q):
             add(groups, p, patches, q)
-    if groups.members.size[p] == 0:
-        return False
     add(groups, p, patches, p)
     groups.inverse /= groups.weight
     groups.uneven /= groups.weight
@@ -166,7 +165,6 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> bool:
     groups.members.x[p], groups.members.y[p] = groups.left + 0.5 * across, groups.top + 0.5 * down
     groups.members.variance_x[p] = across * across / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
     groups.members.variance_y[p] = down * down / (shared.EXTENT_SIGMAS * shared.EXTENT_SIGMAS)
-    return True
 
 
 def grows_evenly(groups: PatchGroups) -> bool:
@@ -198,6 +196,14 @@ def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Set
         if away < max(circles.radius[c], half) + settings.member_margin_px and away < least:
             nearest, least = c, away
     return nearest
+
+
+def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
+    """Whether a group is as far off as a circle that is known to be in the way."""
+    if c < 0 or circles.cause[c] != INCOMING or not circles.range[c] > 0:
+        return False
+    apart = math.fabs(groups.inverse - 1 / circles.range[c])
+    return apart < AGREE_SIGMAS / math.sqrt(groups.weight) + AGREE_SHARE * groups.inverse
 
 
 def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
@@ -235,9 +241,12 @@ def update(
         groups.obstacle[p] = 1 if seen and is_obstacle(patches, p, around) else 0
         groups.taken[p] = 0
     for p in range(patches.capacity):
-        if not groups.obstacle[p] or groups.taken[p] or not gather(groups, p, patches):
+        if not groups.obstacle[p] or groups.taken[p]:
             continue
+        gather(groups, p, patches)
         c = circle_of(groups, p, circles, settings)
+        if groups.members.size[p] < 2 and not continues(groups, circles, c):
+            continue
         is_known = c >= 0 and circles.cause[c] == INCOMING
         if not is_in_way(groups, p, patches, is_known, around) or (c < 0 and not grows_evenly(groups)):
             continue

@@ -63,6 +63,9 @@ cdef int MIN_THROUGH
 cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
+cdef double REMNANT_SHARE
+cdef double USUAL_S
+cdef double LEAVES_S
 cdef double LOSES_HZ
 cdef double FOOT_PX
 cdef double BORDER_PX
@@ -151,6 +154,8 @@ cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence ev
 @cython.locals(across=bint)
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
+cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
+cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 cdef void take_place(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil
@@ -168,4 +173,5 @@ cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns ci
 cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
+@cython.locals(remnant=bint, count=int)
 cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

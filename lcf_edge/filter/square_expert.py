@@ -66,6 +66,9 @@ OUTSIDE_S = 1.0  # beside the picture,
 COMING_S = 3.0  # and if it moves towards the path there;
 NEAR_S = 1.0  # where it is near,
 NEAR_M = 1.5
+REMNANT_SHARE = 0.33  # of the edges that lately showed what is that near: fewer do not tell how it moves,
+USUAL_S = 3.0  # where these are forgotten with this time constant,
+LEAVES_S = 0.5  # unless it will have left the picture so soon
 RESTING_S = 2.0  # where it stands, or is near, before a vehicle that stands, too,
 LINGERS_S = 6.0  # and if nothing is seen through it;
 THROUGH_S = 0.5  # what has kept its place in the picture for so long is
@@ -365,6 +368,7 @@ def least_row(objects: ObjectColumns) -> int:
 def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> None:
     """A new object. It is not told in its first frames: its numbers would be those of a few edges."""
     objects.active[o] = 1
+    objects.usual[o] = 0.0
     objects.id[o] = shared.new_id(ids)
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
@@ -767,6 +771,27 @@ def is_behind(objects: ObjectColumns, o: int) -> bool:
     return False
 
 
+def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, around: Situation) -> bool:
+    """Whether so few of the edges are left that lately showed an object that they do not tell how it moves.
+
+    What is very near loses its corners, and the last ones may lie on a limb, or on something else: its range would
+    seem to grow while it comes closer. What is about to leave the picture loses them by that, and still tells; what
+    rests before a vehicle that does shows few.
+    """
+    objects.usual[o] = max(objects.usual[o] * math.exp(-around.dt_s / USUAL_S), count)
+    if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.usual[o]:
+        return False
+    if math.fabs(around.speed_mps) < RESTS_MPS:
+        return False
+    way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
+    return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
+
+
+def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
+    """For how long an object is remembered that was lost near: until the vehicle is there."""
+    return min(max(objects.range[o] / max(math.fabs(around.speed_mps), SLOW_MPS), NEAR_S), LINGERS_S)
+
+
 def go_on(
     objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
 ) -> None:
@@ -786,7 +811,7 @@ def go_on(
     elif math.fabs(around.speed_mps) < SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
     elif objects.range[o] < NEAR_M:
-        patience_s = NEAR_S
+        patience_s = near_s(objects, o, around)
     if objects.unseen_s[o] > patience_s:
         objects.trust[o] -= around.dt_s * LOSES_HZ
     if objects.trust[o] < settings.tr_cr:
@@ -1001,18 +1026,21 @@ def update(
     for o in range(objects.capacity):
         if not objects.active[o]:
             continue
-        if squares.wholes.count[o] >= MIN_EDGES:
+        count = squares.wholes.count[o]
+        remnant = count >= MIN_EDGES and is_remnant(objects, o, count, plane, around)
+        if count >= MIN_EDGES:
             objects.unseen_s[o], objects.state[o] = 0.0, SEEN
-            objects.support[o] = squares.wholes.count[o]
+            objects.support[o] = count
             believed = belief_in(objects, o, squares.wholes, around, settings)
             objects.trust[o] = edge_equations.change_trust(objects.trust[o], believed, settings.tr_max)
             if objects.trust[o] < settings.tr_cr and objects.age_s[o] > 0:
                 objects.active[o] = 0
                 continue
-            show(objects, o, squares.wholes, around)
-            if objects.age_s[o] == 0:
-                forget_motion(objects, o)
-            observe(objects, o, squares.wholes, around)
+            if not remnant:
+                show(objects, o, squares.wholes, around)
+                if objects.age_s[o] == 0:
+                    forget_motion(objects, o)
+                observe(objects, o, squares.wholes, around)
         elif squares.resting[o] >= MIN_EDGES:
             objects.unseen_s[o], objects.state[o] = 0.0, SEEN
             objects.looming[o] = objects.sideways[o] = 0.0
@@ -1020,7 +1048,7 @@ def update(
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
             go_on(objects, o, edges, plane, around, settings)
         collect_evidence(squares.evidence, objects, o, plane, around)
-        if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or rests(objects, o, around)):
+        if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or remnant or rests(objects, o, around)):
             coast(objects, o, squares.evidence, around)
         elif math.isfinite(around.speed_mps):
             range_belief.consider(squares.belief, squares.evidence, around)

@@ -55,6 +55,24 @@ def test_at_the_rim_of_the_way_it_is_told_without_a_gap() -> None:
     assert all(told[told.index(True) :])
 
 
+def test_what_two_patches_have_founded_one_confirms() -> None:
+    """Patches end after a while, and blur loses some: a circle is not founded anew each time."""
+    tables, board = LineCircleFilter(CONFIG, LENS), Board()
+    patches, rebel, alone, frames = tables.patches, tables.rebel, -1, 0
+    for seq, (corners, motion, image) in enumerate(board):
+        tables.step(corners, motion, image)
+        if alone >= 0 and not patches.active[alone]:
+            break
+        told = (rebel.active & (rebel.trust >= CONFIG.filter.tr_s)).any()
+        if alone < 0 and told and board.distance_m(seq) < 0.9 * VEHICLE.horizon_s * board.speed_mps:
+            alone = int(np.flatnonzero(np.asarray(patches.circle) >= 0)[0])
+        if alone >= 0:
+            np.asarray(patches.active)[np.arange(patches.capacity) != alone] = 0
+            frames += 1
+            assert told
+    assert frames > 10
+
+
 LEVEL = Config(vehicle=VEHICLE, camera=Camera(height_m=0.45))
 TILTED = Config(vehicle=VEHICLE, camera=Camera(height_m=0.45, pitch_rad=-0.05))  # which is wrong
 
