@@ -10,7 +10,7 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``flow``             directions, flow lines, the ideal camera, rotations as homographies
 ``key_frames``       how the vehicle has turned and moved since each key frame
 ``heading``          where it heads in the camera's axes: the mounting, learnt, and how the camera shakes
-``situation``        the vehicle at this instant: where it heads in the picture, what it is, how it moves
+``situation``        the vehicle at this instant: where it heads in the image, what it is, how it moves
 ``path``             its path over the ground: how far beside it something lies, and how long the way to it is
 ``image_plane``      where a position of the ideal pinhole is seen through the lens
 ``least_squares``    of a few unknowns
@@ -21,9 +21,9 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``leaps``            where whole parts of the image lost their corners: a leap that they share
 ``edge_equations``   the Circle expert's equations for edges: prediction, the five classes λ*, updates, trust
 ``edge_expert``      applies them to the table
-``baselines``        what the displacement since each key frame implies for this picture
+``baselines``        what the displacement since each key frame implies for this image
 ``flow_fit``         what all edges together tell of the camera: errors of its rotation, and of O
-``rest``             whether the vehicle stands, as the picture tells
+``rest``             whether the vehicle stands, as the image tells
 ``ground_speed``     how fast the vehicle is, as the ground tells
 ``rebel_detection``  what breaks the flow over a chain of key positions, as equations
 ``alpha``            applies them: chains become rebel edges, rebels that obey go home
@@ -33,7 +33,7 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``group_motion``     how edges that go together move: mean velocity and rate of expansion
 ``patches``          pieces of the image near the path, followed for seconds
 ``patch_circles``    C_r from patches that grow
-``coarse_motion``    pieces of the picture in small that move by themselves
+``coarse_motion``    pieces of the image in small that move by themselves
 ``coarse_circles``   C_r from those that go together
 ``turmoil``          C_r where corners come and go and none can be followed
 ``range_belief``     what an object's motion says about its range and its motion over ground

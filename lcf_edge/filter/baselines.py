@@ -1,4 +1,4 @@
-"""What the displacement since each key frame implies for this picture: where standing points may have gone."""
+"""What the displacement since each key frame implies for this image: where standing points may have gone."""
 
 import math
 
@@ -64,7 +64,7 @@ def turn(baselines: Baselines, k: int, pinhole: Pinhole, x: float, y: float, z: 
     """A small rotation, rad about each axis, comes on top of that since key frame ``k``: H ← K·R·K⁻¹·H."""
     fx, fy, cx, cy = pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy
     for j in range(3):
-        # to rays, turned, and back to the picture
+        # to rays, turned, and back to the image
         across, down, ahead = baselines.h[k, j], baselines.h[k, 3 + j], baselines.h[k, 6 + j]
         u, v = (across - cx * ahead) / fx, (down - cy * ahead) / fy
         turned_u, turned_v, turned_w = u - z * v + y * ahead, z * u + v - x * ahead, ahead - y * u + x * v

@@ -1,4 +1,4 @@
-"""Circle expert, C_r from coarse motion: pieces of the picture in small that touch and move alike."""
+"""Circle expert, C_r from coarse motion: pieces of the image in small that touch and move alike."""
 
 import math
 
@@ -12,7 +12,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-LINKS = 3  # pictures, through which the motion of a piece has led;
+LINKS = 3  # images, through which the motion of a piece has led;
 MIN_S = 0.19  # and for so long that of
 MIN_PIECES = 2
 MANY_PIECES = 6  # so many need not have moved for as long
@@ -38,7 +38,7 @@ class CoarseGroups:
 
 
 def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
-    """Each piece whose motion has led through pictures enough is a group; False: there is none."""
+    """Each piece whose motion has led through images enough is a group; False: there is none."""
     is_any = False
     for k in range(coarse.columns * coarse.rows):
         linked = coarse.links[k] >= LINKS

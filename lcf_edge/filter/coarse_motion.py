@@ -1,9 +1,9 @@
-"""Coarse motion: pieces of the picture that move by themselves, found in the picture in small.
+"""Coarse motion: pieces of the image that move by themselves, found in the image in small.
 
-What crosses fast is elsewhere in the next picture, and what is dark or plain has few corners that are found again. In
+What crosses fast is elsewhere in the next image, and what is dark or plain has few corners that are found again. In
 small, noise averages out and outlines remain. A piece that is not where it would have been if it stood still, however
 near or far off, is sought all around, in the frame before and in an older key frame, which shows slower motion. Its
-motion counts if it leads from picture to picture, as in α.
+motion counts if it leads from image to image, as in α.
 """
 
 import math
@@ -23,7 +23,7 @@ from lcf_edge.lens import Lens
 WINDOW = 8  # small px along a side of a piece
 PIXELS = 64
 STEP = 4  # small px from piece to piece
-REACH_SHARE = 0.16  # of the picture's width, by which a piece may have moved across,
+REACH_SHARE = 0.16  # of the image's width, by which a piece may have moved across,
 DOWN_SHARE = 0.5  # and down, as a share of that
 NEAREST_M = 0.25  # depth below which nothing is expected to stand
 ANY_WAY_M = 1e3  # driven, where the speed is unknown: what stands may have come any way from O
@@ -40,7 +40,7 @@ RING_LIKENESS = 1.25  # this factor,
 RING_GREY = 0.5  # and so much a pixel
 MAX_SEEN = 40  # pieces in a frame that are sought where they would stand,
 MAX_SEARCHES = 20  # and all around
-SLOW_S = 0.3  # the older picture is no older than this,
+SLOW_S = 0.3  # the older image is no older than this,
 MIN_SLOW_S = 0.1  # nor younger
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
 SAME_SHARE = 0.25  # and by this share
@@ -49,15 +49,15 @@ WORST = 256 * 64
 
 
 class CoarseMotion:
-    """The picture in small, ``width`` by ``height``, each px of which is ``side`` px of the input frame.
+    """The image in small, ``width`` by ``height``, each px of which is ``side`` px of the input frame.
 
     Pixels, row after row: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far.
     ``turned``: (1, 3, 3), the rotation since the last one.
 
     Pixels laid out so that those of a piece lie together: of each column the ``WINDOW`` px to the right of it, row
-    after row. ``pieces``, ``pieces_last``, of this picture and the last one.
+    after row. ``pieces``, ``pieces_last``, of this image and the last one.
 
-    The picture in which pieces are sought: ``then``, laid out, ``then_s`` ago; ``back``, from where what is far off is
+    The image in which pieces are sought: ``then``, laid out, ``then_s`` ago; ``back``, from where what is far off is
     seen now to where it was seen then; ``ahead_m``, ``focus_x``, ``focus_y``: how far and where the vehicle drove
     since; ``off_flow``, small px. ``words``, ``words_last``, ``words_then``: the memory of what is laid out, a row of a
     piece each. Of the piece that is sought: ``here``, its first pixel in ``pieces``; ``base_x``, ``base_y``, where it
@@ -66,10 +66,10 @@ class CoarseMotion:
     have been, if it stands.
 
     A row a piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its middle, px of the ideal pinhole; ``rough``: how
-    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last picture, -1: it was not all in it; ``shares``
-    (2, pieces), where it lately stood, in the last picture and in the older one; ``links``: pictures through which its
+    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last image, -1: it was not all in it; ``shares``
+    (2, pieces), where it lately stood, in the last image and in the older one; ``links``: images through which its
     motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which it
-    was seen; ``links_before``, ``vx_before``, ``vy_before`` of the last picture. ``block``: roughness of each ``STEP``
+    was seen; ``links_before``, ``vx_before``, ``vy_before`` of the last image. ``block``: roughness of each ``STEP``
     by ``STEP`` px.
     """
 
@@ -101,11 +101,11 @@ class CoarseMotion:
         self.elapsed_s = doubles(pieces)
 
 
-# Pictures
+# Images
 
 
 def take(coarse: CoarseMotion, small: Bytes) -> None:
-    """Take the next picture in small, row after row."""
+    """Take the next image in small, row after row."""
     now, pixels = coarse.now, coarse.width * coarse.height
     for k in range(pixels):
         now[k] = small[k]
@@ -119,7 +119,7 @@ def take(coarse: CoarseMotion, small: Bytes) -> None:
 
 
 def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> None:
-    """Lay out a picture from its first pixel on."""
+    """Lay out an image from its first pixel on."""
     for y in range(coarse.height):
         word = 0
         for x in range(coarse.width):
@@ -130,7 +130,7 @@ def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> N
 
 
 def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
-    """A rotation (1, 3, 3) comes on top of that since the last picture."""
+    """A rotation (1, 3, 3) comes on top of that since the last image."""
     for j in range(3):
         x, y, z = coarse.turned[0, 0, j], coarse.turned[0, 1, j], coarse.turned[0, 2, j]
         for i in range(3):
@@ -138,7 +138,7 @@ def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
 
 
 def keep(coarse: CoarseMotion, slot: int) -> None:
-    """This picture is that of the key frame in ``slot``."""
+    """This image is that of the key frame in ``slot``."""
     coarse.keys = min(coarse.keys + 1, KEYS)
     now, kept, pixels = coarse.now, coarse.kept, coarse.width * coarse.height
     first = slot * pixels
@@ -155,7 +155,7 @@ def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int,
 
 
 def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
-    """Pieces are sought in the last picture."""
+    """Pieces are sought in the last image."""
     for k in range(coarse.words.shape[0]):
         coarse.words_then[k] = coarse.words_last[k]
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
@@ -169,7 +169,7 @@ def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
 def look_farther_back(
     coarse: CoarseMotion, slot: int, keys: KeyFrames, baselines: Baselines, around: Situation
 ) -> None:
-    """Pieces are sought in the picture of the key frame in ``slot``."""
+    """Pieces are sought in the image of the key frame in ``slot``."""
     lay_out(coarse, coarse.kept, slot * coarse.width * coarse.height, coarse.words_then)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
     coarse.then_s = baselines.elapsed_s[slot]
@@ -179,7 +179,7 @@ def look_farther_back(
 
 
 def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
-    """Slot of the key frame whose picture shows slow motion, -1: there is none."""
+    """Slot of the key frame whose image shows slow motion, -1: there is none."""
     oldest, most = -1, MIN_SLOW_S
     for k in range(KEYS):
         if k < coarse.keys and most <= baselines.elapsed_s[k] <= SLOW_S:
@@ -343,7 +343,7 @@ def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
 
 
 def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
-    """Set ``here`` and ``base`` of a piece; False: if it is far off, it was not all in the picture."""
+    """Set ``here`` and ``base`` of a piece; False: if it is far off, it was not all in the image."""
     left, top = STEP * (k % coarse.columns), STEP * (k // coarse.columns)
     coarse.here = WINDOW * (left * coarse.height + top)
     if not image_plane.project(plane, coarse.x[k], coarse.y[k]):
@@ -357,7 +357,7 @@ def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
 
 
 def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
-    """Whether the piece that was put moves by itself; ``age``: LAST or OLDER, of the picture then."""
+    """Whether the piece that was put moves by itself; ``age``: LAST or OLDER, of the image then."""
     nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
     end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
     coarse.share = coarse.shares[age, k]
@@ -378,7 +378,7 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
 
 
 def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
-    """Which pieces that are not known to move do so, since the picture then."""
+    """Which pieces that are not known to move do so, since the image then."""
     pieces = coarse.columns * coarse.rows
     for back in range(pieces):
         k = pieces - 1 - back
@@ -394,7 +394,7 @@ def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation
 
 
 def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: ImagePlane, around: Situation) -> None:
-    """Which pieces move by themselves: fast, since the last picture, or more slowly, since an older one."""
+    """Which pieces move by themselves: fast, since the last image, or more slowly, since an older one."""
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0

@@ -31,7 +31,7 @@ class EdgeColumns:
         return self.rebel[i] != 0 or self.suspect_keys[i] > 0
 
     def is_own_part(self, i: int) -> bool:
-        """Whether an edge has stayed where it is in the picture: a part of the vehicle, or dirt on the lens."""
+        """Whether an edge has stayed where it is in the image: a part of the vehicle, or dirt on the lens."""
         return self.fixed_s[i] >= OWN_PART_S
 
     def rebels(self) -> int:

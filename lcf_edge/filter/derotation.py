@@ -19,7 +19,7 @@ MIN_SIGMA_PX = 0.15  # errors that corners of one frame share
 
 
 def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
-    """H = K·R·K⁻¹ on every stored place of the edges; own directions turn with the picture. ``roll``: rad."""
+    """H = K·R·K⁻¹ on every stored place of the edges; own directions turn with the image. ``roll``: rad."""
     for i in range(edges.count):
         flow.warp(h, edges.x[i], edges.y[i])
         edges.x[i], edges.y[i] = h.x, h.y
@@ -30,7 +30,7 @@ def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
 
 
 def derotate_circles(circles: CircleColumns, h: Homography, roll: float) -> None:
-    """H = K·R·K⁻¹ on the centres of circles; their directions turn with the picture."""
+    """H = K·R·K⁻¹ on the centres of circles; their directions turn with the image."""
     for c in range(circles.capacity):
         if circles.active[c]:
             flow.warp(h, circles.x[c], circles.y[c])

@@ -17,7 +17,7 @@ MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nearer to the focus there is no direction from it
 STRAY_GATE_SHARE = 0.5  # BL of what has just shown how it moves, in shares of BL at birth
 FIXED_PX = 1  # a corner that stays may jump by the width of a pixel
-MAX_FIXED_STEP_S = 0.1  # of one frame: a few pictures minutes apart show no part of the vehicle
+MAX_FIXED_STEP_S = 0.1  # of one frame: a few images minutes apart show no part of the vehicle
 JOIN_GATE_SHARE = 0.25  # and of its own motion, where it is expected to move as its circle
 
 
@@ -144,7 +144,7 @@ def correct(
         edges.bl[i], speed, predicted, corr, dt_s, settings.bl_min_px, settings.bl0_px
     )
     if edges.own_way(i):
-        swing = SWING_SHARE * dt_s * math.fabs(speed)  # what comes near accelerates in the picture
+        swing = SWING_SHARE * dt_s * math.fabs(speed)  # what comes near accelerates in the image
         edges.bl[i] = max(edges.bl[i], swing)
         turn_own_way(edges, i)
 

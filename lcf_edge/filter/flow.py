@@ -1,4 +1,4 @@
-"""Where what stands still goes in the picture: angles, flow lines, the ideal camera, rotations as homographies."""
+"""Where what stands still goes in the image: angles, flow lines, the ideal camera, rotations as homographies."""
 
 import math
 
@@ -18,7 +18,7 @@ def line_distance(dx: float, dy: float, cos: float, sin: float) -> float:
     """Signed distance in px of an offset (dx, dy) from the line through the origin in the direction (cos β, sin β).
 
     The paper's error-span condition with O as IC and tan β as the slope; signed, and without a pole at vertical
-    lines. Positive: to the right of the direction of flow as the picture shows it (y down).
+    lines. Positive: to the right of the direction of flow as the image shows it (y down).
     """
     return dy * cos - dx * sin
 
@@ -32,7 +32,7 @@ class Pinhole:
 
 
 class Homography:
-    """H = K·R·K⁻¹, row after row: where the picture of distant points goes when the camera turns.
+    """H = K·R·K⁻¹, row after row: where the image of distant points goes when the camera turns.
 
     ``x``, ``y``: the place that ``warp`` found, px.
     """

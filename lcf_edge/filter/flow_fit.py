@@ -6,10 +6,10 @@ seconds ago r px from the focus, and went outward by μ·r since, lies off its f
     drift = t·(a·ω) + μ·(sin β·ΔO_x - cos β·ΔO_y) + noise
 
 with ω the error of the rotation's rate, a the px across the flow for a turn of 1 rad about each axis, and ΔO the
-error of the focus. Least squares over edges from all over the picture, robust against what moves, gives ω and ΔO with
+error of the focus. Least squares over edges from all over the image, robust against what moves, gives ω and ΔO with
 their covariance; a second one gives each key frame that edges enough have seen a rotation of its own, which it keeps
 when those edges are gone. How far edges stay off their lines after that (``scale_px``) tells how far they can be
-believed. What a turn moves in the picture, only the lens tells; where it is guessed, edges stay off their lines by a
+believed. What a turn moves in the image, only the lens tells; where it is guessed, edges stay off their lines by a
 share of that way (``turn_share``), which is learnt.
 """
 
@@ -34,7 +34,7 @@ TURN_SHARE = 0.03  # of the way that a turn moves an edge, by which that may be 
 TURN_MEMORY_S = 2.0  # over which it is
 MIN_TURN_PX = 4.0  # a shorter way tells nothing
 MIN_TURNED = 12  # edges that have it
-COLUMNS = 8  # cells of the picture, that count alike however many edges they hold
+COLUMNS = 8  # cells of the image, that count alike however many edges they hold
 ROWS = 6
 CELL_EDGES = 6.0  # edges of a cell that count fully
 NOISE_PX = 0.6  # 1 sigma of the drift of an edge that stands

@@ -1,4 +1,4 @@
-"""How edges that go together move in the picture: mean velocity and rate of expansion, by weighted least squares.
+"""How edges that go together move in the image: mean velocity and rate of expansion, by weighted least squares.
 
 An edge that was at x' a time T ago and is at x now has the velocity v = (x - x')/T halfway between, with the standard
 deviation √2·σ/T of two places. What its rotation leaves uncertain is common to all and added once. Of a set of edges
@@ -123,7 +123,7 @@ def add_patch(sums: MotionSums, k: int, patches: Patches, p: int, around: Situat
 
 
 def add_piece(sums: MotionSums, k: int, coarse: CoarseMotion, p: int, around: Situation) -> None:
-    """Take a piece of the picture in small, as two edges in its middle."""
+    """Take a piece of the image in small, as two edges in its middle."""
     elapsed_s, noise_px, half = coarse.elapsed_s[p], PIECE_NOISE * coarse.side, PIECE_HALF * coarse.side
     weight = elapsed_s * elapsed_s / (2 * noise_px * noise_px)
     vx, vy = coarse.vx[p], coarse.vy[p]

@@ -50,7 +50,7 @@ def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_
     x = rotation[0, 0, 0] * heading.ray_x + rotation[0, 0, 1] * heading.ray_y + rotation[0, 0, 2]
     y = rotation[0, 1, 0] * heading.ray_x + rotation[0, 1, 1] * heading.ray_y + rotation[0, 1, 2]
     z = rotation[0, 2, 0] * heading.ray_x + rotation[0, 2, 1] * heading.ray_y + rotation[0, 2, 2]
-    shaken_x = x / z - yaw_rate_radps * dt_s  # a left turn moves the picture to the right
+    shaken_x = x / z - yaw_rate_radps * dt_s  # a left turn moves the image to the right
     shaken_y = y / z
     heading.ray_x = heading.mounted_x + math.exp(-dt_s / YAW_MEMORY_S) * (shaken_x - heading.mounted_x)
     heading.ray_y = heading.mounted_y + math.exp(-dt_s / PITCH_MEMORY_S) * (shaken_y - heading.mounted_y)

@@ -40,7 +40,7 @@ def distort(plane: ImagePlane, x: float, y: float) -> None:
 
 
 def project(plane: ImagePlane, x: float, y: float) -> bool:
-    """Set ``u``, ``v`` to where a position of the ideal pinhole is seen, px. Return whether that is in the picture."""
+    """Set ``u``, ``v`` to where a position of the ideal pinhole is seen, px. Return whether that is in the image."""
     plane.u, plane.v = x, y
     if plane.is_distorted:
         distort(plane, x, y)

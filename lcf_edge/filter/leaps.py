@@ -1,8 +1,8 @@
-"""What leaps across the picture: its corners are found by what neighbours agree on, not by what is predicted.
+"""What leaps across the image: its corners are found by what neighbours agree on, not by what is predicted.
 
 Where most of the edges that were just seen have no corner where the camera's motion and their own put them, nothing
 that is predicted fits. There every pair of such an edge and a free corner that look alike votes for its shift; a shift
-that most of them share, and no other one, is how that part of the picture moved.
+that most of them share, and no other one, is how that part of the image moved.
 """
 
 from lcf_edge.filter import image_plane, matching, rounding
@@ -12,9 +12,9 @@ from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
 
-COLUMNS = 8  # parts of the picture
+COLUMNS = 8  # parts of the image
 ROWS = 6
-REACH_SHARE = 0.16  # of the picture's width, by which something may leap
+REACH_SHARE = 0.16  # of the image's width, by which something may leap
 BINS = 50  # of shifts, each way
 SIDE = BINS + 1  # of the table of shifts
 MIN_LOST = 4  # edges without a corner that a part needs
@@ -43,7 +43,7 @@ class Leaps:
 
 
 def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
-    """Which edges were seen in the last frame and have no corner now, by parts of the picture."""
+    """Which edges were seen in the last frame and have no corner now, by parts of the image."""
     for p in range(COLUMNS * ROWS):
         leaps.seen[p] = leaps.lost[p] = 0
     leaps.asking = 0
@@ -64,7 +64,7 @@ def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
 
 
 def is_lost(leaps: Leaps, part: int) -> bool:
-    """Whether nothing that is predicted fits in a part of the picture."""
+    """Whether nothing that is predicted fits in a part of the image."""
     return leaps.lost[part] >= MIN_LOST and leaps.lost[part] > LOST_SHARE * leaps.seen[part]
 
 

@@ -175,7 +175,7 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
-            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its pictures, three laid out
+            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its images, three laid out
         }
 
     @property
@@ -328,7 +328,7 @@ class LineCircleFilter:
         leaps.find(self._leaps, self._index, self._plane, edges, corners, settings)
 
     def _slack_px(self, motion: Motion) -> float:
-        """By how much the rotation may shift the picture: as the gyro says, or, without one, as it lately did."""
+        """By how much the rotation may shift the image: as the gyro says, or, without one, as it lately did."""
         gyro_px = GYRO_SIGMAS * motion.rotation_sigma_rad * self._pinhole.focal
         return min(gyro_px, SURPRISE_PX + SURPRISES * self._missing_px, self._settings.leap_px)
 
@@ -411,7 +411,7 @@ class LineCircleFilter:
         return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
 
     def _fit_flow(self) -> None:
-        """What the whole picture tells of rotation, O and noise; the mounting learns from it; whether it stands."""
+        """What the whole image tells of rotation, O and noise; the mounting learns from it; whether it stands."""
         fit, around, heading, pinhole = self._fit, self._around, self._heading, self._pinhole
         fit.prior_x = headings.focus_sigma_rad(headings.sideways_sigma_rad(heading)) * pinhole.fx
         fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy

@@ -23,7 +23,7 @@ ROUNDS = 2  # of mutual best choice
 class CornerIndex:
     """Corners sorted by cell, row after row: those near a place are a few runs of neighbours in that order.
 
-    What a look-up costs follows from the corners that it finds, not from the size of the gate or of the picture.
+    What a look-up costs follows from the corners that it finds, not from the size of the gate or of the image.
     ``start``: of each cell's run. In that order: ``order``, row of the frame's corners; and what a look needs, copied,
     so that a run of corners is a run of memory: ``x``, ``y`` (px of the input frame), ``appearance``. ``listed``: work
     space of a look. ``nbytes``: that all of it occupies.

@@ -30,7 +30,7 @@ class Flowing:
     """Trusted normal edges that may be grouped, a row each; and what they tell about their circles.
 
     ``row``: of the table of edges. ``r``: px from O. ``cos``, ``sin``: of the direction of flow. ``expansion``: V/r,
-    1/s. ``cell``: of the picture and octave of expansion in which it looks for others, -1: it has a circle;
+    1/s. ``cell``: of the image and octave of expansion in which it looks for others, -1: it has a circle;
     ``cell_size``: edges in each.
 
     A row a circle: ``members``; ``before``, edges that belonged to it; ``included``, those that still lie in it;
@@ -239,7 +239,7 @@ def direct(circles: CircleColumns, around: Situation) -> None:
 
 
 def cell_of(x: float, y: float, expansion: float, around: Situation, size_px: float) -> int:
-    """Number of the cell of the picture, and of the octave of expansion, in which an edge looks for others."""
+    """Number of the cell of the image, and of the octave of expansion, in which an edge looks for others."""
     u = rounding.whole(math.floor((x - around.focus_x) / size_px)) + CELLS // 2
     v = rounding.whole(math.floor((y - around.focus_y) / size_px)) + CELLS // 2
     octave = rounding.whole(math.floor(math.log2(max(math.fabs(expansion), SLOWEST)) + 0.5)) - SLOWEST_OCTAVE

@@ -11,7 +11,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
-LEFT_SHARE = 0.25  # of an object's width: with no more of it in the picture it has left
+LEFT_SHARE = 0.25  # of an object's width: with no more of it in the image it has left
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
@@ -89,7 +89,7 @@ def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around:
 
 
 def has_left(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
-    """Whether hardly a part of an object that is not seen is in the picture."""
+    """Whether hardly a part of an object that is not seen is in the image."""
     inward = (0.5 - LEFT_SHARE) * objects.width[o]
     inmost_x = objects.x[o] + inward if objects.x[o] < 0.5 * plane.width else objects.x[o] - inward
     return objects.state[o] != SEEN and not image_plane.project(plane, inmost_x, objects.y[o])
@@ -98,9 +98,9 @@ def has_left(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
 def end_outside(
     objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, plane: ImagePlane, around: Situation
 ) -> None:
-    """Circles of what has left the picture end: there only the object goes on.
+    """Circles of what has left the image end: there only the object goes on.
 
-    Not where nothing is seen to flow: that is what fills the picture.
+    Not where nothing is seen to flow: that is what fills the image.
     """
     if not around.flow_is_seen:
         return

@@ -1,8 +1,8 @@
-"""Patches: pieces of the picture near the path, followed for seconds; how much they grew tells how far off they are.
+"""Patches: pieces of the image near the path, followed for seconds; how much they grew tells how far off they are.
 
 Near the focus, where what is ahead appears, a corner hardly moves within the window of key frames, and it seldom lives
-longer. A piece of the picture around it does: it is found again by shift and scale, to a small part of a pixel, against
-the picture in which it was first seen (inverse compositional Lucas-Kanade: Baker and Matthews 2004). What stands still
+longer. A piece of the image around it does: it is found again by shift and scale, to a small part of a pixel, against
+the image in which it was first seen (inverse compositional Lucas-Kanade: Baker and Matthews 2004). What stands still
 at Z was seen ΔZ farther off, so it has grown by s = (Z + ΔZ)/Z.
 """
 
@@ -24,7 +24,7 @@ MAX_HALF_PX = 16.0  # and at most
 HALF_WIDTH_SHARE = 0.4  # of the vehicle's half width, as far off as it is in half a horizon, that half a side is
 BESIDE = 1.2  # half widths from the path there, within which patches are born,
 BESIDE_HALVES = 1.5  # or so many half sides
-NEAREST_S = 1.0  # ground that is reached sooner is too low in the picture
+NEAREST_S = 1.0  # ground that is reached sooner is too low in the image
 ROW_SHARE = 1.0  # of a distance in height that counts when the place nearest to the path is chosen
 APART = 1.1  # half sides that lie between patches
 BIRTHS = 3  # in one frame, at most
@@ -239,7 +239,7 @@ def find(patches: Patches, p: int, image: Bytes, plane: ImagePlane) -> bool:
 
 
 def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
-    """Each patch in this picture, or as predicted where that does not show it; too often, and it ends."""
+    """Each patch in this image, or as predicted where that does not show it; too often, and it ends."""
     for p in range(patches.capacity):
         if not patches.active[p]:
             continue
@@ -289,7 +289,7 @@ def is_covered(patches: Patches, x: float, y: float, half: float) -> bool:
 def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situation) -> int:
     """The edge nearest to the path, but for those tried, that may show what is met within the horizon; -1: none.
 
-    In the picture that is the neighbourhood of the path as far off as the vehicle is in half a horizon, from the
+    In the image that is the neighbourhood of the path as far off as the vehicle is in half a horizon, from the
     vehicle's height there down to the ground that is reached in ``NEAREST_S``.
     """
     fx, fy = around.pinhole.fx, around.pinhole.fy

@@ -1,4 +1,4 @@
-"""What an object's motion in the picture says about its range and its motion over ground, and how sure that is.
+"""What an object's motion in the image says about its range and its motion over ground, and how sure that is.
 
 Three numbers are measured: the looming m = (V - w_z)/Z, 1/s; the sideways rate q = w_x/Z, 1/s, what is left of the
 motion to the side when the looming is taken out; and the inverse range 1/Z of the ground under its lowest edge. Here V
@@ -58,7 +58,7 @@ class Evidence:
     vehicle's speed at which they were measured, which may be another one now; ``across``, tan of the bearing from O;
     ``across_sigma``; ``half_width``, tan of half its width; ``half_extent``, of half its width or height, whichever is
     more; ``foot`` 1/Z of the ground under it, 1/m, with
-    ``foot_sigma``; ``hidden``: the probability that it shows no edge; ``is_cut``: it is below the picture; ``log_odds``
+    ``foot_sigma``; ``hidden``: the probability that it shows no edge; ``is_cut``: it is below the image; ``log_odds``
     of standing and ``range_before``, m, NaN: none, with ``range_doubt``, 1 sigma of its logarithm, as they were
     believed in the frame before, brought to now.
     """

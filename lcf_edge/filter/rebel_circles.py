@@ -44,7 +44,7 @@ MIRROR_NOISE_PX = 0.6  # 1 sigma of how far an edge went
 MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group better than something upright
 SURE_REBELS = 5.0  # fewer say less, and must be seen once more before their circle is reported
 MOVER_SHARE = 0.25  # of the edges in a circle that moves must be rebels: where things repeat, edges swap places
-LIKELY_OWN_S = 0.9  # what has not moved in the picture for so long may be of an own part;
+LIKELY_OWN_S = 0.9  # what has not moved in the image for so long may be of an own part;
 SEEN_TO_MOVE_PX = 3.0  # by which the ground there would have moved, else it may be far off;
 OWN_SHARE = 0.1  # so many of these, as a share of the rebels that they lie among, make them own parts too
 SPREAD_NOISE_PX = 0.85  # 1 sigma of how far an edge went, of two places
@@ -67,7 +67,7 @@ FAR_LIKE_SPEED = 0.3  # share of the faster one's speed, by which they then diff
 COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
 COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
 MIN_TTC_SHARE = 0.0125
-BLIND_S = 1.0  # for so long circles stay where they are when the whole picture is covered
+BLIND_S = 1.0  # for so long circles stay where they are when the whole image is covered
 MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
 CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
@@ -118,7 +118,7 @@ class RebelGroups:
 def predict(circles: CircleColumns, around: Situation) -> None:
     """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
 
-    Without a time to contact, the centre goes on as it went. What covers the picture stays there.
+    Without a time to contact, the centre goes on as it went. What covers the image stays there.
     """
     if around.is_blind:
         return
@@ -156,7 +156,7 @@ def coasts(circles: CircleColumns, c: int, around: Situation, settings: Settings
 def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
     """Circles that left the frame end.
 
-    What is about to be met fills the picture, and is not gone because its middle has left: there the innermost point of
+    What is about to be met fills the image, and is not gone because its middle has left: there the innermost point of
     its extent must leave, and what stands must be seen to flow again.
     """
     for c in range(circles.capacity):
@@ -237,7 +237,7 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
 
     They are near, and move in the same direction with a like speed, or differ in velocity by no more than the parts of
-    an object that grows in the picture do. The few corners on something large and plain that passes fast lie farther
+    an object that grows in the image do. The few corners on something large and plain that passes fast lie farther
     apart: these must move alike, and be known to.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
@@ -293,7 +293,7 @@ def near_link_px(y: float, around: Situation) -> float:
 
 
 def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, support: int) -> None:
-    """Groups of one near thing, whose corners lie far apart in the picture, are one, if they move alike.
+    """Groups of one near thing, whose corners lie far apart in the image, are one, if they move alike.
 
     Not what stands: that spreads over the ground, too.
     """
@@ -734,7 +734,7 @@ def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, s
     """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it.
 
     What is about to be met may hide all that flows: then it goes on until contact. Nothing is known of any of them
-    while something covers the picture: they stay, and must be seen as soon as the picture is.
+    while something covers the image: they stay, and must be seen as soon as the image is.
     """
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands, as the picture tells: the ground, which must flow when it drives, does not."""
+"""Whether the vehicle stands, as the image tells: the ground, which must flow when it drives, does not."""
 
 import math
 
@@ -11,7 +11,7 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.situation import Situation
 
 MIN_BASELINE_S = 0.2  # motion over less than this is lost in noise
-MIN_STILL_S = 0.25  # a picture that comes twice is no rest
+MIN_STILL_S = 0.25  # an image that comes twice is no rest
 MIN_EDGES = 25
 MIN_GROUND_EDGES = 8
 MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is measured

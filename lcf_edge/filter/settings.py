@@ -24,8 +24,8 @@ class Settings:
     """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s).
 
     Extents of things and angles are px of ``pinhole``: what the configuration has in px is meant at a focal length of
-    ``REFERENCE_FOCAL_PX``, so that it holds for every size of picture and every lens. Gates and noise of corners are px
-    of whatever picture.
+    ``REFERENCE_FOCAL_PX``, so that it holds for every size of image and every lens. Gates and noise of corners are px
+    of whatever image.
     """
 
     def __init__(self, settings: Filter, pinhole: Pinhole) -> None:

@@ -1,4 +1,4 @@
-"""The vehicle at this instant: where it heads in the picture, what it is, how it moves."""
+"""The vehicle at this instant: where it heads in the image, what it is, how it moves."""
 
 import math
 
@@ -14,13 +14,13 @@ class Situation:
 
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
     unknown. ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal
-    length from O, so that the paper's bounds in V_ν have a unit in the picture; inf where V_ν is unknown. ``dt_s``:
+    length from O, so that the paper's bounds in V_ν have a unit in the image; inf where V_ν is unknown. ``dt_s``:
     t_f. ``noise_px``: 1 sigma of an edge's place. ``delta_px``: δ over a chain of key frames. Both as configured, or
-    as the picture shows it (``flow_fit``). ``turn_share``: 1 sigma of where a turn moves an edge, as a share of that
+    as the image shows it (``flow_fit``). ``turn_share``: 1 sigma of where a turn moves an edge, as a share of that
     way. ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: as the flow tells it, where
     that is less. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
     (``rest``). ``flow_is_seen``: enough of what stands is in sight to tell its flow.
-    ``is_blind``: it is not, and hardly an edge of the picture is found again: something covers it.
+    ``is_blind``: it is not, and hardly an edge of the image is found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:

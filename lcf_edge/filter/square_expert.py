@@ -54,7 +54,7 @@ MAX_ODDS = 4.0  # of which no more is kept
 GROWS_S = 0.07  # time constant with which a box follows edges outside it,
 SHRINKS_S = 0.3  # and edges that show it smaller,
 FOOT_S = 1.2  # and with which a foot is forgotten that is not seen,
-FOOT_BELOW_S = 3.0  # below the picture
+FOOT_BELOW_S = 3.0  # below the image
 EDGE_PX = 1.0  # by which a corner lies inside of what it is a corner of
 TURMOIL_HZ = 1.0  # 1 sigma of m and q of what shows no motion that could be followed
 FRAMES_UNREPORTED = 2.0  # of a new object,
@@ -62,22 +62,22 @@ UNSURE = 0.25  # and three more with fewer edges than
 SURE_EDGES = 7
 COAST_S = 0.3  # an object goes on unseen for so long without losing trust,
 HIDDEN_S = 1.0  # and behind another one for so long,
-OUTSIDE_S = 1.0  # beside the picture,
+OUTSIDE_S = 1.0  # beside the image,
 COMING_S = 3.0  # and if it moves towards the path there;
 NEAR_S = 1.0  # where it is near,
 NEAR_M = 1.5
 REMNANT_SHARE = 0.33  # of the edges that lately showed what is that near: fewer do not tell how it moves,
 USUAL_S = 3.0  # where these are forgotten with this time constant,
-LEAVES_S = 0.5  # unless it will have left the picture so soon
+LEAVES_S = 0.5  # unless it will have left the image so soon
 RESTING_S = 2.0  # where it stands, or is near, before a vehicle that stands, too,
 LINGERS_S = 6.0  # and if nothing is seen through it;
-THROUGH_S = 0.5  # what has kept its place in the picture for so long is
+THROUGH_S = 0.5  # what has kept its place in the image for so long is
 MIN_THROUGH = 3  # when there are so many of it in the middle of its box,
 THROUGH_SHARE = 0.3  # no farther from there than this share of it
 LOSES_HZ = 20.0  # trust that it loses then
 FOOT_PX = 2.0  # 1 sigma of where the lowest edge is
 BORDER_PX = 4.0
-CUT_SHARE = 0.15  # of its height: with its lowest edge so near to the picture's border its foot may be below that,
+CUT_SHARE = 0.15  # of its height: with its lowest edge so near to the image's border its foot may be below that,
 CUT_HIDES = 0.75  # which is so likely
 PASSED_M = 0.1  # what is not seen and nearer than this is passed
 MOVES_SIGMAS = 1.5  # by which a velocity is above its noise
@@ -177,7 +177,7 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
 
 
 def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
-    """Whether a part of the middle row of an object's box is in the picture."""
+    """Whether a part of the middle row of an object's box is in the image."""
     left, right = objects.x[o] - 0.5 * objects.width[o], objects.x[o] + 0.5 * objects.width[o]
     y = min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1)
     if image_plane.project(plane, objects.x[o], y) or image_plane.project(plane, left, y):
@@ -191,13 +191,13 @@ def is_passed(objects: ObjectColumns, o: int) -> bool:
 
 
 def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Settings) -> bool:
-    """Whether an object that left the picture at its side may still be met."""
+    """Whether an object that left the image at its side may still be met."""
     patience_s = outside_s(objects, o, around)
     return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < patience_s and objects.middle[o] > 0
 
 
 def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
-    """For how long an object is remembered that left the picture at its side: longer if it moves towards the path."""
+    """For how long an object is remembered that left the image at its side: longer if it moves towards the path."""
     comes_mps = objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]
     return COMING_S if comes_mps > SLOW_MPS else OUTSIDE_S
 
@@ -730,7 +730,7 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
 
 
 def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """The vehicle's speed is not known: the picture alone tells when, and the foot where."""
+    """The vehicle's speed is not known: the image alone tells when, and the foot where."""
     objects.middle[o] = objects.middle_sigma[o] = objects.range[o] = objects.range_sigma[o] = NAN
     objects.lateral[o] = objects.lateral_sigma[o] = NAN
     objects.forward[o] = objects.forward_sigma[o] = objects.right[o] = objects.right_sigma[o] = NAN
@@ -775,7 +775,7 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
     """Whether so few of the edges are left that lately showed an object that they do not tell how it moves.
 
     What is very near loses its corners, and the last ones may lie on a limb, or on something else: its range would
-    seem to grow while it comes closer. What is about to leave the picture loses them by that, and still tells; what
+    seem to grow while it comes closer. What is about to leave the image loses them by that, and still tells; what
     rests before a vehicle that does shows few.
     """
     objects.usual[o] = max(objects.usual[o] * math.exp(-around.dt_s / USUAL_S), count)
@@ -797,7 +797,7 @@ def go_on(
 ) -> None:
     """An object that no edge shows in this frame is hidden, or coasts; in the end it is lost.
 
-    What stands shows nothing to a vehicle that does, what is very near may show no corner, and what left the picture
+    What stands shows nothing to a vehicle that does, what is very near may show no corner, and what left the image
     at its side cannot.
     """
     objects.unseen_s[o] += around.dt_s
@@ -998,6 +998,20 @@ def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situat
     return 1.0 if wholes.count[o] >= SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
 
 
+def renew_numbers(
+    objects: ObjectColumns, o: int, squares: Squares, unmeasured: bool, plane: ImagePlane, around: Situation
+) -> None:
+    """The numbers of an object: from its evidence, or, where nothing new is seen of its motion, as it went."""
+    collect_evidence(squares.evidence, objects, o, plane, around)
+    if unmeasured and math.isfinite(objects.forward[o]):
+        coast(objects, o, squares.evidence, around)
+    elif math.isfinite(around.speed_mps):
+        range_belief.consider(squares.belief, squares.evidence, around)
+        believe(objects, o, squares.belief, squares.evidence, around)
+    else:
+        believe_without_speed(objects, o, squares.evidence, around)
+
+
 def update(
     squares: Squares,
     objects: ObjectColumns,
@@ -1047,12 +1061,7 @@ def update(
             objects.reference[o] = around.speed_mps
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
             go_on(objects, o, edges, plane, around, settings)
-        collect_evidence(squares.evidence, objects, o, plane, around)
-        if math.isfinite(objects.forward[o]) and (objects.unseen_s[o] > 0 or remnant or rests(objects, o, around)):
-            coast(objects, o, squares.evidence, around)
-        elif math.isfinite(around.speed_mps):
-            range_belief.consider(squares.belief, squares.evidence, around)
-            believe(objects, o, squares.belief, squares.evidence, around)
-        else:
-            believe_without_speed(objects, o, squares.evidence, around)
+        renew_numbers(
+            objects, o, squares, remnant or objects.unseen_s[o] > 0 or rests(objects, o, around), plane, around
+        )
     return evicted

@@ -127,7 +127,7 @@ CIRCLE_COLUMNS = (
     Column("x", "centre, to the right", "px", CENTRE_WRITERS),
     Column("y", "centre, down", "px", CENTRE_WRITERS),
     Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles", "object_circles")),
-    Column("beta", "β of its motion in the picture", "rad", ("derotation", *SPEED_WRITERS)),
+    Column("beta", "β of its motion in the image", "rad", ("derotation", *SPEED_WRITERS)),
     Column("speed", "V along β", "px/s", SPEED_WRITERS),
     Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
     Column("trust", "Tr", "1", ("circles", *SPEED_WRITERS, "feedback")),

@@ -1,9 +1,9 @@
 """Turmoil: places where edges come and go and hardly one is found again, though what stands there would hardly move.
 
 What tumbles, spins or bursts keeps no corner for two frames, and so shows no rebel: the flow breaks there as a whole.
-The picture is divided into cells, and edges that were found and lost are counted in each. Near O, or when the vehicle
+The image is divided into cells, and edges that were found and lost are counted in each. Near O, or when the vehicle
 rests, even what will be met in a second is found again from frame to frame. Where nearly all is lost, for several
-frames, while the rest of the picture is found, is a circle of C_r. When it is met is not known.
+frames, while the rest of the image is found, is a circle of C_r. When it is met is not known.
 """
 
 import math
@@ -20,12 +20,12 @@ from lcf_edge.messages import Cause
 ACROSS = 20  # cells in a row; a place is judged with those around it
 HALF_LIFE_S = 0.15  # of what was counted
 MIN_EDGES = 25.0  # counted in a place lately,
-MIN_LOST = 6.0  # and of these lost in this frame: one bad picture is no turmoil
+MIN_LOST = 6.0  # and of these lost in this frame: one bad image is no turmoil
 FOUND_SHARE = 0.1  # of them, that are found at most lately,
 FOUND_NOW_SHARE = 0.2  # and in this frame; more than that elsewhere,
 FOUND_ELSEWHERE = 0.35  # and lately this share, where edges are found at all
 LOST_STILL_SHARE = 0.3  # of them, that are found at most where a circle goes on
-BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the picture
+BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the image
 MIN_HIDDEN = 6.0  # trusted edges of a place, that are lost in this frame
 HIDDEN_FOUND_SHARE = 0.05  # of these, that are found all the same, where something is in front of them
 MIN_HIDDEN_CELLS = 6  # of a place, that are hidden: smaller ones show what passes far off
@@ -39,7 +39,7 @@ INFINITY = float("inf")
 
 
 class Turmoil:
-    """A row a cell, the cells of the picture row by row.
+    """A row a cell, the cells of the image row by row.
 
     ``across``, ``down``: how many; ``side_px``, ``per_px``. ``found``, ``lost``: edges, the less the longer ago;
     ``found_now``, ``lost_now``: in this frame. ``unruly``: whether it and those around it are in turmoil; ``lasts_s``:
@@ -111,7 +111,7 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
 
 
 def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
-    """Whether hardly an edge of the whole picture is found in this frame; of few, only if it was so ``before``."""
+    """Whether hardly an edge of the whole image is found in this frame; of few, only if it was so ``before``."""
     found = lost = 0.0
     for k in range(turmoil.across * turmoil.down):
         found += turmoil.found_now[k]
@@ -120,7 +120,7 @@ def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
 
 
 def is_inner(turmoil: Turmoil, k: int) -> bool:
-    """Whether a cell has others on all sides; what leaves the picture is lost at its border."""
+    """Whether a cell has others on all sides; what leaves the image is lost at its border."""
     column, row = k % turmoil.across, k // turmoil.across
     return 0 < column < turmoil.across - 1 and 0 < row < turmoil.down - 1
 
@@ -175,9 +175,9 @@ def mark(turmoil: Turmoil, k: int) -> None:
 
 
 def is_found_elsewhere(turmoil: Turmoil) -> bool:
-    """Whether the picture outside of turmoil is found, in this frame and lately; of the latter, the best of it counts.
+    """Whether the image outside of turmoil is found, in this frame and lately; of the latter, the best of it counts.
 
-    What tumbles near may fill much of the picture, and all around it may be lost now and then.
+    What tumbles near may fill much of the image, and all around it may be lost now and then.
     """
     found = share = found_now = lost_now = 0.0
     for k in range(turmoil.across * turmoil.down):
@@ -190,7 +190,7 @@ def is_found_elsewhere(turmoil: Turmoil) -> bool:
 
 
 def see(turmoil: Turmoil, around: Situation, settings: Settings) -> bool:
-    """Where turmoil is, and for how long; nowhere if all the picture is lost. False: there is none."""
+    """Where turmoil is, and for how long; nowhere if all the image is lost. False: there is none."""
     is_any = False
     for k in range(turmoil.across * turmoil.down):
         turmoil.place[k] = -1

@@ -53,7 +53,7 @@ def test_light_and_contrast_make_no_difference(noise: Callable[..., Grey]) -> No
     assert roundness(image, *MIDDLE) == pytest.approx(roundness(2 * image + 50, *MIDDLE), rel=1e-5)
 
 
-def test_a_plain_picture_has_none() -> None:
+def test_a_plain_image_has_none() -> None:
     assert roundness(np.full((41, 41), 77, np.uint8), *MIDDLE) == 0
 
 

@@ -47,11 +47,11 @@ def test_samples_are_the_ring_with_its_mean_at_128(
     assert np.array_equal(samples, by_whole_arrays(image, pixel))
 
 
-@pytest.mark.parametrize("view", ["rows of a larger picture", "every second column", "read-only"])
-def test_any_picture_is_looked_at_in_place(view: str) -> None:
+@pytest.mark.parametrize("view", ["rows of a larger image", "every second column", "read-only"])
+def test_any_image_is_looked_at_in_place(view: str) -> None:
     whole = np.random.default_rng(1).integers(0, 256, (90, 160), np.uint8)
     whole.flags.writeable = view != "read-only"
-    image = {"rows of a larger picture": whole[10:70, 20:120], "every second column": whole[:, ::2]}.get(view, whole)
+    image = {"rows of a larger image": whole[10:70, 20:120], "every second column": whole[:, ::2]}.get(view, whole)
     pixel = places(image.shape[1], image.shape[0], 50, 2)
     assert np.array_equal(appearance(image, pixel), by_whole_arrays(image.copy(), pixel))
 

@@ -64,7 +64,7 @@ def test_no_corner_is_nearer_to_the_border_than_its_samples_reach(noise: Noise) 
     assert corners.pixel[:, 1].max() == 60 - 1 - BORDER_PX
 
 
-def test_a_picture_without_a_corner_gives_empty_arrays() -> None:
+def test_an_image_without_a_corner_gives_empty_arrays() -> None:
     image = np.full((48, 64), 128, np.uint8)
     corners, evicted = detector(image).detect(image)
     assert (len(corners), evicted) == (0, 0)
@@ -79,7 +79,7 @@ def test_a_picture_without_a_corner_gives_empty_arrays() -> None:
     capacity=st.integers(1, 40),
     threshold=st.integers(1, 254),
 )
-def test_any_picture_of_any_size(noise: Noise, size: tuple[int, int], seed: int, capacity: int, threshold: int) -> None:
+def test_any_image_of_any_size(noise: Noise, size: tuple[int, int], seed: int, capacity: int, threshold: int) -> None:
     image = noise(seed, *size)
     steady = Filter(fast_adaptive=False, fast_threshold=threshold)
     every, nothing = detector(image, steady).detect(image)
@@ -90,13 +90,13 @@ def test_any_picture_of_any_size(noise: Noise, size: tuple[int, int], seed: int,
     assert {*map(tuple, corners.pixel.tolist())} <= {*map(tuple, every.pixel.tolist())}
 
 
-def test_a_picture_of_16_px_has_room_for_corners_in_its_middle_only(noise: Noise) -> None:
+def test_an_image_of_16_px_has_room_for_corners_in_its_middle_only(noise: Noise) -> None:
     images = [noise(seed, 16, 16) for seed in range(20)]
     found = np.concatenate([detector(image).detect(image)[0].pixel for image in images])
     assert set(found.ravel().tolist()) == {7, 8}
 
 
-def test_rows_of_a_larger_picture_may_be_looked_at_in_place(noise: Noise) -> None:
+def test_rows_of_a_larger_image_may_be_looked_at_in_place(noise: Noise) -> None:
     whole = noise(width=200, height=100)
     part = whole[10:70, 20:120]
     seen, _ = detector(part).detect(part)
@@ -117,7 +117,7 @@ def squares(pixel: npt.NDArray[np.int32]) -> list[tuple[int, int]]:
     return [(x // SPREAD_PX, y // SPREAD_PX) for x, y in pixel.tolist()]
 
 
-def test_20_000_corners_are_cut_to_the_budget_and_still_cover_the_picture(noise: Noise) -> None:
+def test_20_000_corners_are_cut_to_the_budget_and_still_cover_the_image(noise: Noise) -> None:
     image = noise()
     corners, evicted = detector(image, Filter(fast_adaptive=False, fast_threshold=8)).detect(image)
     assert len(corners) == 1500
@@ -142,7 +142,7 @@ def within(pixel: npt.NDArray[np.number[Any]], left: int, top: int, right: int, 
 
 def test_no_square_takes_more_than_four_times_the_mean() -> None:
     image = np.full((480, 640), 128, np.uint8)
-    image[:, 320:] = clutter(5)[:, 320:]  # half of the picture is as rich as can be
+    image[:, 320:] = clutter(5)[:, 320:]  # half of the image is as rich as can be
     _, corners = settled(image, Filter(corners_target=384))
     in_square = Counter(map(tuple, (corners.pixel // 40).tolist()))  # 192 of them, 2 corners in the mean
     assert max(in_square.values()) == 8
@@ -223,7 +223,7 @@ def test_without_adaption_the_threshold_stays(noise: Noise) -> None:
     assert {threshold for threshold, _ in settle(detector(image), image, 5)} == {25}
 
 
-def test_the_same_pictures_give_the_same_corners() -> None:
+def test_the_same_images_give_the_same_corners() -> None:
     images = [clutter(cell_px) for cell_px in (12, 5, 40, 12, 8)]
     one, other = (detector(images[0], Filter()) for _ in range(2))
     for image in images:
@@ -252,7 +252,7 @@ def mean_of(image: Grey, x: npt.NDArray[np.int32], y: npt.NDArray[np.int32]) -> 
     return ring.sum(axis=0) // len(RING_PX)
 
 
-def test_a_brighter_picture_looks_the_same() -> None:
+def test_a_brighter_image_looks_the_same() -> None:
     image = clutter(12) // 2 + 20
     dark, bright = (detector(each).detect(each)[0] for each in (image, image + 90))
     assert same(dark, bright)
@@ -276,7 +276,7 @@ LENSES = [
 ]
 
 
-@pytest.mark.parametrize("lens", LENSES, ids=["euroc", "fisheye", "wider than a plane picture holds"])
+@pytest.mark.parametrize("lens", LENSES, ids=["euroc", "fisheye", "wider than a plane image holds"])
 def test_positions_are_those_without_distortion(noise: Noise, lens: Lens) -> None:
     image = noise(width=lens.width, height=lens.height)
     corners, _ = CornerDetector(STEADY, lens, 32767).detect(image)

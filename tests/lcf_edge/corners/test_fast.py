@@ -1,4 +1,4 @@
-"""FAST-9 of our own: the corners of OpenCV's, of each part of a picture, and the same ones uncompiled."""
+"""FAST-9 of our own: the corners of OpenCV's, of each part of an image, and the same ones uncompiled."""
 
 import os
 import subprocess
@@ -41,14 +41,14 @@ def found(
     image=arrays(np.uint8, (HEIGHT, WIDTH), elements=st.sampled_from([0, 1, 30, 120, 128, 200, 254, 255])),
     threshold=st.integers(1, 254),
 )
-def test_the_corners_of_any_picture_and_threshold_are_those_of_opencv(image: Grey, threshold: int) -> None:
+def test_the_corners_of_any_image_and_threshold_are_those_of_opencv(image: Grey, threshold: int) -> None:
     keypoints = cv2.FastFeatureDetector.create(threshold, True).detect(image)
     assert found(image, threshold, WHOLE, compiled=True) == [(*one.pt, one.response) for one in keypoints]
 
 
 @needs_extension
 @pytest.mark.parametrize("threshold", [1, 13, 25, 60, 127, 128, 200])
-def test_a_part_has_the_corners_that_it_has_as_a_picture_of_its_own(threshold: int) -> None:
+def test_a_part_has_the_corners_that_it_has_as_an_image_of_its_own(threshold: int) -> None:
     noise = np.random.default_rng(1).integers(0, 256, (HEIGHT, WIDTH), np.uint8)
     for image in (noise, clutter(5, WIDTH, HEIGHT)):
         assert found(image, threshold, PARTS, compiled=True) == found(image, threshold, PARTS, compiled=False)
@@ -81,7 +81,7 @@ def test_a_second_look_with_a_lower_threshold_finds_what_a_first_one_would() -> 
 
 
 @needs_extension
-def test_the_next_picture_is_looked_at_anew() -> None:
+def test_the_next_image_is_looked_at_anew() -> None:
     fast = Fast(WIDTH, HEIGHT, compiled=True)
     fast.look(clutter(5, WIDTH, HEIGHT))
     assert len(fast.corners(10, WHOLE)[0])
@@ -89,7 +89,7 @@ def test_the_next_picture_is_looked_at_anew() -> None:
     assert not len(fast.corners(10, WHOLE)[0])
 
 
-def test_a_picture_that_is_all_border_has_none() -> None:
+def test_an_image_that_is_all_border_has_none() -> None:
     for size in ((1, 1), (7, 6), (640, 3)):
         image = np.zeros(size, np.uint8)
         height, width = size

@@ -1,4 +1,4 @@
-"""What is wrong with a picture is told in a word."""
+"""What is wrong with an image is told in a word."""
 
 from dataclasses import replace
 
@@ -24,7 +24,7 @@ def moved(image: Grey, length_px: int) -> Grey:
     return np.asarray(cv2.blur(image, (length_px, 1)), np.uint8)
 
 
-def test_usual_pictures_have_no_notes() -> None:
+def test_usual_images_have_no_notes() -> None:
     quality = ImageQuality()
     assert {quality.notes(image, 700) for image in drive()} == {()}
 
@@ -66,5 +66,5 @@ def test_a_drive_with_long_exposures_while_shaken_is_less_sharp() -> None:
 
 
 @given(size=st.tuples(st.integers(1, 70), st.integers(1, 70)), grey=st.integers(0, 255))
-def test_any_size_of_picture_has_a_sharpness(size: tuple[int, int], grey: int) -> None:
+def test_any_size_of_image_has_a_sharpness(size: tuple[int, int], grey: int) -> None:
     assert 0 <= sharpness(np.full(size, grey, np.uint8)) <= 1

@@ -40,6 +40,6 @@ def test_the_fine_share_is_that_of_rows_or_columns(noise: Callable[..., Grey]) -
     assert fine_share_of_columns(flat, 61, 47, 5, 9, 4) == pytest.approx(shares[1])
 
 
-def test_in_a_plain_picture_no_share_is_fine() -> None:
+def test_in_a_plain_image_no_share_is_fine() -> None:
     plain = np.full(100, 9, np.uint8).data
     assert fine_share_of_rows(plain, 10, 10, 0, 1, 4) == fine_share_of_columns(plain, 10, 10, 0, 1, 4) == 0

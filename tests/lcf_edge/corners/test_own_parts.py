@@ -28,7 +28,7 @@ def test_without_a_mask_everything_is_in_sight() -> None:
 
 
 @given(size=st.sampled_from([(640, 480), (320, 240), (1280, 960), (160, 480)]))
-def test_polygons_scale_with_the_picture(size: tuple[int, int]) -> None:
+def test_polygons_scale_with_the_image(size: tuple[int, int]) -> None:
     (scaled,) = polygons(Camera(mask=[TRIANGLE]), *size)
     expected = (np.array(TRIANGLE) + 0.5) * np.array(size) / (640, 480) - 0.5  # pixel centres at whole numbers
     np.testing.assert_allclose(scaled, expected, atol=1e-4)

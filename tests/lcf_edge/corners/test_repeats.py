@@ -1,4 +1,4 @@
-"""A picture that comes once more tells nothing new, and is known by it."""
+"""An image that comes once more tells nothing new, and is known by it."""
 
 import numpy as np
 import numpy.typing as npt
@@ -30,27 +30,27 @@ def answers(images: list[Grey], every_ns: int = FRAME_NS) -> list[bool]:
 def test_copies_are_repeats_however_often_each_comes(times: list[int]) -> None:
     images = [view(6 * number) for number, copies in enumerate(times) for _ in range(copies)]
     first = [copy == 0 for copies in times for copy in range(copies)]
-    begun = times[0]  # until the picture changes for the first time nothing is known
+    begun = times[0]  # until the image changes for the first time nothing is known
     assert answers(images)[begun:] == [not new for new in first[begun:]]
 
 
-def test_what_a_coder_adds_to_a_copy_makes_it_no_new_picture() -> None:
+def test_what_a_coder_adds_to_a_copy_makes_it_no_new_image() -> None:
     images = [view(6 * (number // 2), noise=0.2, seed=number) for number in range(12)]
     assert answers(images)[2:] == [False, True] * 5
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])
-def test_a_scene_that_stands_still_is_new_in_every_picture(noise: float) -> None:
+def test_a_scene_that_stands_still_is_new_in_every_image(noise: float) -> None:
     assert not any(answers([view(0, noise, seed) for seed in range(40)]))
 
 
-def test_the_noise_of_a_camera_makes_new_pictures_while_the_vehicle_stands() -> None:
+def test_the_noise_of_a_camera_makes_new_images_while_the_vehicle_stands() -> None:
     driving = [view(6 * number, 1.5, number) for number in range(20)]
     standing = [view(6 * 19, 1.5, 20 + number) for number in range(20)]
     assert not any(answers([*driving, *standing]))
 
 
-def test_a_camera_that_gives_one_picture_for_ever_shows_a_scene_that_stands() -> None:
+def test_a_camera_that_gives_one_image_for_ever_shows_a_scene_that_stands() -> None:
     told = answers([*(view(6 * number) for number in range(20)), *[view(6 * 19)] * 40])
     frozen = round(MAX_REPEAT_S * 1e9 / FRAME_NS)
     assert told[20 : 20 + frozen] == [True] * frozen

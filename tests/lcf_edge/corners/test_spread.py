@@ -1,4 +1,4 @@
-"""Which corners are kept: the strongest, none close to another one, from all over the picture."""
+"""Which corners are kept: the strongest, none close to another one, from all over the image."""
 
 from collections import Counter
 
@@ -168,5 +168,5 @@ def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
 
 
 @given(size=st.tuples(st.integers(160, 4000), st.integers(120, 3000)))
-def test_every_picture_has_about_as_many_squares(size: tuple[int, int]) -> None:
+def test_every_image_has_about_as_many_squares(size: tuple[int, int]) -> None:
     assert size[0] * size[1] / side_px(*size) ** 2 == pytest.approx(SQUARES, rel=0.15)

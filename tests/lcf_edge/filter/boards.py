@@ -1,4 +1,4 @@
-"""Pictures of what stands ahead: a board with a pattern before a far background, seen from a vehicle that drives."""
+"""Images of what stands ahead: a board with a pattern before a far background, seen from a vehicle that drives."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ def pattern(width: int, height: int, seed: int, grain_px: float = 2.5) -> Grey:
 
 
 def drawn(image: Grey, texture: Grey, left: float, top: float, scale: float) -> Grey:
-    """The picture with the texture, that many times as large, its corner there, px."""
+    """The image with the texture, that many times as large, its corner there, px."""
     matrix = np.array([[scale, 0, left], [0, scale, top]])
     size = image.shape[1], image.shape[0]
     put = cv2.warpAffine(texture, matrix, size, flags=cv2.INTER_AREA if scale < 0.5 else cv2.INTER_LINEAR)
@@ -35,7 +35,7 @@ def drawn(image: Grey, texture: Grey, left: float, top: float, scale: float) -> 
 
 @dataclass(frozen=True)
 class Board:
-    """A drive towards a board; iterating gives what each step takes, with the picture.
+    """A drive towards a board; iterating gives what each step takes, with the image.
 
     ``range_m``, ``right_m``, ``width_m``, ``height_m``: of the board's middle, at the start and at the camera's height,
     and its size. ``speed_mps``, ``yaw_rate_radps``: as told; the camera itself looks straight ahead. ``flicker``: share
@@ -81,7 +81,7 @@ class Board:
         return drawn(background, texture, left, LENS.cy - self.height_m / 2 * px_m, self.width_m * px_m / 200)
 
     def floored(self, image: Grey, height_m: float, driven_m: float) -> Grey:
-        """The picture with a floor of soft blobs below the horizon, 50 px a metre."""
+        """The image with a floor of soft blobs below the horizon, 50 px a metre."""
         floor = pattern(400, 1200, self.seed + 200, 4.0)
         u, v = np.meshgrid(np.arange(LENS.width), np.arange(LENS.height))
         below = np.maximum(v - LENS.cy, 0.5)

@@ -97,7 +97,7 @@ class Drive:
         return np.stack([lens.cx + lens.fx * x / z, lens.cy + lens.fy * y / z], axis=1).astype(np.float32)
 
     def corners(self, seq: int) -> Corners:
-        """Those in the picture, at whole pixels of the input frame."""
+        """Those in the image, at whole pixels of the input frame."""
         raw = np.rint(self.lens.distort(self.in_image(seq)))
         size = self.lens.width, self.lens.height
         seen = np.flatnonzero(((raw >= 0) & (raw < size)).all(axis=1))  # NaN compares false

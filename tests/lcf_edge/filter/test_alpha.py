@@ -46,7 +46,7 @@ def test_a_landmark_that_crosses_is_a_rebel_after_three_key_frames_and_not_befor
     found = rebels_by_frame(drive(np.array([HIGH]), np.array(velocity_mps), frames=10, fps=fps), config)
     assert not any(found[: KEY_FRAMES - 1])
     assert {0} in found[KEY_FRAMES - 1 : LATEST]
-    if fps == 20:  # at fewer it may be lost between two pictures, and found again
+    if fps == 20:  # at fewer it may be lost between two images, and found again
         assert all(rebels == {0} for rebels in found[LATEST:])
 
 

@@ -61,7 +61,7 @@ def test_what_is_about_the_horizon_is_not_flat(situation: Situation) -> None:
 
 
 def test_paint_that_keeps_station_does_not_lead(drive: Drive, clutter: Landmarks) -> None:
-    """As the end of a lane line does, that is always where the picture ends."""
+    """As the end of a lane line does, that is always where the image ends."""
     random = np.random.default_rng(5)
     strip = np.stack([random.uniform(-0.3, 0.3, 40), np.full(40, 0.3), random.uniform(2.0, 2.3, 40)], axis=1)
     way = replace(drive(clutter(200)) + drive(strip, np.array([0, 0, 2.0])), frames=18)

@@ -1,4 +1,4 @@
-"""What crosses fast, and has no corner that is found again, is found in the picture in small."""
+"""What crosses fast, and has no corner that is found again, is found in the image in small."""
 
 import math
 from collections.abc import Iterator
@@ -23,14 +23,14 @@ from lcf_edge.small_image import SmallImage
 
 Grey = npt.NDArray[np.uint8]
 
-LENS = Lens(640, 480, 1500.0, 1500.0, 319.5, 239.5)  # so narrow that a turn shifts all of the picture alike
+LENS = Lens(640, 480, 1500.0, 1500.0, 319.5, 239.5)  # so narrow that a turn shifts all of the image alike
 SMALL = SmallImage(LENS.width, LENS.height)
 CONFIG = Config(camera=Camera(height_m=0.5), vehicle=Vehicle(half_width_m=0.4, height_m=1.2))
 DT_S = 0.1
 
 
 def far_background(seed: int = 0) -> Grey:
-    """Soft blobs, three pictures wide."""
+    """Soft blobs, three images wide."""
     noise = np.random.default_rng(seed).normal(size=(LENS.height, 3 * LENS.width)).astype(np.float32)
     soft = cv2.GaussianBlur(noise, (0, 0), 12)
     return np.asarray(np.clip(150 + 25 * soft / soft.std(), 0, 255), np.uint8)
@@ -41,9 +41,9 @@ BACKGROUND = far_background()
 
 @dataclass(frozen=True)
 class Passing:
-    """A plain dark thing before a far background; iterating gives the motion and the picture of each step.
+    """A plain dark thing before a far background; iterating gives the motion and the image of each step.
 
-    ``left``, ``top``, ``width``, ``height``: px, in the first picture. ``pxps``: its motion. ``turn_rad``: by which the
+    ``left``, ``top``, ``width``, ``height``: px, in the first image. ``pxps``: its motion. ``turn_rad``: by which the
     camera turns in each frame. ``grows``: by which it stands nearer in each. ``until_seq``: then it is gone.
     ``contrast``: of the background. ``blobs``: of the thing itself, grey levels.
     """
@@ -128,19 +128,19 @@ def test_it_becomes_an_object() -> None:
 
 
 @pytest.mark.parametrize(("left", "width", "first"), [(-300.0, 400.0, 6), (0.0, 300.0, 6), (0.0, 60.0, 4)])
-def test_what_passes_near_from_top_to_bottom_of_the_picture_is_found(left: float, width: float, first: int) -> None:
+def test_what_passes_near_from_top_to_bottom_of_the_image_is_found(left: float, width: float, first: int) -> None:
     near = Passing(left=left, top=0.0, width=width, height=480.0, pxps=(500.0, 0.0), dt_s=0.05, blobs=20.0)
     found = rebels(near)
     assert found[first]
     assert found[-1]
 
 
-def test_slow_motion_is_seen_since_an_older_picture() -> None:
+def test_slow_motion_is_seen_since_an_older_image() -> None:
     slow = Passing(pxps=(100.0, 0.0), dt_s=0.05, frames=20)  # 5 px a frame, less than one of the small ones
     assert rebels(slow)[-1] == 1
 
 
-def test_what_is_seen_to_move_for_two_pictures_only_is_nothing() -> None:
+def test_what_is_seen_to_move_for_two_images_only_is_nothing() -> None:
     assert not any(tables.rebel.active.any() for _, tables in driven(Passing(until_seq=3)))
 
 
@@ -176,7 +176,7 @@ def test_where_the_rotation_is_uncertain_nothing_is_told() -> None:
         assert not tables.rebel.active.any()
 
 
-def test_a_picture_too_small_for_a_piece_is_no_fault() -> None:
+def test_an_image_too_small_for_a_piece_is_no_fault() -> None:
     lens = Lens(16, 12, 12.0, 12.0, 7.5, 5.5)
     tables = LineCircleFilter(CONFIG, lens)
     small = SmallImage(16, 12)
@@ -186,7 +186,7 @@ def test_a_picture_too_small_for_a_piece_is_no_fault() -> None:
 
 
 @pytest.mark.parametrize("size", [(640, 480), (160, 120), (1242, 375), (1920, 1080), (3, 2), (1, 1)])
-def test_in_small_every_picture_has_about_as_many_pixels(size: tuple[int, int]) -> None:
+def test_in_small_every_image_has_about_as_many_pixels(size: tuple[int, int]) -> None:
     width, height = size
     small = SmallImage(width, height)
     image = np.full((height, width), 77, np.uint8)
@@ -198,7 +198,7 @@ def test_in_small_every_picture_has_about_as_many_pixels(size: tuple[int, int]) 
 
 
 def dark_car(turn_radps: float) -> Drive:
-    """A nearly black car crosses 11 m ahead at 9 m/s, before a bright sky; ten pictures a second."""
+    """A nearly black car crosses 11 m ahead at 9 m/s, before a bright sky; ten frames a second."""
     still = Profile(((0.0, 0.0),))
     lens = RenderedLens(1242, 375, 720.0)
     drive = Drive("dark_car", 0, 6.0, 10.0, Profile(((0.0, 4.0), (6.0, 5.0))), still, (), lens, SensorNoise())

@@ -55,7 +55,7 @@ def derotate(
 
 
 def spread(number: int, seed: int = 0) -> npt.NDArray[np.float32]:
-    """(2, n) places in the picture."""
+    """(2, n) places in the image."""
     return np.random.default_rng(seed).uniform([[10], [10]], [[630], [470]], (2, number)).astype(np.float32)
 
 
@@ -95,7 +95,7 @@ def test_every_stored_position_is_warped() -> None:
     ],
 )
 def test_own_directions_turn_with_a_roll_and_with_nothing_else(axis: tuple[float, float, float], roll: float) -> None:
-    """As the middle of the picture does."""
+    """As the middle of the image does."""
     edges, circles = EdgeTable(4, 2, 2), (CircleTable(3), CircleTable(3))
     edges.append(4)
     edges.beta[:4], edges.rebel[:2], edges.suspect_keys[2:4] = 0.5, True, 1

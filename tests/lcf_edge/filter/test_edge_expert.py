@@ -1,4 +1,4 @@
-"""What crosses and comes near is followed although it accelerates in the picture."""
+"""What crosses and comes near is followed although it accelerates in the image."""
 
 import numpy as np
 import pytest

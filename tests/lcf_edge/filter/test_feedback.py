@@ -87,7 +87,7 @@ def test_a_rectangle_is_taken_where_it_fits_better(
 ) -> None:
     middle = (-2.56, -0.51, 8.0)  # of one of the squares in which newborn circles are gathered
     row = drive(box(middle, size_m, landmarks=40), frames=10)
-    squares = Config(filter=Filter(bs_px=64 * REFERENCE_FOCAL_PX / row.lens.fx))  # of 64 px in this picture
+    squares = Config(filter=Filter(bs_px=64 * REFERENCE_FOCAL_PX / row.lens.fx))  # of 64 px in this image
     tables = next(tables for _, tables, _ in steps(row, squares) if tables.psi.active.any())
     assert {Shape(int(shape)) for shape in tables.psi.shape[tables.psi.active]} == {shape}
 

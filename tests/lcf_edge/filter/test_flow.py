@@ -76,7 +76,7 @@ def test_distance_from_the_line_is_the_papers(beta: float, dx: float, dy: float)
 
 
 @given(st.tuples(small, small, small), st.lists(st.tuples(aside, aside), min_size=1, max_size=8))
-def test_a_picture_warped_by_h_is_the_projection_of_rotated_rays(
+def test_an_image_warped_by_h_is_the_projection_of_rotated_rays(
     axis: tuple[float, float, float], rays: list[tuple[float, float]]
 ) -> None:
     rotation = cv2.Rodrigues(np.array(axis))[0]

@@ -102,7 +102,7 @@ class Seen:
         return np.asarray(cv2.Rodrigues(elapsed_s * np.array(self.rate_radps))[0])
 
     def rotation_px(self, slot: int) -> float:
-        """By how much the baseline is wrong, rms px over the picture."""
+        """By how much the baseline is wrong, rms px over the image."""
         turned = self.rotation(self.baselines.elapsed_s[slot])
         off = []
         for x, y in ((100.0, 100.0), (540.0, 100.0), (319.0, 240.0), (100.0, 400.0), (540.0, 400.0)):

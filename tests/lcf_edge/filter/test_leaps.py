@@ -1,4 +1,4 @@
-"""What leaps across the picture is found by the shift that its edges agree on."""
+"""What leaps across the image is found by the shift that its edges agree on."""
 
 from dataclasses import dataclass, field
 
@@ -21,14 +21,14 @@ from lcf_edge.lens import Lens
 
 LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
 SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
-REACH_PX = 102.0  # 0.16 of the picture's width
+REACH_PX = 102.0  # 0.16 of the image's width
 RIGHT = np.array([70, 0])
 
 Places = npt.NDArray[np.int64]
 
 
 def spread(number: int, seed: int = 1) -> Places:
-    """Places inside one part of the picture, some px apart."""
+    """Places inside one part of the image, some px apart."""
     cells = np.random.default_rng(seed).choice(49, number, replace=False)
     return np.stack([250 + 9 * (cells % 7), 170 + 9 * (cells // 7)], axis=1)
 

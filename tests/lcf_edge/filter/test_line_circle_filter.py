@@ -367,7 +367,7 @@ def test_mirrored_input_gives_mirrored_output(street: Any, lens: Lens, yaw_rate_
 def test_both_profiles_tell_what_passes_from_what_moves(
     drive: Drive, clutter: Landmarks, box: Landmarks, profile: str, fps: float, speed_mps: float
 ) -> None:
-    """The paper's rover drives at 5 cm/s and takes one picture a second: a fortieth of the time."""
+    """The paper's rover drives at 5 cm/s and takes one frame a second: a fortieth of the time."""
     config = load(settings=[f"filter.profile={profile}", "vehicle.horizon_s=4" if fps > 1 else "vehicle.horizon_s=60"])
     slower = speed_mps / 2.0
     seconds = 1.2 / slower

@@ -240,7 +240,7 @@ def test_only_edges_that_are_not_held_and_corners_that_are_free_meet(lens: Lens)
     assert frame.find() == [row if row % 6 == 0 else -1 for row in range(40)]
 
 
-def test_edges_outside_the_picture_find_nothing(lens: Lens) -> None:
+def test_edges_outside_the_image_find_nothing(lens: Lens) -> None:
     corners = crowd(lens, 40)
     frame = Frame(lens, corners)
     frame.expect([-1.0, 640.0, 320.0, np.nan], [240.0, 240.0, 480.0, 240.0], corners.appearance[:4], 640.0)
@@ -273,11 +273,11 @@ def test_the_same_input_gives_the_same_pairs(lens: Lens, seed: int, spread: floa
     assert found[0] == found[1]
 
 
-# The picture
+# The image
 
 
 @LENSES
-def test_in_the_picture_is_what_the_camera_can_see(lens: Lens) -> None:
+def test_in_the_image_is_what_the_camera_can_see(lens: Lens) -> None:
     edge = np.array([[0, 0], [639, 479], [-2, 240], [641, 240], [320, -2], [320, 481], [320, 240]], np.float32)
     position = lens.undistort(edge)
     expected = [True, True, False, False, False, False, True]
@@ -297,7 +297,7 @@ def test_places_in_the_input_frame_are_those_of_the_lens(lens: Lens, x: float, y
 
 
 @given(st.floats(-1e6, 1e6), st.floats(0, 1e6), st.integers(1, 200))
-def test_a_place_outside_the_picture_has_no_cells_around_it(middle: float, gate: float, cells: int) -> None:
+def test_a_place_outside_the_image_has_no_cells_around_it(middle: float, gate: float, cells: int) -> None:
     first, last = matching.first_cell(middle, gate, cells), matching.last_cell(middle, gate, cells)
     assert 0 <= first <= cells
     assert -1 <= last < cells

@@ -163,12 +163,12 @@ def test_after_every_frame_what_is_seen_and_will_be_met_has_a_circle(
     assert due > 5
 
 
-# What has left the picture
+# What has left the image
 
 
 @pytest.mark.parametrize("side", [-1, 1])
 @pytest.mark.parametrize(("in_sight_px", "ends"), [(14.0, True), (16.0, False)])
-def test_circles_end_with_a_quarter_of_what_is_seen_no_more_in_the_picture(
+def test_circles_end_with_a_quarter_of_what_is_seen_no_more_in_the_image(
     situation: Situation, side: int, in_sight_px: float, ends: bool
 ) -> None:
     """Of an object 60 px wide, which itself goes on."""

@@ -1,4 +1,4 @@
-"""Edges that stay where they are in the picture are the vehicle's own, and nobody's rebels."""
+"""Edges that stay where they are in the image are the vehicle's own, and nobody's rebels."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -16,7 +16,7 @@ Landmarks = Callable[..., npt.NDArray[np.float64]]
 
 FPS = 20
 OWN_PART_S = 1.0
-ONE_SECOND = FPS + 1  # the first picture begins it
+ONE_SECOND = FPS + 1  # the first image begins it
 
 
 class Bumper:
@@ -58,7 +58,7 @@ def is_own_part(tables: LineCircleFilter, row: int) -> bool:
     return bool(tables.edges.fixed_s[row] >= OWN_PART_S)
 
 
-def test_what_stays_in_the_picture_for_a_second_is_nobodys_rebel(street: Any) -> None:
+def test_what_stays_in_the_image_for_a_second_is_nobodys_rebel(street: Any) -> None:
     tables, bumper = LineCircleFilter(Config(), street.lens), Bumper(street)
     for seq, (corners, motion) in enumerate(bumper):
         tables.step(corners, motion)

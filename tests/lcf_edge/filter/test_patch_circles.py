@@ -1,4 +1,4 @@
-"""What stands ahead and comes slowly is found by how much a piece of the picture grows, though its corners flicker."""
+"""What stands ahead and comes slowly is found by how much a piece of the image grows, though its corners flicker."""
 
 import math
 

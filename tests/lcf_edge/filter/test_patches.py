@@ -1,4 +1,4 @@
-"""Patches: a piece of the picture is found again with its place and its scale, or not at all."""
+"""Patches: a piece of the image is found again with its place and its scale, or not at all."""
 
 import cv2
 import numpy as np
@@ -35,7 +35,7 @@ def follow(patches: Patches, image: Grey, lens: Lens = LENS) -> None:
 
 
 def grown(image: Grey, scale: float, right_px: float = 0.0, down_px: float = 0.0) -> Grey:
-    """The picture about the middle of the patch, that many times as large, and shifted."""
+    """The image about the middle of the patch, that many times as large, and shifted."""
     x, y = MIDDLE
     matrix = np.array([[scale, 0, x - scale * x + right_px], [0, scale, y - scale * y + down_px]])
     return np.asarray(cv2.warpAffine(image, matrix, (640, 480), flags=cv2.INTER_CUBIC), np.uint8)
@@ -61,7 +61,7 @@ def test_place_and_scale_are_found_to_a_part_of_a_pixel_whatever_the_light(
     assert patches.sigma[0] < 0.03
 
 
-def test_over_many_pictures_the_scale_is_that_since_the_first_one() -> None:
+def test_over_many_images_the_scale_is_that_since_the_first_one() -> None:
     image = pattern(640, 480, 3, 4.0)
     patches = born(image)
     assert patches is not None
@@ -116,7 +116,7 @@ def test_what_does_not_show_its_scale_is_no_patch(nothing: str) -> None:
     assert born(image, x=5.0 if nothing == "at the border" else MIDDLE[0]) is None
 
 
-def test_what_is_gone_is_missed_and_ends_after_a_few_pictures() -> None:
+def test_what_is_gone_is_missed_and_ends_after_a_few_images() -> None:
     patches = born(pattern(640, 480, 1))
     assert patches is not None
     for missed in range(1, MAX_MISSES + 1):

@@ -50,7 +50,7 @@ def test_what_stands_has_the_range_of_its_looming(situation: Situation, range_m:
 
 @pytest.mark.parametrize("side", [-1, 1])
 def test_who_leaves_to_the_side_does_not_stand_and_is_not_met(situation: Situation, side: int) -> None:
-    """He walks off at the vehicle's side as fast as the picture shows: near things that stand would loom."""
+    """He walks off at the vehicle's side as fast as the image shows: near things that stand would loom."""
     evidence = evidence_of(5.0, 0.0, 1.2 * side, 0.35 * side, 1.5)
     belief = belief_of(evidence, situation(speed_mps=1.5))
     assert belief.stands < 0.01
@@ -59,7 +59,7 @@ def test_who_leaves_to_the_side_does_not_stand_and_is_not_met(situation: Situati
     assert belief.mean[RIGHT] == pytest.approx(1.2 * side, rel=0.3)
 
 
-def test_what_moves_in_the_picture_of_a_vehicle_at_rest_does_not_stand(situation: Situation) -> None:
+def test_what_moves_in_the_image_of_a_vehicle_at_rest_does_not_stand(situation: Situation) -> None:
     belief = belief_of(evidence_of(4.0, -1.0, 0.0, 0.0, 0.0), situation(speed_mps=0.0))
     assert belief.stands < 0.01
     assert belief.mean[FORWARD] < -0.5
@@ -89,7 +89,7 @@ def test_nothing_stands_deep_under_the_ground(situation: Situation) -> None:
 
 
 @pytest.mark.parametrize(("is_cut", "nearer"), [(False, False), (True, True)])
-def test_a_foot_beyond_the_picture_says_only_that_the_thing_is_no_farther(
+def test_a_foot_beyond_the_image_says_only_that_the_thing_is_no_farther(
     situation: Situation, is_cut: bool, nearer: bool
 ) -> None:
     """Somebody who crosses, of whom the ground under the lowest edge is 4 m off."""

@@ -193,7 +193,7 @@ def test_rebels_that_do_not_go_together_make_two(scene: Scene, other: tuple[floa
     [(430.0, 20.0, 0.5, 1), (430.0, 120.0, 0.5, 2), (330.0, 20.0, 0.5, 2), (430.0, 20.0, 0.0, 2)],
     ids=["near", "near, but not alike", "farther off", "height unknown"],
 )
-def test_groups_far_apart_in_the_picture_are_one_where_what_is_seen_is_near(
+def test_groups_far_apart_in_the_image_are_one_where_what_is_seen_is_near(
     situation: Situation, y: float, other_pxps: float, height_m: float, groups: int
 ) -> None:
     around = situation(camera_height_m=height_m)  # at row 430 the ground is 1.3 m off: 0.3 m are 114 px
@@ -334,7 +334,7 @@ def test_what_was_seen_twice_alone_does_not_coast(situation: Situation) -> None:
     assert scene.update().trust == [before - 1]
 
 
-def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_picture(situation: Situation, lens: Lens) -> None:
+def test_what_is_about_to_be_met_ends_when_its_extent_has_left_the_image(situation: Situation, lens: Lens) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
     circles = scene.circles
@@ -361,7 +361,7 @@ def test_what_is_about_to_be_met_and_hides_all_that_flows_stays_until_contact(si
     (before,) = scene.trust
     circles.unseen_s[:] = HORIZON_S  # longer than anything coasts
     assert scene.update().trust == [before]
-    circles.x[:] = 900.0  # it ran out of the picture, as what crosses does
+    circles.x[:] = 900.0  # it ran out of the image, as what crosses does
     rebel_circles.end_outside(circles.columns, ImagePlane(lens), scene.around, SETTINGS)
     assert scene.trust == [before]
     scene.around.flow_is_seen = True
@@ -369,7 +369,7 @@ def test_what_is_about_to_be_met_and_hides_all_that_flows_stays_until_contact(si
     assert scene.trust == []
 
 
-def test_circles_stay_while_something_covers_the_picture_for_up_to_a_second(situation: Situation) -> None:
+def test_circles_stay_while_something_covers_the_image_for_up_to_a_second(situation: Situation) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
     circles, around = scene.circles, scene.around
@@ -385,7 +385,7 @@ def test_circles_stay_while_something_covers_the_picture_for_up_to_a_second(situ
     assert scene.update().trust == [TR_S - 1]
 
 
-def test_a_circle_that_is_not_seen_again_with_the_picture_is_told_no_more(situation: Situation) -> None:
+def test_a_circle_that_is_not_seen_again_with_the_image_is_told_no_more(situation: Situation) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
     scene.around.is_blind = True

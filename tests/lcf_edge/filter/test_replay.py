@@ -1,4 +1,4 @@
-"""From pictures to circles: rendered drives against their truth, and a real one where nothing threatens."""
+"""From images to circles: rendered drives against their truth, and a real one where nothing threatens."""
 
 import os
 from dataclasses import replace

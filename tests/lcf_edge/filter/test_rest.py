@@ -1,4 +1,4 @@
-"""Whether the vehicle stands, as the picture tells, although a speed is told."""
+"""Whether the vehicle stands, as the image tells, although a speed is told."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -15,7 +15,7 @@ Drive = Callable[..., Any]
 Landmarks = Callable[..., npt.NDArray[np.float64]]
 
 MEASURED_MPS = 2.0
-SOON = 15  # pictures, 0.75 s
+SOON = 15  # images, 0.75 s
 
 
 def verdicts(way: Any, config: Config | None = None, measured_mps: float = MEASURED_MPS) -> Iterator[LineCircleFilter]:
@@ -51,7 +51,7 @@ def test_who_drives_does_not_stand(street: Any, speed_mps: float) -> None:
     assert not any(tables.stands for tables in verdicts(way, measured_mps=speed_mps))
 
 
-def test_who_stands_where_somebody_walks_is_seen_to_stand_in_most_pictures(
+def test_who_stands_where_somebody_walks_is_seen_to_stand_in_most_images(
     street: Any, drive: Drive, box: Landmarks
 ) -> None:
     walker = drive(box((-2, -0.6, 5), (0.5, 1.2, 0.3)), np.array([1.2, 0, 0]))

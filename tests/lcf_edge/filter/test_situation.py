@@ -47,7 +47,7 @@ def test_a_camera_that_looks_up_or_right_sees_the_focus_below_or_left() -> None:
 
 
 def test_a_turn_of_the_vehicle_leaves_the_focus_where_it_is() -> None:
-    """A left turn moves the picture right, and with it nothing that drives."""
+    """A left turn moves the image right, and with it nothing that drives."""
     ahead = Ahead()
     for _ in range(40):
         ahead.turn(motion((0.0, 0.4 * 0.05, 0.0), yaw_rate_radps=0.4))
@@ -55,7 +55,7 @@ def test_a_turn_of_the_vehicle_leaves_the_focus_where_it_is() -> None:
 
 
 @pytest.mark.parametrize(("axis", "shift"), [((0.02, 0, 0), (0, -10)), ((0, 0.02, 0), (10, 0))])
-def test_a_shake_moves_the_focus_with_the_picture(axis: tuple[float, float, float], shift: tuple[float, float]) -> None:
+def test_a_shake_moves_the_focus_with_the_image(axis: tuple[float, float, float], shift: tuple[float, float]) -> None:
     ahead = Ahead()
     ahead.turn(motion(axis))
     assert np.array(ahead.focus) - (319.5, 239.5) == pytest.approx(shift, abs=2)

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -210,7 +211,7 @@ def before_a_wall(drive: Drive, box: Landmarks, clutter: Landmarks) -> tuple[Lin
 def test_what_stands_before_a_vehicle_that_stops_stays_where_it_was(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
-    """Nothing moves in the picture any more: it breaks no flow, and is still there; what is known of it stays."""
+    """Nothing moves in the image any more: it breaks no flow, and is still there; what is known of it stays."""
     tables, corners, motion = before_a_wall(drive, box, clutter)
     (row,) = published(tables.objects)
     identity, numbers = tables.objects.id[row], []
@@ -240,7 +241,7 @@ def test_before_a_vehicle_that_stands_an_object_is_not_held_by_what_lies_beside_
     assert (np.abs(edges.x[: edges.count][own] - tables.objects.x[row]) <= 1.5 * width).all()
 
 
-def test_who_leaves_the_picture_at_its_side_is_expected_there_for_a_second(
+def test_who_leaves_the_image_at_its_side_is_expected_there_for_a_second(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
     """He walks towards the path beside a faster vehicle, so that it loses sight of him."""
@@ -282,7 +283,7 @@ def test_what_is_reported_does_not_depend_on_the_frame_rate(
 
 
 def remembered_s(way: Any, walker: slice, speed_mps: float) -> float:
-    """For how long whoever left the picture is reported, while the vehicle goes on so slowly that nothing flows."""
+    """For how long whoever left the image is reported, while the vehicle goes on so slowly that nothing flows."""
     tables, mine, seen = LineCircleFilter(Config(), way.lens), {looks.tobytes() for looks in way.looks[walker]}, False
     for corners, motion in way:
         in_sight = any(looks.tobytes() in mine for looks in corners.appearance)
@@ -301,7 +302,7 @@ def remembered_s(way: Any, walker: slice, speed_mps: float) -> float:
 @pytest.mark.parametrize(
     ("start_m", "right_mps", "about_s"), [((1.5, 3.8), -0.45, 2.8), ((0.9, 3.2), 0.4, 1.0)], ids=["comes", "leaves"]
 )
-def test_who_left_the_picture_at_its_side_is_remembered_longer_if_he_walks_towards_the_path(
+def test_who_left_the_image_at_its_side_is_remembered_longer_if_he_walks_towards_the_path(
     drive: Drive, box: Landmarks, clutter: Landmarks, start_m: tuple[float, float], right_mps: float, about_s: float
 ) -> None:
     x, z = start_m
@@ -352,4 +353,4 @@ def test_the_few_corners_left_of_what_is_near_do_not_tell_how_it_moves(
         ranges_m.append([float(tables.objects.range[row]) for row in published(tables.objects)])
     assert len(ranges_m[19]) == 1
     assert all(len(each) == 1 for each in ranges_m[20:])
-    assert all(after[0] < before[0] for before, after in zip(ranges_m[20:], ranges_m[21:], strict=False))
+    assert all(after[0] < before[0] for before, after in pairwise(ranges_m[20:]))

@@ -18,7 +18,7 @@ Landmarks = Callable[..., npt.NDArray[np.float64]]
 
 CAMERA_M = 0.5
 CONFIG = Config(camera=Camera(height_m=CAMERA_M))
-AHEAD, ASIDE = (320.0, 260.0), (90.0, 260.0)  # px of a picture of 640 x 480; O is in its middle
+AHEAD, ASIDE = (320.0, 260.0), (90.0, 260.0)  # px of an image of 640 x 480; O is in its middle
 HALF_PX = 60.0
 CORNERS = 60  # of what is in turmoil
 FLUTTERING = 250  # about somebody with few corners: hardly one of all is found again
@@ -29,7 +29,7 @@ class Storm:
     """A drive among landmarks, with corners about ``place`` that are other ones in each frame; iterating gives a step.
 
     ``half_px``: half its side. ``stay``: corners that it keeps from ``stay_from`` on. ``from_seq``, ``until_seq``: only
-    from there on, and no more then. ``all_of_it``: of the landmarks none is found again either, as in a picture that
+    from there on, and no more then. ``all_of_it``: of the landmarks none is found again either, as in an image that
     shakes.
     """
 
@@ -170,9 +170,9 @@ def test_corners_inside_it_expect_no_motion_of_it(calm: Any) -> None:
     "changes",
     [
         pytest.param({"until_seq": 4}, id="without it"),
-        pytest.param({"until_seq": 5}, id="one bad picture"),
-        pytest.param({"all_of_it": True}, id="all the picture is lost"),
-        pytest.param({"place": (620.0, 20.0), "half_px": 20.0}, id="at the picture's border"),
+        pytest.param({"until_seq": 5}, id="one bad image"),
+        pytest.param({"all_of_it": True}, id="all the image is lost"),
+        pytest.param({"place": (620.0, 20.0), "half_px": 20.0}, id="at the image's border"),
     ],
 )
 def test_other_reasons_to_lose_corners_are_none(calm: Any, changes: dict[str, Any]) -> None:
@@ -187,7 +187,7 @@ def test_beside_a_fast_vehicle_what_stands_is_lost_too_and_beside_one_that_rests
 
 
 def test_the_ground_before_a_fast_vehicle_is_lost_as_well(calm: Any) -> None:
-    """A picture that shakes has many corners there, and finds few of them again, however far all else is."""
+    """An image that shakes has many corners there, and finds few of them again, however far all else is."""
     near = Storm(replace(calm, speed_mps=3.0), place=(320.0, 420.0), half_px=40.0)
     assert after(near)[1] == 0
     assert after(near, Config(camera=Camera(height_m=3.0)))[1] > 0
@@ -227,7 +227,7 @@ def test_a_circle_goes_on_while_most_edges_are_still_lost(calm: Any, stay: int, 
 
 @dataclass(frozen=True)
 class Cover:
-    """A drive among landmarks, and from ``from_seq`` on something plain before a part of the picture.
+    """A drive among landmarks, and from ``from_seq`` on something plain before a part of the image.
 
     ``step_px``: by which it comes in from the left in a frame, until it hides all left of ``right_px``. ``leaves``:
     every so-many landmark behind it is seen all the same.
@@ -273,7 +273,7 @@ def test_what_comes_before_the_camera_without_a_corner_is_told_by_what_it_hides(
     "changes",
     [
         pytest.param({"from_seq": 100}, id="nothing comes"),
-        pytest.param({"right_px": 700.0, "step_px": 700.0}, id="all the picture is hidden: it may be the lens"),
+        pytest.param({"right_px": 700.0, "step_px": 700.0}, id="all the image is hidden: it may be the lens"),
         pytest.param({"right_px": 60.0}, id="a narrow thing, far off"),
         pytest.param({"leaves": 3}, id="one in three is seen through it: leaves, or glare"),
     ],
@@ -282,8 +282,8 @@ def test_other_reasons_to_lose_what_was_trusted_are_none(slow: Any, changes: dic
     assert not any(covered(replace(Cover(slow), **changes)))
 
 
-def test_what_sweeps_over_the_whole_picture_is_one_circle_until_it_covers_it_and_then(slow: Any) -> None:
-    """A car that crosses right before the camera leaps a quarter of the picture in each frame."""
+def test_what_sweeps_over_the_whole_image_is_one_circle_until_it_covers_it_and_then(slow: Any) -> None:
+    """A car that crosses right before the camera leaps a quarter of the image in each frame."""
     sweeps = Cover(slow, right_px=700.0, step_px=150.0)
     tables, told = LineCircleFilter(CONFIG, slow.lens), []
     for corners, motion in sweeps:
@@ -294,7 +294,7 @@ def test_what_sweeps_over_the_whole_picture_is_one_circle_until_it_covers_it_and
 
 
 @pytest.mark.parametrize("all_of_it", [True, False])
-def test_a_picture_in_which_hardly_an_edge_is_found_is_covered(calm: Any, all_of_it: bool) -> None:
+def test_an_image_in_which_hardly_an_edge_is_found_is_covered(calm: Any, all_of_it: bool) -> None:
     tables, _ = after(Storm(calm, all_of_it=all_of_it))
     assert tables._around.is_blind == all_of_it
 
