@@ -73,11 +73,9 @@ class Bmi160(FifoImu):
         }
 
     def _reset(self) -> None:
-        for command, pause_s in (
-            (SOFT_RESET, RESET_S),
-            (ACCEL_NORMAL, ACCEL_START_S),
-            (GYRO_NORMAL, GYRO_START_S),
-        ):
+        self._command_reset(CMD, SOFT_RESET)
+        self._clock.sleep_s(RESET_S)
+        for command, pause_s in ((ACCEL_NORMAL, ACCEL_START_S), (GYRO_NORMAL, GYRO_START_S)):
             self._write(CMD, command)
             self._clock.sleep_s(pause_s)
         if self._read(PMU_STATUS, 1)[0] & 0x3C != BOTH_NORMAL:

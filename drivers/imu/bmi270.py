@@ -101,7 +101,7 @@ class Bmi270(Bmi160):
 
     def _reset(self) -> None:
         firmware = self._read_firmware()
-        self._write(CMD, SOFT_RESET)
+        self._command_reset(CMD, SOFT_RESET)
         self._clock.sleep_s(RESET_S)
         self._write(PWR_CONF, 0)
         self._clock.sleep_s(AWAKE_S)

@@ -96,8 +96,7 @@ class Bno055(I2cImu):
 
     def _reboot(self) -> None:
         """Reset the chip and wait until it says who it is. Raises ``DeviceLostError``."""
-        with suppress(TransferError):  # it is gone before it would acknowledge
-            self._bus.write(self.address, SYS_TRIGGER, bytes([RESET]), tries=1)
+        self._command_reset(SYS_TRIGGER, RESET)
         end_ns = self._clock.monotonic_ns() + round(MAX_BOOT_S * 1e9)
         self._clock.sleep_s(BOOT_S)
         while self._clock.monotonic_ns() < end_ns:

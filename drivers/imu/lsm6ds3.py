@@ -77,7 +77,7 @@ class Lsm6ds3(FifoImu):
             self.thermometer = Thermometer(OUT_TEMP_L, "little", lsb_per_c=256, zero_c=25.0)
             self.fifo_bytes = 4096
         self._write(FIFO_CTRL5, 0)  # a reset while the FIFO fills is not acknowledged (richcreations/imud#72)
-        self._write(CTRL3_C, SW_RESET)
+        self._command_reset(CTRL3_C, SW_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:

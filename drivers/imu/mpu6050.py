@@ -76,7 +76,7 @@ class Mpu6050(FifoImu):
         return min((code for code, width_hz in FILTERS_HZ.items() if width_hz <= self.rate_hz / 2), default=6)
 
     def _reset(self) -> None:
-        self._write(PWR_MGMT_1, DEVICE_RESET)
+        self._command_reset(PWR_MGMT_1, DEVICE_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:
