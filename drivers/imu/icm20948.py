@@ -1,7 +1,8 @@
 """TDK InvenSense ICM-20948; its magnetometer is left alone.
 
-ICM-20948 Datasheet, DS-000189 revision 1.3. Registers lie in four banks: here the high byte of a register is what
-REG_BANK_SEL holds. The ranges are those of the MPU-6050.
+ICM-20948 Datasheet, DS-000189 revision 1.3; PX4 (InvenSense_ICM20948_registers.hpp) and SparkFun's library
+(ICM_20948_REGISTERS.h) agree. Registers lie in four banks: here the high byte of a register is what REG_BANK_SEL holds.
+The ranges are those of the MPU-6050.
 """
 
 import struct

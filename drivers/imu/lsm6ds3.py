@@ -1,7 +1,7 @@
 """ST LSM6DS3 and LSM6DS3TR-C.
 
 LSM6DS3 data sheet DocID026899 revision 8, application note AN4650; LSM6DS3TR-C data sheet DocID030071 revision 3
-(half the FIFO, finer thermometer, otherwise the same registers).
+(half the FIFO, finer thermometer, otherwise the same registers). Linux (st_lsm6dsx_core.c) agrees.
 """
 
 import sys

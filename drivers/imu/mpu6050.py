@@ -1,7 +1,7 @@
 """TDK InvenSense MPU-6050 (and MPU-6000, the IMU of the MPU-9150).
 
-MPU-6000/MPU-6050 Register Map and Descriptions, RM-MPU-6000A-00 revision 4.2; Product Specification,
-PS-MPU-6000A-00 revision 3.4.
+MPU-6000/MPU-6050 Register Map and Descriptions, RM-MPU-6000A-00 revision 4.2; Product Specification, PS-MPU-6000A-00
+revision 3.4. PX4 (InvenSense_MPU6000_registers.hpp) agrees, Linux (inv_mpu_core.c) on rates and filters.
 """
 
 import struct
