@@ -347,7 +347,7 @@ def test_unplugged_and_plugged_in_again_it_comes_back(rig: RigMaker, driver: str
     for _ in range(4):
         assert kept.read() == []
     assert isinstance(kept.error, DriverError)
-    chip.power_up()
+    chip.brown_out()
     bench.wire.chips[chip.address] = chip
     plugged_ns = bench.clock.monotonic_ns()
     samples: list[Any] = []
