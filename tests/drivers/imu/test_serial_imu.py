@@ -1,5 +1,6 @@
 """Serial IMUs by the real driver, through a real terminal, and everything that goes wrong with them."""
 
+import errno
 import math
 import os
 import re
@@ -491,6 +492,17 @@ def test_no_permission_names_the_group(plug: Plug) -> None:
     finally:
         if privileged:
             os.seteuid(0)
+
+
+def test_a_port_that_the_services_unit_leaves_out_is_no_matter_of_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused_by_the_device_policy(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr("drivers.imu.serial_port.serial.Serial", refused_by_the_device_policy)
+    with pytest.raises(
+        DeviceForbiddenError, match=r"^/dev/ttyTHS1: the service is not allowed to open it; allow it in"
+    ):
+        open_port("xsens", "/dev/ttyTHS1", 0, ImuSettings())
 
 
 def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
