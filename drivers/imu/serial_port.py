@@ -27,7 +27,7 @@ PORT_PATTERNS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "
 
 _FORBIDDEN = {
     errno.EACCES: "no permission; add the user to the group dialout and log in again",
-    errno.EPERM: "the service is not allowed to open it; allow it in the unit (docs/install.md, Devices)",  # DeviceAllow
+    errno.EPERM: "the service may not open it; allow it in the unit (docs/install.md, Devices)",  # DeviceAllow
 }
 
 

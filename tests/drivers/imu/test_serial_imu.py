@@ -499,9 +499,7 @@ def test_a_port_that_the_services_unit_leaves_out_is_no_matter_of_groups(monkeyp
         raise OSError(errno.EPERM, os.strerror(errno.EPERM))
 
     monkeypatch.setattr("drivers.imu.serial_port.serial.Serial", refused_by_the_device_policy)
-    with pytest.raises(
-        DeviceForbiddenError, match=r"^/dev/ttyTHS1: the service is not allowed to open it; allow it in"
-    ):
+    with pytest.raises(DeviceForbiddenError, match=r"^/dev/ttyTHS1: the service may not open it; allow"):
         open_port("xsens", "/dev/ttyTHS1", 0, ImuSettings())
 
 
