@@ -6,7 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NoReturn
 
-from drivers.by_hand import positive
 from lcf_edge import __version__
 from lcf_edge.errors import UsageError
 from lcf_edge.recording.pace import FASTEST, SLOWEST
@@ -87,7 +86,7 @@ def parser() -> argparse.ArgumentParser:
     record.add_argument(
         "file", type=Path, metavar="FILE.mcap", help="a new file; without an ending: a folder, as a bag of rosbag2"
     )
-    record.add_argument("--seconds", type=positive, metavar="N", help="length of the recording (until Ctrl-C)")
+    record.add_argument("--seconds", type=_positive, metavar="N", help="length of the recording (until Ctrl-C)")
 
     source = _Parser(add_help=False)
     source.add_argument(
@@ -212,7 +211,7 @@ def _pace() -> _Parser:
     pace.add_argument(
         "--start", type=_number(0.0, 1e6), default=0.0, metavar="S", help="begin that long after the first picture"
     )
-    pace.add_argument("--duration", type=positive, default=math.inf, metavar="S", help="and end that long after it")
+    pace.add_argument("--duration", type=_positive, default=math.inf, metavar="S", help="and end that long after it")
     pace.add_argument(
         "--speed", type=_number(SLOWEST, FASTEST), metavar="N", help="times as fast as the recording was made"
     )
@@ -280,7 +279,7 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
     )
     for kind, default_s in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
         text = f"how long to take ({default_s}; of a recording: all)"
-        kind.add_argument("--seconds", type=positive, metavar="N", help=text)
+        kind.add_argument("--seconds", type=_positive, metavar="N", help=text)
 
 
 def _number(least: float, most: float) -> Callable[[str], float]:
@@ -304,6 +303,16 @@ def _polygon(text: str) -> list[list[float]]:
     if len(numbers) < 6 or len(numbers) % 2 or not all(map(math.isfinite, numbers)):
         raise argparse.ArgumentTypeError(f"{text}: write three points and more as X,Y,X,Y,X,Y")
     return [list(point) for point in zip(numbers[::2], numbers[1::2], strict=True)]
+
+
+def _positive(text: str) -> float:
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: write a number above 0")
+    return number
 
 
 def _whole(least: int, most: int) -> Callable[[str], int]:
