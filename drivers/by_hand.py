@@ -1,5 +1,7 @@
 """Watching a device from the command line: rate, jitter, errors and values once a second."""
 
+import argparse
+import math
 import sys
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -36,6 +38,17 @@ def watch(
         sys.stderr.write(f"{error}\n")
         return 1
     return 0
+
+
+def positive(text: str) -> float:
+    """A number above 0, of a command line. Raises ``argparse.ArgumentTypeError``."""
+    try:
+        number = float(text)
+    except ValueError:
+        number = math.nan
+    if not 0 < number < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: write a number above 0")
+    return number
 
 
 def describe_imu(sample: ImuSample) -> str:

@@ -35,6 +35,7 @@ MODES = {  # size: what is seen of the sensor, shortest time of a frame in µs
     (1920, 1080): ((1920, 1080), 21_000),
     (3280, 2464): (FULL, 47_000),
 }
+UNLOCKED = {"ExposureTime": 20_000, "AnalogueGain": 1.0}  # what switching the automatic off leaves at first
 
 
 class World(msgspec.Struct, frozen=True, kw_only=True):
@@ -45,8 +46,9 @@ class World(msgspec.Struct, frozen=True, kw_only=True):
     formats: tuple[str, ...] = ("YUV420", "NV12", "YUYV", "RGB888")  # by libcamera's names
     focuses: bool = False
     newer: bool = False  # has the controls of libcamera 0.5
+    starts_bare: bool = False  # takes controls with requests alone, as an RK3399's pipeline does
     chooses_modes: bool = True
-    log_path: str = ""  # a file that gets the mode and the controls at every start
+    log_path: str = ""  # a file that gets the mode, the controls of the start, and what of UNLOCKED is locked
 
     installed: bool = True
     busy: bool = False
@@ -186,14 +188,20 @@ class Request:
         self.cookie = cookie
         self.status = Status.Complete
         self.buffers: dict[str, Buffer] = {}
+        self.controls: dict[Control, Any] = {}
         self.metadata: dict[Control, Any] = {}
 
     def add_buffer(self, stream: str, buffer: Buffer) -> None:
         """Give it the memory."""
         self.buffers[stream] = buffer
 
+    def set_control(self, control: Control, value: Any) -> None:
+        """From this picture on."""
+        self.controls[control] = value
+
     def reuse(self) -> None:
         """Make it as new."""
+        self.controls.clear()
 
 
 class Camera:
@@ -223,6 +231,8 @@ class Camera:
         self._mode = (0, 0)
         self._configuration: Configuration | None = None
         self._queue: deque[Request] = deque()
+        self._log: dict[str, Any] = {}
+        self._locked: dict[str, Any] = {}
         self._stopped = threading.Event()
 
     def acquire(self) -> None:
@@ -254,8 +264,8 @@ class Camera:
     def start(self, controls: dict[Control, Any]) -> None:
         """Images come from now on."""
         started_with = {control.name: value for control, value in controls.items()}
-        if self._world.log_path:
-            Path(self._world.log_path).write_text(json.dumps({"mode": self._mode, **started_with}), encoding="utf-8")
+        self._log = {"mode": self._mode, **started_with}
+        self._apply({} if self._world.starts_bare else started_with)
         threading.Thread(target=self._run, args=(started_with["FrameDurationLimits"][0] / 1e6,), daemon=True).start()
 
     def stop(self) -> None:
@@ -265,6 +275,28 @@ class Camera:
     def queue_request(self, request: Request) -> None:
         """Fill it when its turn comes."""
         self._queue.append(request)
+
+    def _apply(self, controls: dict[str, Any]) -> None:
+        """Before libcamera 0.5 in any order; here what switches the automatic is last, and forgets what is locked.
+
+        From 0.5 on the switches go first, and what is not switched to manual is not locked.
+        """
+        values = {name: value for name, value in controls.items() if name in UNLOCKED}
+        if self._world.newer:
+            for name, unlocked in UNLOCKED.items():
+                mode = controls.get(f"{name}Mode")
+                if mode == 0:
+                    self._locked.pop(name, None)
+                elif mode == 1:
+                    self._locked[name] = unlocked
+            self._locked |= {name: value for name, value in values.items() if name in self._locked}
+        else:
+            self._locked |= values
+            if "AeEnable" in controls:
+                self._locked = {} if controls["AeEnable"] else dict(UNLOCKED)
+        if self._world.log_path:
+            text = json.dumps({**self._log, "locked": self._locked})
+            Path(self._world.log_path).write_text(text, encoding="utf-8")
 
     def _run(self, interval_s: float) -> None:
         world, number, due_s = self._world, 0, time.monotonic()
@@ -277,6 +309,8 @@ class Camera:
             if self._queue and number != world.skipped:
                 request = self._queue.popleft()
                 request.status = Status.Cancelled if number == world.cancelled else Status.Complete
+                if request.controls:
+                    self._apply({control.name: value for control, value in request.controls.items()})
                 self._fill(request, number)
                 self._manager.pass_on(request)
             number += 1

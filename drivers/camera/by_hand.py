@@ -6,7 +6,7 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from drivers.by_hand import describe_frame, watch
+from drivers.by_hand import describe_frame, positive, watch
 from drivers.device import Device
 from drivers.errors import DriverError
 from drivers.samples import Frame
@@ -38,15 +38,13 @@ def run(
     parser.add_argument("--list", action="store_true", help=listed)
     parser.add_argument("--width", type=int, default=640, help="px")
     parser.add_argument("--height", type=int, default=480, help="px")
-    parser.add_argument("--fps", type=float, default=30.0, help="frames a second")
+    parser.add_argument("--fps", type=positive, default=30.0, help="frames a second")
     parser.add_argument("--format", choices=formats, default="auto")
-    parser.add_argument("--exposure-s", type=float)
+    parser.add_argument("--exposure-s", type=positive)
     parser.add_argument("--gain", type=gain)
     parser.add_argument("--power-line-hz", type=int, choices=(0, 50, 60))
-    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--seconds", type=positive, default=10.0)
     arguments = parser.parse_args(argv)
-    if arguments.fps <= 0:
-        parser.error("argument --fps: must be positive")
     if arguments.list:
         try:
             return list_cameras()

@@ -1,6 +1,7 @@
 """Exposure, gain and power-line frequency: set, read back, refused where the camera does not do it."""
 
 import errno
+from collections.abc import Callable
 from contextlib import suppress
 
 from drivers.camera.v4l2_errors import NOT_IMPLEMENTED
@@ -26,7 +27,7 @@ from drivers.errors import UnsupportedSettingError
 
 EXPOSURE_UNIT_S = 1e-4
 _AUTOMATIC, _MANUAL, _SHUTTER_FIRST, _APERTURE_FIRST = 0, 1, 2, 3  # of CID_EXPOSURE_AUTO; 0 and 3 expose by themselves
-_POWER_LINE = {0: 0, 50: 1, 60: 2}
+_POWER_LINE = (0, 50, 60)  # Hz, by the control's value
 _REFUSALS = (*NOT_IMPLEMENTED, errno.ERANGE, errno.EACCES, errno.EBUSY)  # errors of a value, not of the device
 
 
@@ -38,7 +39,7 @@ def set_exposure(node: Node, exposure_s: float | None) -> None:
     if exposure_s is not None:
         if _query(node, CID_EXPOSURE_AUTO):
             _set(node, "the exposure's lock", CID_EXPOSURE_AUTO, _MANUAL)
-        _set(node, "the exposure in units of 100 µs", CID_EXPOSURE_ABSOLUTE, round(exposure_s / EXPOSURE_UNIT_S))
+        _set(node, "camera.exposure_s", CID_EXPOSURE_ABSOLUTE, round(exposure_s / EXPOSURE_UNIT_S), _seconds)
         return
     if _query(node, CID_EXPOSURE_AUTO) and _get(node, CID_EXPOSURE_AUTO) in {_MANUAL, _SHUTTER_FIRST}:
         modes = [mode for mode in (_AUTOMATIC, _APERTURE_FIRST) if _in_menu(node, CID_EXPOSURE_AUTO, mode)]
@@ -61,13 +62,13 @@ def set_gain(node: Node, gain: int | None) -> None:
         return
     if automatic:
         _set(node, "the gain's lock", CID_AUTOGAIN, 0)
-    _set(node, "the gain", CID_GAIN if _query(node, CID_GAIN) else CID_ANALOGUE_GAIN, gain)
+    _set(node, "camera.gain", CID_GAIN if _query(node, CID_GAIN) else CID_ANALOGUE_GAIN, gain)
 
 
 def set_power_line(node: Node, power_line_hz: int | None) -> None:
     """Against flicker: 50 or 60 Hz, 0: off; None: as the camera is. Raises ``UnsupportedSettingError``, ``OSError``."""
     if power_line_hz is not None:
-        _set(node, "the power-line frequency", CID_POWER_LINE_FREQUENCY, _POWER_LINE[power_line_hz])
+        _set(node, "camera.power_line_hz", CID_POWER_LINE_FREQUENCY, _POWER_LINE.index(power_line_hz), _power_line)
 
 
 def _query(node: Node, control: int) -> ControlQuery | None:
@@ -95,13 +96,23 @@ def _get(node: Node, control: int) -> int:
     return int(node.ask(G_CTRL, Control(id=control)).value)
 
 
-def _set(node: Node, what: str, control: int, value: int) -> None:
+def _seconds(units: int) -> str:
+    return f"{units * EXPOSURE_UNIT_S:g}"
+
+
+def _power_line(index: int) -> str:
+    return str(_POWER_LINE[index]) if index < len(_POWER_LINE) else "automatic"
+
+
+def _set(node: Node, what: str, control: int, value: int, shown: Callable[[int], str] = str) -> None:
+    """Set a control. ``what``: its key, or what it does; ``shown``: its value in the key's unit."""
     query = _query(node, control)
     if query is None:
         raise UnsupportedSettingError(f"{node.name}: {what} cannot be set; leave it unset")
     if not query.minimum <= value <= query.maximum:
         raise UnsupportedSettingError(
-            f"{node.name}: {what} cannot be {value}; choose {query.minimum} to {query.maximum}, or leave it unset"
+            f"{node.name}: {what} cannot be {shown(value)}; choose {shown(query.minimum)} to {shown(query.maximum)},"
+            " or leave it unset"
         )
     try:
         node.ask(S_CTRL, Control(id=control, value=value))
@@ -110,9 +121,9 @@ def _set(node: Node, what: str, control: int, value: int) -> None:
         if error.errno not in _REFUSALS:
             raise
         raise UnsupportedSettingError(
-            f"{node.name}: {what} cannot be {value} ({error.strerror}); leave it unset"
+            f"{node.name}: {what} cannot be {shown(value)} ({error.strerror}); leave it unset"
         ) from error
     if abs(taken - value) >= max(query.step, 1):
         raise UnsupportedSettingError(
-            f"{node.name}: {what} became {taken} instead of {value}; set {taken} or leave it unset"
+            f"{node.name}: {what} became {shown(taken)} instead of {shown(value)}; set {shown(taken)} or leave it unset"
         )

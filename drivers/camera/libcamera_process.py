@@ -47,6 +47,7 @@ _RAW = re.compile(r"(?:S[RGB]{4}|R)(\d+)")  # of a sensor; its bits
 _MAX_SIZES = 12
 _MAX_SHARE = 0.95  # of the widest field of view is as good
 _MANUAL, _AUTOMATIC, _OFF = 1, 0, 0
+_LOCKED = ("ExposureTime", "AnalogueGain")
 
 
 class Refused(Exception):  # noqa: N818  # it is no fault of the program
@@ -131,6 +132,9 @@ def _run(libcamera: Any, manager: Any, camera: Any, connection: socket.socket, r
     granted["buffers"] = [[plane.offset, plane.length] for plane in planes]
     _send(connection, "ready", [plane.fd for plane in planes], **granted)
     camera.start(controls)
+    for one, part in zip(requests, _in_order(controls), strict=False):
+        for control, value in part.items():
+            one.set_control(control, value)
     try:
         for one in requests:
             camera.queue_request(one)
@@ -192,9 +196,10 @@ def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[An
         _check_rate(camera, fps)
         stream = config.at(0)
         return stream.stream, {"format": name, "width": width, "height": height, "stride": stream.stride, "fps": fps}
+    refused = "format that can be read" if requested == "auto" else requested
     described = "; ".join(f"{name}: {_sizes(offered, one)}" for name, one in readable.items())
     raise Refused(
-        "unsupported", f"no {requested} of {width}x{height}; offered: {described or 'nothing that can be read'}"
+        "unsupported", f"no {refused} of {width}x{height}; offered: {described or 'nothing that can be read'}"
     )
 
 
@@ -277,9 +282,9 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
         interval_us = round(1e6 / request["fps"])
         chosen["FrameDurationLimits"] = (interval_us, interval_us)
     if exposure_s is not None:
-        chosen["ExposureTime"] = _within(known, "ExposureTime", "the exposure in µs", round(exposure_s * 1e6))
+        chosen["ExposureTime"] = _within(known, "ExposureTime", "camera.exposure_s", round(exposure_s * 1e6), 1e-6)
     if gain is not None:
-        chosen["AnalogueGain"] = _within(known, "AnalogueGain", "the gain", float(gain))
+        chosen["AnalogueGain"] = _within(known, "AnalogueGain", "camera.gain", float(gain))
     if "ExposureTimeMode" in known:  # of libcamera 0.5 on; before, a value is a lock
         chosen["ExposureTimeMode"] = _AUTOMATIC if exposure_s is None else _MANUAL
     if "AnalogueGainMode" in known:
@@ -288,7 +293,7 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
         chosen["AeEnable"] = exposure_s is None or gain is None
     if power_line_hz is not None:
         if not {"AeFlickerMode", "AeFlickerPeriod"} <= set(known):
-            raise Refused("unsupported", "the power-line frequency cannot be set; leave it unset")
+            raise Refused("unsupported", "camera.power_line_hz cannot be set; leave it unset")
         chosen["AeFlickerMode"] = _MANUAL if power_line_hz else _OFF
         if power_line_hz:
             chosen["AeFlickerPeriod"] = round(1e6 / (2 * power_line_hz))
@@ -299,12 +304,24 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
     return {known[name][0]: value for name, value in chosen.items()}
 
 
-def _within(known: dict[str, Any], name: str, what: str, value: float) -> float:
+def _in_order(controls: dict[Any, Any]) -> tuple[dict[Any, Any], dict[Any, Any]]:
+    """What goes with the first request and what with the second, of what the camera was started with.
+
+    Before 0.5 libcamera takes the controls that come together in any order, and switching the automatic off or on
+    forgets a value that is locked already (agc_channel.cpp); some pipelines take none at the start (rkisp1.cpp).
+    """
+    values = {control: value for control, value in controls.items() if control.name in _LOCKED}
+    return {control: value for control, value in controls.items() if control not in values}, values
+
+
+def _within(known: dict[str, Any], name: str, key: str, value: float, unit: float = 1.0) -> float:
+    """The value, where the control can have it. ``unit``: of the control, in the key's."""
     if name not in known:
-        raise Refused("unsupported", f"{what} cannot be set; leave it unset")
+        raise Refused("unsupported", f"{key} cannot be set; leave it unset")
     low, high = _first(known[name][1].min) or 0, _first(known[name][1].max) or math.inf
     if not low <= value <= high:
-        raise Refused("unsupported", f"{what} cannot be {value:g}; choose {low:g} to {high:g}, or leave it unset")
+        text = f"{key} cannot be {value * unit:g}; choose {low * unit:g} to {high * unit:g}, or leave it unset"
+        raise Refused("unsupported", text)
     return value
 
 

@@ -109,8 +109,8 @@ class Bmi088(FifoImu):
         }
 
     def _reset(self) -> None:
-        self._write(ACC_SOFTRESET, RESET)
-        self._write(GYRO_SOFTRESET, RESET)
+        self._command_reset(ACC_SOFTRESET, RESET)
+        self._command_reset(GYRO_SOFTRESET, RESET)
         self._clock.sleep_s(RESET_S)
         self._write(ACC_PWR_CONF, ACTIVE)
         self._write(ACC_PWR_CTRL, ACCEL_ON)
@@ -144,8 +144,8 @@ class Bmi088(FifoImu):
     def _read(self, register: int, length: int, tries: int = TRIES) -> bytes:
         return self._bus.read(self._address_of(register), register & 0xFF, length, tries)
 
-    def _write(self, register: int, *values: int) -> None:
-        self._bus.write(self._address_of(register), register & 0xFF, bytes(values))
+    def _write(self, register: int, *values: int, tries: int = TRIES) -> None:
+        self._bus.write(self._address_of(register), register & 0xFF, bytes(values), tries)
 
     def _address_of(self, register: int) -> int:
         return self._accel_address if register & ACCEL else self.address

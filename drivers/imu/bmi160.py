@@ -1,7 +1,9 @@
 """Bosch BMI160.
 
-BMI160 data sheet, BST-BMI160-DS000-07 revision 0.8. The FIFO runs without headers: frames of gyro, then accelerometer,
-in the order of the data registers; a frame that was not read to its end comes again, so bursts end with a frame.
+BMI160 data sheet, BST-BMI160-DS000-07 revision 0.8; Linux (bmi160_core.c) agrees on all but the FIFO, which it does not
+use, and Bosch's BMI160_SensorAPI (bmi160_defs.h) on that. The FIFO runs without headers: frames of gyro, then
+accelerometer, in the order of the data registers; a frame that was not read to its end comes again, so bursts end with
+a frame.
 """
 
 import sys
@@ -73,11 +75,9 @@ class Bmi160(FifoImu):
         }
 
     def _reset(self) -> None:
-        for command, pause_s in (
-            (SOFT_RESET, RESET_S),
-            (ACCEL_NORMAL, ACCEL_START_S),
-            (GYRO_NORMAL, GYRO_START_S),
-        ):
+        self._command_reset(CMD, SOFT_RESET)
+        self._clock.sleep_s(RESET_S)
+        for command, pause_s in ((ACCEL_NORMAL, ACCEL_START_S), (GYRO_NORMAL, GYRO_START_S)):
             self._write(CMD, command)
             self._clock.sleep_s(pause_s)
         if self._read(PMU_STATUS, 1)[0] & 0x3C != BOTH_NORMAL:

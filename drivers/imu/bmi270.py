@@ -1,8 +1,9 @@
 """Bosch BMI270: at every start it must be given the vendor's configuration file.
 
-BMI270 data sheet, BST-BMI270-DS000-05 revision 1.3. The file is the one that the Linux driver takes, 8 KiB. The FIFO is
-that of the BMI160, but for frames that say that a sensor has no data (the values are those of Bosch's BMI270_SensorAPI,
-bmi2_defs.h). The gyro's x leans towards z by a factor that each chip knows (GYR_CAS) and the host takes out.
+BMI270 data sheet, BST-BMI270-DS000-05 revision 1.3; Zephyr (bmi270.h) agrees. The file is the one that the Linux driver
+takes, 8 KiB. The FIFO is that of the BMI160, but for frames that say that a sensor has no data (the values are those of
+Bosch's BMI270_SensorAPI, bmi2_defs.h). The gyro's x leans towards z by a factor that each chip knows (GYR_CAS) and the
+host takes out.
 """
 
 import sys
@@ -101,7 +102,7 @@ class Bmi270(Bmi160):
 
     def _reset(self) -> None:
         firmware = self._read_firmware()
-        self._write(CMD, SOFT_RESET)
+        self._command_reset(CMD, SOFT_RESET)
         self._clock.sleep_s(RESET_S)
         self._write(PWR_CONF, 0)
         self._clock.sleep_s(AWAKE_S)

@@ -1,8 +1,8 @@
 """Bosch BNO055 in its fusion mode IMU, the one in which data sheet and chip agree on the gyro's scale.
 
-BNO055 data sheet, BST-BNO055-DS000-14 revision 1.4. In the modes without fusion the gyro's counts follow the range
-(2^15 counts, as the Linux driver found), not the 16 counts for 1 °/s of table 3-22. Fusion means 100 Hz, 4 g and
-2000 °/s, whatever is asked, and a gyro whose bias the chip takes out.
+BNO055 data sheet, BST-BNO055-DS000-14 revision 1.4; Linux (bno055.c) agrees on registers, times and weights. In the
+modes without fusion the gyro's counts follow the range (2^15 counts, as the Linux driver found), not the 16 counts for
+1 °/s of table 3-22. Fusion means 100 Hz, 4 g and 2000 °/s, whatever is asked, and a gyro whose bias the chip takes out.
 
 There is no FIFO: the registers are polled, and what they still hold from last time is dropped. The chip stretches the
 clock; bus masters that do not wait for it (Raspberry Pi) read bytes with a flipped top bit. So a jump must be seen in
@@ -96,8 +96,7 @@ class Bno055(I2cImu):
 
     def _reboot(self) -> None:
         """Reset the chip and wait until it says who it is. Raises ``DeviceLostError``."""
-        with suppress(TransferError):  # it is gone before it would acknowledge
-            self._bus.write(self.address, SYS_TRIGGER, bytes([RESET]), tries=1)
+        self._command_reset(SYS_TRIGGER, RESET)
         end_ns = self._clock.monotonic_ns() + round(MAX_BOOT_S * 1e9)
         self._clock.sleep_s(BOOT_S)
         while self._clock.monotonic_ns() < end_ns:

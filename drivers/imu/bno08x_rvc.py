@@ -2,7 +2,7 @@
 
 Frames of 19 bytes: 0xAA 0xAA, an index, yaw, pitch and roll in 0.01°, acceleration x, y, z in mg (all little-endian
 int16), three reserved bytes, the low byte of the sum of all after the header. Source: Hillcrest "BNO080 Datasheet"
-1000-3927, October 2017, section 1.3.5.2 (the same in CEVA's BNO08X data sheet).
+1000-3927, October 2017, section 1.3.5.2 (the same in CEVA's BNO08X data sheet); Adafruit's CircuitPython driver agrees.
 
 There is no gyro in a frame: the rates are the turn between two frames, over the time between them. So a sample is of
 the middle between its two frames (its acceleration is their mean), and a rate comes in steps of 1 °/s (0.01° in 10 ms);

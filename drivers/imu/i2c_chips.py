@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import ClassVar, Protocol
 
-from drivers.by_hand import describe_imu, watch
+from drivers.by_hand import describe_imu, positive, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import UnsupportedSettingError
@@ -77,12 +77,12 @@ def run_by_hand(driver: str, argv: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser(prog=f"python -m drivers.imu.{driver}")
     parser.add_argument("--bus", type=int, default=1, help="N of /dev/i2c-N (%(default)s)")
     parser.add_argument("--address", type=_number, default=0, help="0: the chip's usual one")
-    parser.add_argument("--rate", type=float, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
+    parser.add_argument("--rate", type=positive, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
     parser.add_argument("--gyro-range", type=int, default=DEFAULT_SETTINGS.gyro_range_dps, help="°/s (%(default)s)")
     parser.add_argument("--accel-range", type=int, default=DEFAULT_SETTINGS.accel_range_g, help="g (%(default)s)")
     parser.add_argument("--identity", type=_number, help="of a copy, taken for the chip all the same")
     parser.add_argument("--firmware", type=Path, default=DEFAULT_SETTINGS.firmware, help="of a BMI270 (%(default)s)")
-    parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
+    parser.add_argument("--seconds", type=positive, default=10.0, help="how long (%(default)s)")
     arguments = parser.parse_args(argv)
     settings = ImuSettings(
         arguments.rate, arguments.gyro_range, arguments.accel_range, arguments.identity, arguments.firmware

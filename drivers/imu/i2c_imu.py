@@ -7,6 +7,7 @@ they do not, the chip has reset itself and is set up again. ``fifo_imu`` and ``b
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import ClassVar, Literal
 
@@ -182,8 +183,13 @@ class I2cImu(ABC):
     def _read(self, register: int, length: int, tries: int = TRIES) -> bytes:
         return self._bus.read(self.address, register, length, tries)
 
-    def _write(self, register: int, *values: int) -> None:
-        self._bus.write(self.address, register, bytes(values))
+    def _write(self, register: int, *values: int, tries: int = TRIES) -> None:
+        self._bus.write(self.address, register, bytes(values), tries)
+
+    def _command_reset(self, register: int, command: int) -> None:
+        """Have the chip reset itself, which it may do before it acknowledges: what it was asked is not asked again."""
+        with suppress(TransferError):
+            self._write(register, command, tries=1)
 
     def _identify(self, copy: int | None) -> str:
         """Return the model by the chip's identity. ``copy``: another identity to accept, of a copy of the chip."""

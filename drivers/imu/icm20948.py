@@ -1,7 +1,8 @@
 """TDK InvenSense ICM-20948; its magnetometer is left alone.
 
-ICM-20948 Datasheet, DS-000189 revision 1.3. Registers lie in four banks: here the high byte of a register is what
-REG_BANK_SEL holds. The ranges are those of the MPU-6050.
+ICM-20948 Datasheet, DS-000189 revision 1.3; PX4 (InvenSense_ICM20948_registers.hpp) and SparkFun's library
+(ICM_20948_REGISTERS.h) agree. Registers lie in four banks: here the high byte of a register is what REG_BANK_SEL holds.
+The ranges are those of the MPU-6050.
 """
 
 import struct
@@ -78,7 +79,7 @@ class Icm20948(FifoImu):
         }
 
     def _reset(self) -> None:
-        self._write(PWR_MGMT_1, DEVICE_RESET)
+        self._command_reset(PWR_MGMT_1, DEVICE_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:
@@ -94,8 +95,8 @@ class Icm20948(FifoImu):
     def _read(self, register: int, length: int, tries: int = TRIES) -> bytes:
         return super()._read(self._select(register), length, tries)
 
-    def _write(self, register: int, *values: int) -> None:
-        super()._write(self._select(register), *values)
+    def _write(self, register: int, *values: int, tries: int = TRIES) -> None:
+        super()._write(self._select(register), *values, tries=tries)
 
     def _select(self, register: int) -> int:
         """The register's place in its bank, which is selected first."""

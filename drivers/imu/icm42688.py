@@ -84,7 +84,7 @@ class Icm42688(FifoImu):
         }
 
     def _reset(self) -> None:
-        self._write(DEVICE_CONFIG, SOFT_RESET)
+        self._command_reset(DEVICE_CONFIG, SOFT_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:

@@ -19,7 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
-from drivers.by_hand import describe_imu, watch
+from drivers.by_hand import describe_imu, positive, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.errors import (
     DeviceLostError,
@@ -258,10 +258,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run the device by hand."""
     parser = argparse.ArgumentParser(prog="python -m drivers.imu.iio")
     parser.add_argument("device", nargs="?", default="", help="the chip's name or iio:deviceN (the first with a gyro)")
-    parser.add_argument("--rate", type=float, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
+    parser.add_argument("--rate", type=positive, default=DEFAULT_SETTINGS.rate_hz, help="Hz (%(default)s)")
     parser.add_argument("--gyro-range", type=int, default=DEFAULT_SETTINGS.gyro_range_dps, help="°/s (%(default)s)")
     parser.add_argument("--accel-range", type=int, default=DEFAULT_SETTINGS.accel_range_g, help="g (%(default)s)")
-    parser.add_argument("--seconds", type=float, default=10.0, help="how long (%(default)s)")
+    parser.add_argument("--seconds", type=positive, default=10.0, help="how long (%(default)s)")
     arguments = parser.parse_args(argv)
     settings = ImuSettings(arguments.rate, arguments.gyro_range, arguments.accel_range)
     return watch(lambda: Iio(arguments.device, settings), arguments.seconds, describe_imu)

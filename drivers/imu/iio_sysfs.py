@@ -26,7 +26,9 @@ ACCEL = tuple(f"in_accel_{axis}" for axis in "xyz")
 STAMP = "in_timestamp"
 GYRO_SUFFIX = re.compile("[-_]gyro$")  # st_lsm6dsx; inv_icm42600 and inv_icm45600 have a hyphen
 
-SCAN_TYPE = re.compile(r"(?P<order>[bl])e:(?P<sign>[su])(?P<bits>\d+)/(?P<storage>8|16|32|64)(?:X1)?>>(?P<shift>\d+)")
+SCAN_TYPE = re.compile(  # of Documentation/driver-api/iio/buffers.rst, in which repeat and shift may be left out
+    r"(?P<order>[bl])e:(?P<sign>[su])(?P<bits>\d+)/(?P<storage>8|16|32|64)(?:X1)?(?:>>(?P<shift>\d+))?"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -134,7 +136,7 @@ def scan_of(folder: Path, names: Iterable[str]) -> Scan:
     for name in names:
         text = text_of(folder / f"scan_elements/{name}_type")
         layout = SCAN_TYPE.fullmatch(text)
-        bits, storage, shift = (int(layout[key]) for key in ("bits", "storage", "shift")) if layout else (0, 0, 0)
+        bits, storage, shift = (int(layout[key] or 0) for key in ("bits", "storage", "shift")) if layout else (0, 0, 0)
         if layout is None or not 0 < bits <= storage - shift:
             raise UnsupportedSettingError(f"{folder.name}: {name} has the unknown type {text}; use another driver")
         code = {"b": ">", "l": "<"}[layout["order"]] + {"s": "i", "u": "u"}[layout["sign"]]

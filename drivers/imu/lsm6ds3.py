@@ -1,7 +1,7 @@
 """ST LSM6DS3 and LSM6DS3TR-C.
 
 LSM6DS3 data sheet DocID026899 revision 8, application note AN4650; LSM6DS3TR-C data sheet DocID030071 revision 3
-(half the FIFO, finer thermometer, otherwise the same registers).
+(half the FIFO, finer thermometer, otherwise the same registers). Linux (st_lsm6dsx_core.c) agrees.
 """
 
 import sys
@@ -77,7 +77,7 @@ class Lsm6ds3(FifoImu):
             self.thermometer = Thermometer(OUT_TEMP_L, "little", lsb_per_c=256, zero_c=25.0)
             self.fifo_bytes = 4096
         self._write(FIFO_CTRL5, 0)  # a reset while the FIFO fills is not acknowledged (richcreations/imud#72)
-        self._write(CTRL3_C, SW_RESET)
+        self._command_reset(CTRL3_C, SW_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:

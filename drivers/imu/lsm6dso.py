@@ -1,8 +1,9 @@
 """ST LSM6DSO and LSM6DSOX, which have the same identity: an LSM6DS3 with another FIFO.
 
-LSM6DSO data sheet DS12140 revision 2; LSM6DSOX data sheet DS12814 revision 3. Each word of the FIFO has a tag that
-says which sensor it is of and, by a count of two bits, of which moment. The LSM6DSO32 says the same of itself too, but
-its counts of acceleration are worth twice as much: only gravity at rest distinguishes them.
+LSM6DSO data sheet DS12140 revision 2; LSM6DSOX data sheet DS12814 revision 3; Linux (st_lsm6dsx_core.c and _buffer.c)
+agrees. Each word of the FIFO has a tag that says which sensor it is of and, by a count of two bits, of which moment.
+The LSM6DSO32 says the same of itself too, but its counts of acceleration are worth twice as much: only gravity at rest
+distinguishes them.
 """
 
 import struct

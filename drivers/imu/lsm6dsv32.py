@@ -1,6 +1,7 @@
 """ST LSM6DSV32X: an LSM6DSV of twice the acceleration, with the same identity.
 
-The codes and weights of its ranges as in ST's own driver (lsm6dsv32x_reg.h).
+The codes and weights of its ranges are those of ST's own driver (lsm6dsv32x_reg.h); Zephyr (dt-bindings/sensor/
+lsm6dsv32x.h) has the same ranges, and the gyro's codes.
 """
 
 import sys

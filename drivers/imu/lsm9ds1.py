@@ -73,7 +73,7 @@ class Lsm9ds1(FifoImu):
         }
 
     def _reset(self) -> None:
-        self._write(CTRL_REG8, SW_RESET)
+        self._command_reset(CTRL_REG8, SW_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:

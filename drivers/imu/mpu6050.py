@@ -1,7 +1,7 @@
 """TDK InvenSense MPU-6050 (and MPU-6000, the IMU of the MPU-9150).
 
-MPU-6000/MPU-6050 Register Map and Descriptions, RM-MPU-6000A-00 revision 4.2; Product Specification,
-PS-MPU-6000A-00 revision 3.4.
+MPU-6000/MPU-6050 Register Map and Descriptions, RM-MPU-6000A-00 revision 4.2; Product Specification, PS-MPU-6000A-00
+revision 3.4. PX4 (InvenSense_MPU6000_registers.hpp) agrees, Linux (inv_mpu_core.c) on rates and filters.
 """
 
 import struct
@@ -76,7 +76,7 @@ class Mpu6050(FifoImu):
         return min((code for code, width_hz in FILTERS_HZ.items() if width_hz <= self.rate_hz / 2), default=6)
 
     def _reset(self) -> None:
-        self._write(PWR_MGMT_1, DEVICE_RESET)
+        self._command_reset(PWR_MGMT_1, DEVICE_RESET)
         self._clock.sleep_s(RESET_S)
 
     def _fifo_level(self) -> int:

@@ -1,10 +1,11 @@
 """TDK InvenSense MPU-6500: an MPU-6050 with another thermometer, half the FIFO and a filter of the accelerometer's own.
 
-MPU-6500 Register Map and Descriptions, RM-MPU-6500A-00 revision 2.1; Product Specification, PS-MPU-6500A-01
-revision 1.3. The MPU-6515 and MPU-6880 differ in what they say of themselves alone, as Linux has it (inv_mpu_iio.h);
-0x72 is said by copies. 0x98 is the ICM-20689, found on many boards that are sold with an MPU-6050: its thermometer is
-another (ICM-20689 data sheet, DS-000143, and Linux), and no more than 512 bytes of its FIFO are used. The ICM-20608-G
-(DS-000081), ICM-20609 (DS-000103) and IAM-20680 are like it, as Linux has it and PX4's ICM20608G driver.
+MPU-6500 Register Map and Descriptions, RM-MPU-6500A-00 revision 2.1; Product Specification, PS-MPU-6500A-01 revision
+1.3; PX4 (InvenSense_MPU6500_registers.hpp) agrees. The MPU-6515 and MPU-6880 differ in what they say of themselves
+alone, as Linux has it (inv_mpu_iio.h); 0x72 is said by copies. 0x98 is the ICM-20689, found on many boards that are
+sold with an MPU-6050: its thermometer is another (ICM-20689 data sheet, DS-000143, and Linux), and no more than 512
+bytes of its FIFO are used. The ICM-20608-G (DS-000081), ICM-20609 (DS-000103) and IAM-20680 are like it, as Linux has
+it and PX4's ICM20608G driver.
 """
 
 import sys

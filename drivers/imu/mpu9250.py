@@ -1,7 +1,7 @@
 """TDK InvenSense MPU-9250 and MPU-9255: an MPU-6500 with a magnetometer beside it, which is left alone.
 
-MPU-9250 Register Map and Descriptions, RM-MPU-9250A-00 revision 1.6; Product Specification, PS-MPU-9250A-01
-revision 1.1.
+MPU-9250 Register Map and Descriptions, RM-MPU-9250A-00 revision 1.6; Product Specification, PS-MPU-9250A-01 revision
+1.1. PX4 (InvenSense_MPU9250_registers.hpp) agrees; that 0x73 is an MPU-9255 is Linux's (inv_mpu_iio.h).
 """
 
 import sys

@@ -92,7 +92,7 @@ class Qmi8658(I2cImu):
         }
 
     def _reset(self) -> None:
-        self._write(RESET, RESET_NOW)
+        self._command_reset(RESET, RESET_NOW)
         self._await_reset()
         self._write(CTRL8, DONE_IN_STATUSINT)
         self._write(CAL1_L, 1)

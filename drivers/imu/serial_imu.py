@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from drivers.allowance import Allowance
-from drivers.by_hand import describe_imu, watch
+from drivers.by_hand import describe_imu, positive, watch
 from drivers.clock import SYSTEM_CLOCK, Clock
 from drivers.device import Device
 from drivers.errors import DeviceLostError, DeviceStalledError, WrongDeviceError
@@ -201,8 +201,8 @@ def run_by_hand(protocol: SerialProtocol, argv: Sequence[str] | None) -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", default="/dev/ttyUSB0")
     parser.add_argument("--baud", type=int, default=0, help=f"0: {protocol.bauds[0]}")
-    parser.add_argument("--rate", type=float, default=ImuSettings().rate_hz, help="that was set in the IMU, Hz")
-    parser.add_argument("--seconds", type=float, default=10.0)
+    parser.add_argument("--rate", type=positive, default=ImuSettings().rate_hz, help="that was set in the IMU, Hz")
+    parser.add_argument("--seconds", type=positive, default=10.0)
     arguments = parser.parse_args(argv)
     return watch(
         lambda: SerialImu(protocol, arguments.port, arguments.baud, arguments.rate), arguments.seconds, describe_imu

@@ -25,6 +25,12 @@ MAX_READ_BYTES = 4096
 PORT_PATTERNS = ("serial/by-id/*", "ttyUSB*", "ttyACM*", "ttyAMA*", "ttyTHS*", "serial[0-9]*")
 
 
+_FORBIDDEN = {
+    errno.EACCES: "no permission; add the user to the group dialout and log in again",
+    errno.EPERM: "the service may not open it; allow it in the unit (docs/install.md, Devices)",  # DeviceAllow
+}
+
+
 class SerialPort:
     """An open port: 8 data bits, no parity, 1 stop bit. What was received before it was opened is thrown away.
 
@@ -83,8 +89,8 @@ def _explained(error: Exception, path: str, baud: int) -> DriverError:
         there = ", ".join(ports())
         found = f"there are {there}; set imu.port" if there else "there is no other; plug the IMU in"
         return DeviceMissingError(f"{path}: no such serial port; {found}")
-    if code in (errno.EACCES, errno.EPERM):
-        return DeviceForbiddenError(f"{path}: no permission; add the user to the group dialout and log in again")
+    if code in _FORBIDDEN:
+        return DeviceForbiddenError(f"{path}: {_FORBIDDEN[code]}")
     if code in (errno.EAGAIN, errno.EBUSY):
         return DeviceBusyError(f"{path}: another program has it open; stop that program (fuser {path} names it)")
     if code == errno.EIO:

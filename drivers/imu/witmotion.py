@@ -3,8 +3,9 @@
 Frames of 11 bytes: 0x55, a type, four little-endian int16, the low byte of the sum of all before it. An acceleration
 (0x51, 16 g full scale) and the angular velocity (0x52, 2000 °/s full scale) that follows it are one sample; times,
 angles and the rest are passed over. Source: WitMotion "WT901SDCL Datasheet" v20-0605, section 6.1, and "HWT905-TTL,
-Protocol" at docs.wit-motion.com. The module sends what was set with the maker's own program, nothing is written to it;
-many leave the factory with 9600 baud and 10 Hz, which is too slow here: set 115200 baud and 200 Hz.
+Protocol" at docs.wit-motion.com; ElettraSciComp's library (witmotion_IMU_QT, util.cpp) agrees. The module sends what
+was set with the maker's own program, nothing is written to it; many leave the factory with 9600 baud and 10 Hz, which
+is too slow here: set 115200 baud and 200 Hz.
 """
 
 import math

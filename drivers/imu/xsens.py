@@ -2,9 +2,10 @@
 
 A message is 0xFA, bus 0xFF, MID 0x36, a length (0xFF: two more bytes of length), data, and a byte that makes the sum of
 all after 0xFA a multiple of 256. The data are big-endian items of identifier, length, value; the low bits of an
-identifier say the format. Source: Xsens "MT Low Level Communication Protocol Documentation" (MT0101P, revision 2019.A).
-Wanted are RateOfTurn and Acceleration in one message, best with SampleTimeFine, PacketCounter and StatusWord. The IMU
-sends what was set with the maker's MT Manager; nothing is written to it.
+identifier say the format. Source: Xsens "MT Low Level Communication Protocol Documentation" (MT0101P, revision 2019.A);
+ETH's driver for ROS (ethzasl_xsens_driver, mtdef.py) agrees. Wanted are RateOfTurn and Acceleration in one message,
+best with SampleTimeFine, PacketCounter and StatusWord. The IMU sends what was set with the maker's MT Manager; nothing
+is written to it.
 """
 
 import math

@@ -13,6 +13,8 @@ from hil_mocks.i2c.motion import Vector
 
 SIX = struct.Struct("<hhh")
 FRAME_BYTES = 12
+WAKES = {0x11: (0x10, 3_800_000), 0x15: (0x04, 80_000_000)}  # CMD of a BMI160: bit of PMU_STATUS, time
+INIT_NS = 20_000_000  # that a BMI270 takes with its file
 
 
 class Bmi(SimulatedChip):
@@ -84,13 +86,13 @@ class Bmi(SimulatedChip):
 
     def _command(self, command: int) -> None:
         if command == 0xB6:
-            self.power_up()
+            self._reset()
         elif command == 0xB0:
             self.clear_fifo()
 
 
 class Bmi160(Bmi):
-    """BMI160."""
+    """BMI160; its sensors take time to wake."""
 
     power_on: ClassVar[Mapping[int, int]] = {
         0x00: 0xD1, 0x20: 0x00, 0x21: 0x80, 0x40: 0x28, 0x41: 0x03, 0x42: 0x28, 0x45: 0x88, 0x46: 0x80, 0x47: 0x10
@@ -98,9 +100,17 @@ class Bmi160(Bmi):
     fifo_bytes = 1024
     fifo_length, fifo_data, fifo_config_1, temperature = 0x22, 0x24, 0x47, 0x20
     gyro_first, accel_first = 0x0C, 0x12
+    boot_ns = 1_000_000
+
+    def power_up(self) -> None:
+        """Both sensors sleep."""
+        self._awake_at_ns: dict[int, int] = {}  # by bit of PMU_STATUS
+        super().power_up()
 
     def awake(self) -> bool:
         """PMU_STATUS."""
+        now_ns = self._clock.monotonic_ns()
+        self.registers[0x03] = sum(bit for bit, at_ns in self._awake_at_ns.items() if at_ns <= now_ns)
         return self.registers[0x03] & 0x3C == 0x14
 
     def force_g(self) -> float:
@@ -109,10 +119,9 @@ class Bmi160(Bmi):
 
     def _command(self, command: int) -> None:
         super()._command(command)
-        if command == 0x11:
-            self.registers[0x03] |= 0x10
-        elif command == 0x15:
-            self.registers[0x03] |= 0x04
+        if command in WAKES:
+            bit, takes_ns = WAKES[command]
+            self._awake_at_ns[bit] = self._clock.monotonic_ns() + takes_ns
 
 
 class Bmi270(Bmi):
@@ -125,16 +134,20 @@ class Bmi270(Bmi):
     fifo_bytes = 2048
     fifo_length, fifo_data, fifo_config_1, temperature = 0x24, 0x26, 0x49, 0x22
     gyro_first, accel_first = 0x12, 0x0C
+    boot_ns = 2_000_000
     firmware = b"".join(sha256(bytes([block])).digest() for block in range(256))
     lean = -20
 
     def power_up(self) -> None:
         """Also forgets the firmware."""
         self._loaded = bytearray(8192)
+        self._initialised_at_ns = 0
         super().power_up()
 
     def awake(self) -> bool:
         """INTERNAL_STATUS and PWR_CTRL."""
+        if self._initialised_at_ns and self._clock.monotonic_ns() >= self._initialised_at_ns:
+            self.registers[0x21] = 1 if self._loaded == self.firmware else 2
         return self.registers[0x21] & 15 == 1 and self.registers[0x7D] & 6 == 6
 
     def force_g(self) -> float:
@@ -155,6 +168,6 @@ class Bmi270(Bmi):
     def _set(self, register: int, value: int) -> None:
         super()._set(register, value)
         if register == 0x59 and value & 1:
-            self.registers[0x21] = 1 if self._loaded == self.firmware else 2
+            self._initialised_at_ns = self._clock.monotonic_ns() + INIT_NS
         elif register == 0x2F:
             self.registers[0x3C] = self.lean & 0x7F if value == 0 else 0

@@ -12,7 +12,6 @@ from hil_mocks.i2c.motion import Motion, Vector
 
 SIX = struct.Struct("<hhh")
 GYRO_HZ = (2000.0, 2000.0, 1000.0, 400.0, 200.0, 100.0, 200.0, 100.0)  # by the bandwidth's code
-GYRO_RESET_NS = 30_000_000
 ACCEL_RATE_ERROR = 0.011  # its clock is not the gyro's
 FRAME_BYTES = 7
 SETTINGS_CHANGED = b"\x48\x01"  # a frame that the chip puts in by itself
@@ -23,6 +22,7 @@ class Accelerometer(SimulatedChip):
 
     address = 0x18
     power_on: ClassVar[Mapping[int, int]] = {0x00: 0x1E, 0x40: 0xA8, 0x41: 0x01, 0x48: 0x02, 0x49: 0x10, 0x7C: 0x03}
+    boot_ns = 1_000_000
 
     def rate_hz(self) -> float:
         """Sample rate; 0 asleep."""
@@ -60,7 +60,7 @@ class Accelerometer(SimulatedChip):
     def _set(self, register: int, value: int) -> None:
         if register == 0x7E:
             if value == 0xB6:
-                self.power_up()
+                self._reset()
             elif value == 0xB0:
                 self.clear_fifo()
                 self._fifo.append(SETTINGS_CHANGED)
@@ -69,11 +69,11 @@ class Accelerometer(SimulatedChip):
 
 
 class Bmi088(SimulatedChip):
-    """The BMI088's gyro, with its accelerometer beside it. While it resets it acknowledges nothing."""
+    """The BMI088's gyro, with its accelerometer beside it."""
 
     address = 0x68
     power_on: ClassVar[Mapping[int, int]] = {0x00: 0x0F, 0x10: 0x80}
-    _resets_until_ns = 0
+    boot_ns = 30_000_000
 
     def __init__(self, motion: Motion, clock: Clock, rate_error: float = 0.0, celsius: float = 31.5) -> None:
         self.accelerometer = Accelerometer(motion, clock, rate_error + ACCEL_RATE_ERROR, celsius)
@@ -83,16 +83,6 @@ class Bmi088(SimulatedChip):
     def places(self) -> Mapping[int, SimulatedChip]:
         """Both, by address."""
         return {self.address: self, Accelerometer.address: self.accelerometer}
-
-    def read(self, register: int, length: int) -> bytes:
-        """A burst; while it resets, none."""
-        self._refuse_while_resetting()
-        return super().read(register, length)
-
-    def write(self, register: int, data: bytes) -> bytes:
-        """A burst; while it resets, none."""
-        self._refuse_while_resetting()
-        return super().write(register, data)
 
     def rate_hz(self) -> float:
         """Sample rate; it wakes by itself."""
@@ -125,13 +115,8 @@ class Bmi088(SimulatedChip):
     def _set(self, register: int, value: int) -> None:
         if register == 0x14:
             if value == 0xB6:
-                self.power_up()
-                self._resets_until_ns = self._clock.monotonic_ns() + GYRO_RESET_NS
+                self._reset()
         elif register != 0x00:
             super()._set(register, value | 0x80 if register == 0x10 else value)
             if register == 0x3E:
                 self.clear_fifo()
-
-    def _refuse_while_resetting(self) -> None:
-        if self._clock.monotonic_ns() < self._resets_until_ns:
-            raise self.not_acknowledged()

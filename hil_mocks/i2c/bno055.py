@@ -9,40 +9,18 @@ from hil_mocks.i2c.motion import Vector
 
 SIX = struct.Struct("<hhh")
 POWER_ON = {0x00: 0xA0, 0x01: 0xFB, 0x02: 0x32, 0x03: 0x0F, 0x3B: 0x80, 0x3D: 0x10, 0x41: 0x24}
-BOOT_S = 0.65  # after a reset, by itself or by SYS_TRIGGER
 TO_CONFIG_S = 0.019
 ALWAYS_WRITABLE = (0x07, 0x3D, 0x3F)  # PAGE_ID, OPR_MODE, SYS_TRIGGER; all else in the mode CONFIG only
 
 
 class Bno055(SimulatedChip):
-    """BNO055; samples in its fusion mode IMU only. It has no FIFO.
-
-    A reset is not acknowledged, and nothing is until the chip has booted. ``resets``: how many there were.
-    """
+    """BNO055; samples in its fusion mode IMU only. It has no FIFO."""
 
     address = 0x28
     power_on = POWER_ON
-    resets = 0
-    _boots_until_ns = 0
+    boot_ns = 650_000_000
+    acknowledges_reset = False
     _switches_until_ns = 0
-
-    def brown_out(self) -> None:
-        """It resets itself, and boots."""
-        self.resets += 1
-        self.power_up()
-        self._boots_until_ns = self._clock.monotonic_ns() + round(BOOT_S * 1e9)
-
-    def read(self, register: int, length: int) -> bytes:
-        """A burst; while it boots, none."""
-        if self._clock.monotonic_ns() < self._boots_until_ns:
-            raise self.not_acknowledged()
-        return super().read(register, length)
-
-    def write(self, register: int, data: bytes) -> bytes:
-        """A burst; while it boots, none."""
-        if self._clock.monotonic_ns() < self._boots_until_ns:
-            raise self.not_acknowledged()
-        return super().write(register, data)
 
     def rate_hz(self) -> float:
         """100 Hz in the mode IMU."""
@@ -64,8 +42,7 @@ class Bno055(SimulatedChip):
 
     def _set(self, register: int, value: int) -> None:
         if register == 0x3F and value & 0x20:
-            self.brown_out()
-            raise self.not_acknowledged()
+            self._reset()
         configurable = self.registers[0x3D] & 15 == 0 and self._clock.monotonic_ns() >= self._switches_until_ns
         if register > 0x03 and (register in ALWAYS_WRITABLE or configurable):
             if register == 0x3D and value & 15 == 0 and self.registers[0x3D] & 15:

@@ -9,7 +9,6 @@ from drivers.clock import Clock
 from hil_mocks.i2c.chip import SimulatedChip, counts
 from hil_mocks.i2c.motion import Motion, Vector
 
-BOOT_NS = 200_000_000
 ANNOUNCEMENT = bytes(276 - 4)
 ACCELEROMETER, GYRO = 1, 2
 FASTEST_US = {ACCELEROMETER: 2000, GYRO: 2500}
@@ -19,14 +18,14 @@ MAX_PACKETS = 200  # that it keeps
 class Bno08x(SimulatedChip):
     """It says what it is when it has booted, and then nothing until it is asked for a sensor.
 
-    While it boots it acknowledges nothing. What was read of a packet without its end comes again, marked as continued.
+    What was read of a packet without its end comes again, marked as continued.
     """
 
     address = 0x4A
     power_on: ClassVar[Mapping[int, int]] = {}
+    boot_ns = 200_000_000
 
     def __init__(self, motion: Motion, clock: Clock, rate_error: float = 0.0, celsius: float = 31.5) -> None:
-        self._boots_until_ns = 0
         super().__init__(motion, clock, rate_error, celsius)
         self._boots_until_ns = 0  # it was switched on long ago
 
@@ -38,7 +37,7 @@ class Bno08x(SimulatedChip):
         self._packets: deque[tuple[int, bytes]] = deque(maxlen=MAX_PACKETS)
         self._read_bytes = 0  # of the first packet's cargo
         super().power_up()
-        self._boots_until_ns = self._clock.monotonic_ns() + BOOT_NS
+        self._boots_until_ns = self._clock.monotonic_ns() + self.boot_ns
         self._packets += [(0, ANNOUNCEMENT), (1, b"\x01"), (2, b"\xf1" + bytes(15))]
 
     def rate_hz(self) -> float:
@@ -94,7 +93,3 @@ class Bno08x(SimulatedChip):
         number = self._report_numbers[sensor]
         self._report_numbers[sensor] = (number + 1) % 256
         return bytes([sensor, number, 3, 0]) + values
-
-    def _refuse_while_booting(self) -> None:
-        if self._clock.monotonic_ns() < self._boots_until_ns:
-            raise self.not_acknowledged()

@@ -18,11 +18,17 @@ Counts = tuple[int, int, int]
 class SimulatedChip(ABC):
     """A chip's registers. ``rate_error``: share by which its clock is too fast. ``celsius``: of its die.
 
-    Time passes for it when it is accessed. ``power_up`` is also what a chip does that resets itself.
+    Time passes for it when it is accessed. ``power_up`` is also what a chip does that resets itself, ``brown_out`` the
+    same with the time that it takes. ``resets``: how many of those there were. ``acknowledges_reset``: whether it
+    acknowledges the command for one.
     """
 
     address: ClassVar[int]
     power_on: ClassVar[Mapping[int, int]]  # registers that are not 0
+    boot_ns: ClassVar[int] = 0  # after a reset; it acknowledges nothing meanwhile
+    acknowledges_reset = True
+    resets = 0
+    _boots_until_ns = 0
 
     def __init__(self, motion: Motion, clock: Clock, rate_error: float = 0.0, celsius: float = 31.5) -> None:
         self.rate_error = rate_error
@@ -47,8 +53,15 @@ class SimulatedChip(ABC):
         self._period_ns = 0.0
         self.clear_fifo()
 
+    def brown_out(self) -> None:
+        """It resets itself, and boots."""
+        self.resets += 1
+        self.power_up()
+        self._boots_until_ns = self._clock.monotonic_ns() + self.boot_ns
+
     def read(self, register: int, length: int) -> bytes:
         """A burst of bytes from a register on."""
+        self._refuse_while_booting()
         self._catch_up()
         return self._burst(register, length)
 
@@ -62,6 +75,7 @@ class SimulatedChip(ABC):
 
     def write(self, register: int, data: bytes) -> bytes:
         """Write a burst of bytes from a register on."""
+        self._refuse_while_booting()
         self._catch_up()
         for at, value in enumerate(data):
             self._set(register + at, value)
@@ -89,6 +103,16 @@ class SimulatedChip(ABC):
     def not_acknowledged(self) -> OSError:
         """What a transfer ends with that the chip leaves without an answer."""
         return OSError(errno.EREMOTEIO, os.strerror(errno.EREMOTEIO))
+
+    def _reset(self) -> None:
+        """It was told to."""
+        self.brown_out()
+        if not self.acknowledges_reset:
+            raise self.not_acknowledged()
+
+    def _refuse_while_booting(self) -> None:
+        if self._clock.monotonic_ns() < self._boots_until_ns:
+            raise self.not_acknowledged()
 
     def _burst(self, register: int, length: int) -> bytes:
         return bytes(self.registers[register : register + length])

@@ -17,6 +17,7 @@ class Icm20948(SimulatedChip):
 
     address = 0x68
     power_on = POWER_ON
+    boot_ns = 100_000_000
 
     def rate_hz(self) -> float:
         """Sample rate; 0 asleep."""
@@ -60,7 +61,7 @@ class Icm20948(SimulatedChip):
     def _set(self, register: int, value: int) -> None:
         banked = self._banked(register)
         if banked == 0x06 and value & 0x80:
-            self.power_up()
+            self._reset()
         elif banked == 0x68 and value & 0x1F:
             self.clear_fifo()
             super()._set(banked, value)

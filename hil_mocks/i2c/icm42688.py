@@ -13,26 +13,23 @@ PACKET_BYTES = 16
 PACKETS = 2048 // PACKET_BYTES
 POWER_ON = {0x13: 0x05, 0x4C: 0x30, 0x4D: 0x91, 0x4F: 0x06, 0x50: 0x06, 0x52: 0x11, 0x5F: 0x00, 0x75: 0x47}
 ODR_HZ = {6: 1000.0, 7: 200.0, 8: 100.0, 9: 50.0, 10: 25.0, 11: 12.5, 15: 500.0}
-RESET_NS = 1_000_000
 START_UP_NS = 45_000_000  # of the gyro, in which its words say that there are no data
 
 
 class Icm42688(SimulatedChip):
-    """ICM-42688-P. While it resets it acknowledges nothing; the FIFO's count reads 0 once after it was flushed."""
+    """ICM-42688-P. The FIFO's count reads 0 once after it was flushed."""
 
     address = 0x68
     power_on = POWER_ON
-    _resets_until_ns = 0
+    boot_ns = 1_000_000
     _gyro_from_ns = 0
 
     def read(self, register: int, length: int) -> bytes:
         """A burst; in another bank than 0, nothing but zeros."""
-        self._refuse_while_resetting()
         return bytes(length) if self.registers[0x76] and register != 0x76 else super().read(register, length)
 
     def write(self, register: int, data: bytes) -> bytes:
         """A burst; not to another bank than 0."""
-        self._refuse_while_resetting()
         return b"" if self.registers[0x76] and register != 0x76 else super().write(register, data)
 
     def rate_hz(self) -> float:
@@ -77,8 +74,7 @@ class Icm42688(SimulatedChip):
 
     def _set(self, register: int, value: int) -> None:
         if register == 0x11 and value & 0x01:
-            self.power_up()
-            self._resets_until_ns = self._clock.monotonic_ns() + RESET_NS
+            self._reset()
         elif register == 0x4B:
             if value & 0x02:
                 self.clear_fifo()
@@ -86,7 +82,3 @@ class Icm42688(SimulatedChip):
             if register == 0x4E and value & ~self.registers[0x4E] & 0x0C:
                 self._gyro_from_ns = self._clock.monotonic_ns() + START_UP_NS
             super()._set(register, value)
-
-    def _refuse_while_resetting(self) -> None:
-        if self._clock.monotonic_ns() < self._resets_until_ns:
-            raise self.not_acknowledged()

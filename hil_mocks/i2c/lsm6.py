@@ -20,6 +20,7 @@ class Lsm6(SimulatedChip):
     """What all have alike. A reset while the FIFO fills is neither acknowledged nor done."""
 
     address = 0x6A
+    boot_ns = 15_000_000
     lsb_per_c: float
     force_mg_per_count = FORCE_MG_PER_COUNT
 
@@ -47,7 +48,7 @@ class Lsm6(SimulatedChip):
         if register == 0x12 and value & 0x01:
             if self.registers[self.mode_register] & 7:
                 raise self.not_acknowledged()
-            self.power_up()
+            self._reset()
         elif register == self.mode_register and not value & 7:
             super()._set(register, value)
             self.clear_fifo()  # bypass

@@ -24,6 +24,7 @@ class Lsm9ds1(SimulatedChip):
 
     address = 0x6A
     power_on = POWER_ON
+    boot_ns = 15_000_000
 
     def rate_hz(self) -> float:
         """Sample rate, the gyro's; 0 switched off."""
@@ -62,7 +63,7 @@ class Lsm9ds1(SimulatedChip):
 
     def _set(self, register: int, value: int) -> None:
         if register == 0x22 and value & 0x01:
-            self.power_up()
+            self._reset()
         elif register == 0x2E and not value & 0xE0:
             super()._set(register, value)
             self.clear_fifo()  # bypass

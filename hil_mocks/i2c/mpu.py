@@ -16,6 +16,7 @@ class Mpu6050(SimulatedChip):
 
     address = 0x68
     power_on: ClassVar[Mapping[int, int]] = {0x6B: 0x40, 0x75: 0x68}
+    boot_ns = 100_000_000
     fifo_bytes = 1024
     lsb_per_c, zero_c = 340.0, 36.53
 
@@ -61,7 +62,7 @@ class Mpu6050(SimulatedChip):
 
     def _set(self, register: int, value: int) -> None:
         if register == 0x6B and value & 0x80:
-            self.power_up()
+            self._reset()
         elif register == 0x6A:
             if value & 0x04:
                 self.clear_fifo()

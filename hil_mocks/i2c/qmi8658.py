@@ -8,12 +8,11 @@ from hil_mocks.i2c.chip import G_MPS2, SimulatedChip, counts
 from hil_mocks.i2c.motion import Vector
 
 POWER_ON = {0x00: 0x05, 0x01: 0x7C, 0x02: 0x20}
-RESET_NS = 15_000_000
 COMMAND_NS = 1_500_000
 
 
 class Qmi8658(SimulatedChip):
-    """QMI8658. While it resets it acknowledges nothing; a command takes time, and its end must be acknowledged.
+    """QMI8658. A command takes time, and its end must be acknowledged.
 
     At power-on it is big-endian, and addresses do not count up in a burst. Reading STATUSINT when there is a sample
     locks the data until the last byte of them was read; without that, here, a burst meets a sample that just comes.
@@ -21,7 +20,7 @@ class Qmi8658(SimulatedChip):
 
     address = 0x6B
     power_on = POWER_ON
-    _resets_until_ns = 0
+    boot_ns = 15_000_000
     _done_at_ns: int | None = None  # of the command that runs
     _number = 0
 
@@ -31,15 +30,10 @@ class Qmi8658(SimulatedChip):
         self._gated, self._available, self._locked = True, False, False
         super().power_up()
 
-    def read(self, register: int, length: int) -> bytes:
-        """A burst; while it resets, none."""
-        self._refuse_while_resetting()
-        return super().read(register, length)
-
-    def write(self, register: int, data: bytes) -> bytes:
-        """A burst; while it resets, none."""
-        self._refuse_while_resetting()
-        return super().write(register, data)
+    def brown_out(self) -> None:
+        """Also says that the reset is done."""
+        super().brown_out()
+        self.registers[0x4D] = 0x80
 
     def rate_hz(self) -> float:
         """Sample rate; 0 switched off."""
@@ -87,16 +81,10 @@ class Qmi8658(SimulatedChip):
     def _set(self, register: int, value: int) -> None:
         if register == 0x60:
             if value == 0xB0:
-                self.power_up()
-                self.registers[0x4D] = 0x80
-                self._resets_until_ns = self._clock.monotonic_ns() + RESET_NS
+                self._reset()
         elif register == 0x0A:
             self._done_at_ns = self._clock.monotonic_ns() + COMMAND_NS if value else None
             if value == 0x12 and not self.registers[0x08] & 3:
                 self._gated = self.registers[0x0B] != 1
         elif register not in (0x00, 0x01):
             super()._set(register, value)
-
-    def _refuse_while_resetting(self) -> None:
-        if self._clock.monotonic_ns() < self._resets_until_ns:
-            raise self.not_acknowledged()

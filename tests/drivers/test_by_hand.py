@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Sequence
+from importlib import import_module
 
 import pytest
 
@@ -83,3 +84,24 @@ def test_values_of_a_sample_with_units_and_saturation() -> None:
     sample = ImuSample(0, (0.1, 0.2, -0.3), (0.0, 0.0, 9.8), saturated=True)
     line = "gyro  +0.1000  +0.2000  -0.3000 rad/s  accel   +0.000   +0.000   +9.800 m/s²  saturated"
     assert describe_imu(sample) == line
+
+
+@pytest.mark.parametrize("number", ["0", "-1", "nan", "inf", "fast"])
+@pytest.mark.parametrize(
+    ("driver", "option"),
+    [
+        ("camera.v4l2", "--fps"),
+        ("camera.libcamera", "--exposure-s"),
+        ("imu.mpu6050", "--rate"),
+        ("imu.iio", "--rate"),
+        ("imu.xsens", "--seconds"),
+    ],
+)
+def test_what_is_no_number_above_0_is_refused_before_a_device_is_opened(
+    capsys: pytest.CaptureFixture[str], driver: str, option: str, number: str
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        import_module(f"drivers.{driver}").main([f"{option}={number}"])
+    assert ended.value.code == 2
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.endswith(f"error: argument {option}: {number}: write a number above 0")

@@ -128,8 +128,8 @@ def test_it_has_a_name_and_an_id(free: Machine) -> None:
             f"{BY_HAND}.libcamera imx219",
             "imx219: libcamera has no such camera; found: Sensor B (platform/vimc.0 Sensor B)",
         ),
-        (f"{LIBCAMERA} --width 8000", "Sensor B: no auto of 8000x120; offered: RGB3: "),
-        (f"{LIBCAMERA} --gain 2", "Sensor B: the gain cannot be set; leave it unset"),
+        (f"{LIBCAMERA} --width 8000", "Sensor B: no format that can be read of 8000x120; offered: RGB3: "),
+        (f"{LIBCAMERA} --gain 2", "Sensor B: camera.gain cannot be set; leave it unset"),
         (
             f"setpriv --reuid=65534 --regid=65534 --clear-groups {LIBCAMERA}",
             "Sensor B: no permission for /dev/media0; ",

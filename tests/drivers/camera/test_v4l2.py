@@ -450,8 +450,8 @@ class TestSettings:
     @pytest.mark.parametrize(
         ("settings", "message"),
         [
-            ({"exposure_s": 10.0}, "choose 3 to 2047"),
-            ({"gain": 256}, "choose 0 to 255"),
+            ({"exposure_s": 10.0}, r"camera\.exposure_s cannot be 10; choose 0\.0003 to 0\.2047, or leave it unset"),
+            ({"gain": 256}, r"camera\.gain cannot be 256; choose 0 to 255, or leave it unset"),
         ],
     )
     def test_a_value_out_of_range_is_refused_with_the_range(
@@ -462,7 +462,7 @@ class TestSettings:
 
     def test_a_value_that_becomes_another_is_refused(self, open_camera: Open, webcam: MockCamera) -> None:
         webcam.controls[v4l2.CID_GAIN] = Rounding(0, 0, 255)
-        with pytest.raises(UnsupportedSettingError, match="became 15 instead of 13"):
+        with pytest.raises(UnsupportedSettingError, match="became 15 instead of 13; set 15 or leave it unset"):
             open_camera(gain=13)
 
     @pytest.mark.parametrize("settings", [{"exposure_s": 0.01}, {"gain": 1}, {"power_line_hz": 50}])
@@ -470,7 +470,9 @@ class TestSettings:
         self, open_camera: Open, webcam: MockCamera, settings: dict[str, object]
     ) -> None:
         webcam.controls.clear()
-        with pytest.raises(UnsupportedSettingError, match="cannot be set; leave it unset"):
+        with pytest.raises(
+            UnsupportedSettingError, match=rf"camera\.{next(iter(settings))} cannot be set; leave it unset"
+        ):
             open_camera(**settings)
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from drivers.device import KeptOpen
 from drivers.errors import DeviceLostError
-from hil_mocks.i2c.bno055 import BOOT_S, TO_CONFIG_S
+from hil_mocks.i2c.bno055 import TO_CONFIG_S, Bno055
 
 ACC_DATA = 0x08
 RigMaker = Callable[..., Any]
@@ -95,7 +95,7 @@ def test_a_system_error_is_mended_by_a_reset(rig: RigMaker) -> None:
 def test_a_chip_that_never_comes_back_from_its_reset_is_reported(
     rig: RigMaker, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("hil_mocks.i2c.bno055.BOOT_S", 60.0)
+    monkeypatch.setattr("hil_mocks.i2c.bno055.Bno055.boot_ns", 60 * 10**9)
     bench = rig("bno055")
     bench.read_for(0.5)
     bench.chip.registers[0x39] = 1
@@ -130,7 +130,7 @@ def test_after_a_brown_out_it_is_back_when_it_has_booted(rig: RigMaker) -> None:
     began_ns = bench.clock.monotonic_ns()
     while not kept.read():
         assert bench.clock.monotonic_ns() - began_ns < 2e9
-    assert bench.clock.monotonic_ns() - began_ns > BOOT_S * 1e9
+    assert bench.clock.monotonic_ns() - began_ns > Bno055.boot_ns
     assert bench.chip.resets == 1
 
 

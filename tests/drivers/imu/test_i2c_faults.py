@@ -230,16 +230,29 @@ def test_a_chip_that_does_not_keep_a_setting_is_reported(
 
 
 @every_chip
-def test_whatever_another_program_left_behind_is_reset(
-    rig: RigMaker, driver: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_whatever_another_program_left_behind_is_reset(rig: RigMaker, driver: str) -> None:
     bench = rig(driver)
-    resets = []
-    power_up = bench.chip.power_up
-    monkeypatch.setattr(bench.chip, "power_up", lambda: (resets.append(1), power_up()))
     bench.chip.registers[0x7F] = 0x20  # an ICM-20948's bank
     assert_true(bench, bench.read_for(0.3), within_s=0.01)
-    assert len(resets) == (driver != "bno055")  # which is not reset but configured anew
+    assert bench.chip.resets == (driver != "bno055")  # which is not reset but configured anew
+
+
+@every_chip
+def test_a_chip_that_boots_is_left_alone(rig: RigMaker, driver: str) -> None:
+    bench = rig(driver)
+    for chip in bench.chip.places.values():
+        chip.acknowledges_reset = True
+    assert_true(bench, bench.read_for(0.3), within_s=0.01)
+    assert bench.device.counts["nack"] == 0
+
+
+@every_chip
+def test_a_reset_that_is_not_acknowledged_is_done_once(rig: RigMaker, driver: str) -> None:
+    bench = rig(driver)
+    for chip in bench.chip.places.values():
+        chip.acknowledges_reset = False
+    assert_true(bench, bench.read_for(0.3), within_s=0.01)
+    assert all(chip.resets == (driver != "bno055") for chip in bench.chip.places.values())
 
 
 @pytest.mark.parametrize("driver", ST)
@@ -334,7 +347,7 @@ def test_unplugged_and_plugged_in_again_it_comes_back(rig: RigMaker, driver: str
     for _ in range(4):
         assert kept.read() == []
     assert isinstance(kept.error, DriverError)
-    chip.power_up()
+    chip.brown_out()
     bench.wire.chips[chip.address] = chip
     plugged_ns = bench.clock.monotonic_ns()
     samples: list[Any] = []

@@ -348,6 +348,15 @@ def test_words_in_the_middle_of_their_storage_keep_their_sign(tree: Tree, pipe: 
     device.close()
 
 
+@pytest.mark.parametrize("kind", ["be:s16/16", "be:s16/16X1", "be:s16/16X1>>0"])
+def test_a_type_may_leave_out_repeat_and_shift(tree: Tree, pipe: Pipe, kind: str) -> None:
+    device = buffered(tree(files={**BUFFER, **{f"scan_elements/{name}_type": kind for name in CHANNELS}}))
+    pipe.write(struct.pack(">6h4x", 4, 5, 6, 1, 2, 3) + struct.pack("<q", 7))
+    (sample,) = device.read()
+    assert (sample.stamp_ns, sample.saturated) == (7, False)
+    device.close()
+
+
 def test_without_monotonic_stamps_the_arrival_counts(tree: Tree, pipe: Pipe) -> None:
     files = {name: value for name, value in BUFFER.items() if "timestamp" not in name}
     device = buffered(tree(files=files))

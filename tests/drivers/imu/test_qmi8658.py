@@ -47,7 +47,7 @@ def test_numbers_go_on_from_0_after_2_to_the_24(rig: RigMaker) -> None:
 
 
 def test_a_reset_that_never_ends_is_reported(rig: RigMaker, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("hil_mocks.i2c.qmi8658.RESET_NS", 10**10)
+    monkeypatch.setattr("hil_mocks.i2c.qmi8658.Qmi8658.boot_ns", 10**10)
     with pytest.raises(DeviceLostError, match="does not come back from a reset; switch its supply off and on"):
         rig("qmi8658").open()
 

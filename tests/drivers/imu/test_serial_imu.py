@@ -1,8 +1,10 @@
 """Serial IMUs by the real driver, through a real terminal, and everything that goes wrong with them."""
 
+import errno
 import math
 import os
 import re
+import termios
 from collections.abc import Callable, Iterator
 from itertools import islice, pairwise
 from pathlib import Path
@@ -264,6 +266,22 @@ def test_an_imu_that_is_pulled_out_while_it_sends(plug: Plug) -> None:
     assert len(read(kept, 3)) == 3
 
 
+def pseudo_terminals_have(baud: int) -> bool:
+    """Whether one can be set to it, and then says so."""
+    speed = getattr(termios, f"B{baud}")
+    leader, follower = os.openpty()
+    try:
+        attributes = termios.tcgetattr(follower)
+        attributes[4:6] = speed, speed
+        termios.tcsetattr(follower, termios.TCSANOW, attributes)
+        return termios.tcgetattr(follower)[4:6] == [speed, speed]
+    except termios.error:
+        return False
+    finally:
+        os.close(leader)
+        os.close(follower)
+
+
 @pytest.mark.parametrize(
     ("name", "baud"),
     [
@@ -274,6 +292,8 @@ def test_an_imu_that_is_pulled_out_while_it_sends(plug: Plug) -> None:
     ],
 )
 def test_a_wrong_baud_rate_is_recognised(plug: Plug, name: str, baud: int) -> None:
+    if not pseudo_terminals_have(baud):
+        pytest.skip(f"pseudo-terminals have no {baud} baud here, as under an emulator of another processor")
     stand_in = plug(ENCODERS[name]())
     device = opened(name, stand_in, baud=baud)
 
@@ -472,6 +492,15 @@ def test_no_permission_names_the_group(plug: Plug) -> None:
     finally:
         if privileged:
             os.seteuid(0)
+
+
+def test_a_port_that_the_services_unit_leaves_out_is_no_matter_of_groups(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused_by_the_device_policy(*_: object, **__: object) -> None:
+        raise OSError(errno.EPERM, os.strerror(errno.EPERM))
+
+    monkeypatch.setattr("drivers.imu.serial_port.serial.Serial", refused_by_the_device_policy)
+    with pytest.raises(DeviceForbiddenError, match=r"^/dev/ttyTHS1: the service may not open it; allow"):
+        open_port("xsens", "/dev/ttyTHS1", 0, ImuSettings())
 
 
 def test_a_file_is_no_serial_port(tmp_path: Path) -> None:
