@@ -1,6 +1,6 @@
 """``python -m benchmarks.budgets``: what each process may take of a core and of memory, and what it takes here.
 
-The daemon drives a rendered drive again and again, in place of a camera of 30 pictures a second and a 200 Hz IMU. The
+The daemon drives a rendered drive again and again, in place of a camera of 30 frames a second and a 200 Hz IMU. The
 other processes come to it one after the other, each with somebody who uses it, and are measured for as long as asked.
 Shares are of one core of this computer, with whatever else runs on it.
 """
@@ -47,7 +47,7 @@ class Budget:
 
 
 BUDGETS = {
-    "run": Budget(0.15, 96, "640×480 at 30 pictures a second, IMU 200 Hz, one subscriber"),
+    "run": Budget(0.15, 96, "640×480 at 30 frames a second, IMU 200 Hz, one subscriber"),
     "record": Budget(0.20, 96, "as run, and everything into a file"),
     "watch": Budget(0.05, 72, "a terminal of 24 × 100"),
     "view": Budget(0.10, 112, "a browser that asks again at once"),

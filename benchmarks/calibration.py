@@ -1,7 +1,7 @@
 """``python -m benchmarks.calibration``: whether the numbers of objects are right, and their sigmas honest.
 
 The planner with the truth drives through worlds of the closed loop and the pipeline looks on; or rendered drives are
-played. Every object is compared with the body that it lies on: the one with whose box in the picture its own overlaps
+played. Every object is compared with the body that it lies on: the one with whose box in the image its own overlaps
 most, its middle being inside (grown by a quarter and 8 px).
 """
 

@@ -24,7 +24,7 @@ from hil_mocks.closed_loop.loop import Log, Moment, drive
 from hil_mocks.closed_loop.outcome import Outcome, brakes, judge, pool
 from hil_mocks.closed_loop.world import World
 
-_SIGHTED = (TRUTH, BLIND)  # they need no pictures
+_SIGHTED = (TRUTH, BLIND)  # they need no images
 
 
 class _Judged:

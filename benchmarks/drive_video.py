@@ -33,7 +33,7 @@ class _Filmed:
     def __init__(self, world: World, name: str, path: Path) -> None:
         inner = driver(world, name)
         if not isinstance(inner, SceneDriver):
-            raise TypeError(f"{name} looks at no pictures")
+            raise TypeError(f"{name} looks at no images")
         self._driver = inner
         size = world.lens.width, world.lens.height
         self.writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), world.fps, size)
@@ -49,7 +49,7 @@ class _Filmed:
 
 
 def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps: float) -> Image:
-    """One picture (height, width, 3): threats by the truth (red below them), what the planner is given, speeds."""
+    """One image (height, width, 3): threats by the truth (red below them), what the planner is given, speeds."""
     assert moment.frame is not None
     image = np.asarray(cv2.cvtColor(moment.frame.image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     for body in moment.known:

@@ -106,7 +106,7 @@ def objects_of_circles(scene: Scene, drive: Drive) -> npt.NDArray[np.void]:
     """An object for each trusted rebel circle: what it says, and what follows from it.
 
     Peers tell the range and the miss of what stands only. Of what moves, its foot on the ground tells the range, and
-    its motion in the picture the miss.
+    its motion in the image the miss.
     """
     circles = scene.circles[(scene.circles["kind"] == Kind.REBEL) & (scene.circles["trust"] >= _MIN_TRUST)]
     objects = np.zeros(len(circles), OBJECT)

@@ -94,7 +94,7 @@ class PeerMethod:
 
 
 class _Nothing:
-    """What every method needs: pictures and ego-motion."""
+    """What every method needs: images and ego-motion."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
         del config, lens

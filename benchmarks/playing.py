@@ -41,7 +41,7 @@ def config_of(drive: Drive, settings: Filter | None = None, memory: Memory | Non
         mask=[[list(point) for point in part] for part in drive.own_parts],
     )
     vehicle = Vehicle(half_width_m=drive.half_width_m, horizon_s=drive.horizon_s)
-    imu = Imu(time_offset_s=-drive.exposure_s / 2)  # a picture shows the middle of its exposure, its stamp the start
+    imu = Imu(time_offset_s=-drive.exposure_s / 2)  # an image shows the middle of its exposure, its stamp the start
     return Config(camera=camera, imu=imu, vehicle=vehicle, filter=settings or Filter(), memory=memory or Memory())
 
 

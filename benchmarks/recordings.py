@@ -1,4 +1,4 @@
-"""Real recordings: what each method says of them, and pictures to look at.
+"""Real recordings: what each method says of them, and images to look at.
 
 A recording is a folder that the replay reads, with a file ``settings`` in it, and ``truth.jsonl`` where somebody has
 marked what is to be seen: the corpus, the truth and the score are those of ``lcf-edge evaluate`` (docs/evaluate.md).
@@ -75,8 +75,8 @@ def tables(results: Sequence[Result]) -> list[Table]:
     return [
         table("Threats found, of those in sight", lambda s: f"{s.found}/{s.due}" if s.due else "-"),
         table("Found after, s", lambda s: number(s.latency_s, 2)),
-        table("Rebels on nothing, a picture", lambda s: number(s.false_per_frame, 2)),
-        table("Pictures with a contact below 1 s that does not come", lambda s: str(s.contacts)),
+        table("Rebels on nothing, an image", lambda s: number(s.false_per_frame, 2)),
+        table("Images with a contact below 1 s that does not come", lambda s: str(s.contacts)),
         table("Step, median ms", lambda s: number(s.median_ms, 2)),
     ]
 
@@ -98,13 +98,13 @@ def as_numbers(result: Result) -> dict[str, dict[str, float]]:
 
 
 def _drawn(moment: Moment, known: Sequence[Known]) -> Colours:
-    """A small picture with what is there and the filter's rebels."""
+    """A small image with what is there and the filter's rebels."""
     line = line_of(moment.frame, rebels(moment.scenes[FILTER].circles))
     return draw(moment.frame.image, known, line.rebels, str(line.seq))
 
 
 def write_sheet(results: Sequence[Result], path: Path) -> Path:
-    """Write all pictures, a row a recording; return where. Raises OSError."""
+    """Write all images, a row a recording; return where. Raises OSError."""
     rows = []
     for each in results:
         height = max((image.shape[0] for image in each.images), default=0) + 16

@@ -1,6 +1,6 @@
 """``python -m benchmarks.run``: detection quality and speed of the filter and its peers, in one run.
 
-Prints the tables and writes them to ``benchmarks/results/``; of real recordings a sheet of pictures besides, to
+Prints the tables and writes them to ``benchmarks/results/``; of real recordings a sheet of images besides, to
 ``bench-out/``.
 """
 

@@ -96,14 +96,14 @@ def score(
 ) -> Score:
     """Compare a drive's results with its truth.
 
-    Matched by stamp; a picture without a result counts as one without circles. `grace_s`: a target counts
+    Matched by stamp; an image without a result counts as one without circles. `grace_s`: a target counts
     when it has been in sight this long; `settle_s`: nothing counts before; `min_trust`: circles below are
     left out. Raises ValueError when a result has a stamp that the truth does not know.
     """
     scenes = {scene.stamp_ns: scene for scene in results}
     unknown = scenes.keys() - {truth.stamp_ns for truth in truths}
     if unknown:
-        raise ValueError(f"results: no truth for the picture at {min(unknown)} ns; another drive's truth?")
+        raise ValueError(f"results: no truth for the image at {min(unknown)} ns; another drive's truth?")
     in_sight_since: dict[int, int] = {}
     waiting: dict[int, int] = {}  # targets not hit yet, stamp of their beginning
     counted: set[int] = set()  # targets that have counted at least once

@@ -1,6 +1,6 @@
-"""The daemon in a session: a camera of 30 pictures a second, a 200 Hz IMU, and a subscriber in another process.
+"""The daemon in a session: a camera of 30 frames a second, a 200 Hz IMU, and a subscriber in another process.
 
-The subscriber is this process, over Zenoh on loopback. What comes before the picture can be read, exposure and
+The subscriber is this process, over Zenoh on loopback. What comes before the image can be read, exposure and
 transfer, is not in the times; nor is the stand-ins' own reading in the share of a core.
 """
 
@@ -37,7 +37,7 @@ _CPU_CLOCK = 2  # CPUCLOCK_SCHED, of the clock that clock_getcpuclockid(3) gives
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What was measured. ``latency_ms``: from a picture's stamp to its scene at the subscriber."""
+    """What was measured. ``latency_ms``: from an image's stamp to its scene at the subscriber."""
 
     frame_count: int
     received: int
@@ -73,7 +73,7 @@ def config_in(folder: Path, drive: Drive, *listen: str) -> Config:
 def save(drive: Drive, folder: Path) -> None:
     """Render a drive for ``session_daemon``."""
     count = 0
-    with (folder / "pictures.raw").open("wb") as file:
+    with (folder / "images.raw").open("wb") as file:
         for frame, _ in scenes.frames(drive):
             file.write(frame.image.tobytes())
             count += 1
@@ -126,7 +126,7 @@ def _listened(daemon: "subprocess.Popen[bytes]", endpoint: str, seconds: float) 
     measured = took_ns[from_scene:to_scene]
     taken = np.array([each for _, each in measured]) / 1e6
     frame_count = measured[-1][0] - measured[0][0] + 1
-    read_s = float(out.split()[-1]) / (took_ns[-1][0] - took_ns[0][0] + 1)  # a picture
+    read_s = float(out.split()[-1]) / (took_ns[-1][0] - took_ns[0][0] + 1)  # an image
     reading = read_s * frame_count / lasted_s
     return Session(
         frame_count,
@@ -160,11 +160,11 @@ def status_mib(process: int, what: str) -> float:
 def tables(session: Session) -> list[Table]:
     """One table."""
     rows = [
-        ["pictures, and scenes that were received", f"{session.frame_count}, {session.received}"],
+        ["images, and scenes that were received", f"{session.frame_count}, {session.received}"],
         ["stamp to received, ms: median (p99)", f"{session.latency_p50_ms:.1f} ({session.latency_p99_ms:.1f})"],
         ["share of a core", f"{session.core_share:.1%}"],
-        ["reading the stand-in's pictures, not in it", f"{session.reading_share:.1%}"],
+        ["reading the stand-in's images, not in it", f"{session.reading_share:.1%}"],
         ["resident memory, MiB", number(session.resident_mib, 1)],
     ]
-    title = f"The daemon, 640×480 at {FRAMES_HZ:g} pictures a second, IMU 200 Hz, a subscriber in another process"
+    title = f"The daemon, 640×480 at {FRAMES_HZ:g} frames a second, IMU 200 Hz, a subscriber in another process"
     return [Table(title, ["", "value"], rows)]

@@ -1,8 +1,8 @@
 """`lcf-edge` with a drive in place of devices: ``python -m benchmarks.session_daemon FOLDER run|record [OPTION ...]``.
 
-FOLDER holds ``pictures.raw``, one after the other, ``imu.raw``, ``speed.raw`` and ``size.json``, as ``session.save``
+FOLDER holds ``images.raw``, one after the other, ``imu.raw``, ``speed.raw`` and ``size.json``, as ``session.save``
 writes them.
-The devices read no more than a driver does: a picture comes out of a file, as it would out of the driver's buffer, and
+The devices read no more than a driver does: an image comes out of a file, as it would out of the driver's buffer, and
 is decoded by nobody. At the end it prints the processor time, s, that reading took.
 """
 
@@ -26,13 +26,13 @@ MAX_WAIT_S = 0.25
 
 
 class Drive:
-    """The drive, driven again and again; all devices share its time. ``read_s``: processor time of reading pictures."""
+    """The drive, driven again and again; all devices share its time. ``read_s``: processor time of reading images."""
 
     def __init__(self, folder: Path) -> None:
         size = json.loads((folder / "size.json").read_text("utf-8"))
         self.shape = size["height"], size["width"]
         self.lap_ns = round(1e9 * size["seconds"])
-        self.images_file = os.open(folder / "pictures.raw", os.O_RDONLY)
+        self.images_file = os.open(folder / "images.raw", os.O_RDONLY)
         self.count = size["count"]
         self.imu = np.fromfile(folder / "imu.raw").reshape(-1, 7)  # np.load would take memory that no vehicle needs
         self.speed = np.fromfile(folder / "speed.raw").reshape(-1, 3)
@@ -76,13 +76,13 @@ class Device(ABC):
 
 
 class Camera(Device):
-    """Its stamp is the moment from which on the picture can be read."""
+    """Its stamp is the moment from which on the image can be read."""
 
     def __init__(self, drive: Drive) -> None:
         super().__init__(drive, [k * drive.lap_ns / 1e9 / drive.count for k in range(drive.count)])
 
     def record(self, stamp_ns: int, number: int) -> Frame:
-        """A picture."""
+        """An image."""
         before = time.thread_time()
         image = np.empty(self.drive.shape, np.uint8)
         os.preadv(self.drive.images_file, [image], number % self.drive.count * image.nbytes)

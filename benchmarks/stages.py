@@ -34,7 +34,7 @@ STEPS = {
     "_detect": "5. key frame, α, rebels",
     "_update_circles": "6. circles, 7. feedback",
 }
-FRAME_READ, SAMPLES, MESSAGE, PUT = "picture out of a YUYV buffer", "samples taken", "scene as a message", "put"
+FRAME_READ, SAMPLES, MESSAGE, PUT = "image out of a YUYV buffer", "samples taken", "scene as a message", "put"
 _WARM_UP = 20
 
 
@@ -81,13 +81,13 @@ def _parts(pipeline: Pipeline) -> dict[str, list[float]]:
     parts = vars(pipeline)
     parts["_stillness"] = SimpleNamespace(look=parts["_stillness"].look)  # nothing can be set on what is compiled
     steps = (
-        (parts["_repeats"], "is_repeat", "whether the picture repeats the last one"),
-        (parts["_small_image"], "of", "picture in small"),
+        (parts["_repeats"], "is_repeat", "whether the image repeats the last one"),
+        (parts["_small_image"], "of", "image in small"),
         (parts["_detector"], "detect", "corners"),
-        (parts["_quality"], "notes", "what is wrong with the picture"),
-        (parts["_stillness"], "look", "whether the picture stands still"),
+        (parts["_quality"], "notes", "what is wrong with the image"),
+        (parts["_stillness"], "look", "whether the image stands still"),
         (parts["_motion"], "advance", "ego-motion"),
-        (pipeline, "_see_rotation", "rotation from the picture"),
+        (pipeline, "_see_rotation", "rotation from the image"),
         (pipeline.filter, "step", "filter"),
         (parts["_motion"], "correct", "ego-motion learns from the flow"),
         (pipeline, "_circles", "circles for the scene"),

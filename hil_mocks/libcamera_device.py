@@ -196,7 +196,7 @@ class Request:
         self.buffers[stream] = buffer
 
     def set_control(self, control: Control, value: Any) -> None:
-        """From this picture on."""
+        """From this image on."""
         self.controls[control] = value
 
     def reuse(self) -> None:

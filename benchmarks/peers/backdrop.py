@@ -1,4 +1,4 @@
-"""An earlier picture, laid over this one as if there were nothing but the ground and what is far away."""
+"""An earlier image, laid over this one as if there were nothing but the ground and what is far away."""
 
 import cv2
 import numpy as np
@@ -9,9 +9,9 @@ from lcf_edge.config import Config
 
 
 class Backdrop:
-    """Above the horizon the earlier picture is turned as the camera turned, below it is moved as the ground moves.
+    """Above the horizon the earlier image is turned as the camera turned, below it is moved as the ground moves.
 
-    Pictures are ``shrink`` times smaller than the camera's. ``pixels``: (n, 2) where each pixel of a picture is,
+    Images are ``shrink`` times smaller than the camera's. ``pixels``: (n, 2) where each pixel of an image is,
     row by row, px of the pinhole.
     """
 
@@ -24,11 +24,11 @@ class Backdrop:
         self.pixels = self.full(np.stack([columns, rows], axis=2).reshape(-1, 2))
 
     def shrink(self, image: Grey) -> Grey:
-        """The small picture."""
+        """The small image."""
         return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def full(self, points: Floats) -> Floats:
-        """Positions (n, 2) px of a small picture, in px of the pinhole."""
+        """Positions (n, 2) px of a small image, in px of the pinhole."""
         half = np.float32(0.5)
         return self._ego.lens.undistort(np.float32(self._shrink) * (points + half) - half)
 
@@ -42,7 +42,7 @@ class Backdrop:
         return np.where(points[:, 1:] > np.float32(ego.focus[1]), ground, points)
 
     def lay(self, earlier: Grey, slot: int) -> tuple[Grey, Mask]:
-        """The slot's small picture laid over the present one, and which pixels it covers; both of ``size``."""
+        """The slot's small image laid over the present one, and which pixels it covers; both of ``size``."""
         ego = self._ego
         derotated = self.expect(self.pixels, slot)
         turn_back = np.linalg.inv(ego.homography(slot)).astype(np.float32).ravel()

@@ -21,7 +21,7 @@ _NEWBORN, _SHOWN_FROM, _SHOWN_TO, _MAX_TRUST = 2.5, 3.0, 2.0, 5.0
 
 @dataclass(frozen=True, slots=True)
 class Clusters:
-    """Objects of one picture; (k,) each."""
+    """Objects of one image; (k,) each."""
 
     x: Floats  # px
     y: Floats
@@ -127,7 +127,7 @@ class TrustedCircles:
         return self._table[:0]
 
     def update(self, found: Clusters, ego: Ego) -> Circles:
-        """Account for one picture's clusters. Return the circles that are shown."""
+        """Account for one image's clusters. Return the circles that are shown."""
         table, dt = self._table, np.float32(ego.last.dt_s)
         h = ego.last_homography().astype(np.float32).ravel()
         table["x"], table["y"] = warp(h, table["x"], table["y"])

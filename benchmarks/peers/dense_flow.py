@@ -1,4 +1,4 @@
-"""DIS optical flow on half-size pictures, on top of the motion of the ground and of what is far away."""
+"""DIS optical flow on half-size images, on top of the motion of the ground and of what is far away."""
 
 import cv2
 import numpy as np
@@ -13,8 +13,8 @@ from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
 
 _SHRINK = 2
-_BACK = 4  # pictures
-# In px of the small picture:
+_BACK = 4  # images
+# In px of the small image:
 _GRID = 4
 _BORDER = 4
 _TEXTURE = 4.0  # least mean gradient of the surroundings, grey levels a pixel
@@ -39,7 +39,7 @@ class DenseFlow:
         self._u, self._v = (each.ravel() for each in grid)
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Rebel circles of one picture."""
+        """Rebel circles of one image."""
         ego = self._ego
         ego.advance(motion)
         small = self._backdrop.shrink(image)

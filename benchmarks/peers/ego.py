@@ -1,4 +1,4 @@
-"""How the camera turned and drove since each of the last pictures, and where it is heading now."""
+"""How the camera turned and drove since each of the last images, and where it is heading now."""
 
 import math
 
@@ -11,7 +11,7 @@ from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
 
 SLOTS = 10
-SPACING_S = 0.045  # least time between two pictures that are remembered: half a second at 20 frame/s
+SPACING_S = 0.045  # least time between two images that are remembered: half a second at 20 frame/s
 _PITCH_MEMORY_S = 1.0  # a camera that shakes faster than this does not change where the vehicle goes
 _YAW_MEMORY_S = 0.3
 _STILL_M = 1e-3
@@ -20,7 +20,7 @@ Vectors = npt.NDArray[np.float64]
 
 
 class Ego:
-    """Rotation and way of the camera since the pictures in ``SLOTS`` slots.
+    """Rotation and way of the camera since the images in ``SLOTS`` slots.
 
     What stands still at X in the camera's axes of slot k is now at ``rotation[k]`` X - ``way_m[k]``.
     """
@@ -33,7 +33,7 @@ class Ego:
         self.elapsed_s = np.full(SLOTS, np.inf)
         self.sigma_rad = np.zeros(SLOTS)  # of the rotation
         self.last = Motion(0.0, np.eye(3), 0.0, 0.0, 0.0)
-        self.number = 0  # pictures remembered so far
+        self.number = 0  # images remembered so far
         self._inverse = np.linalg.inv(lens.matrix)
         self._mounted = np.array([-math.tan(config.camera.yaw_rad), math.tan(config.camera.pitch_rad), 1.0])
         self._forward = self._mounted.copy()  # direction of travel, z = 1
@@ -50,11 +50,11 @@ class Ego:
         return self.lens.cx + self.lens.fx * x, self.lens.cy + self.lens.fy * y
 
     def advance(self, motion: Motion) -> None:
-        """Account for the motion since the last picture."""
+        """Account for the motion since the last image."""
         self.last = motion
         before = motion.rotation @ (self._forward / np.linalg.norm(self._forward))
         shaken = before / before[2]
-        shaken[0] -= motion.path_yaw_rate_radps * motion.dt_s  # a left turn moves the picture to the right
+        shaken[0] -= motion.path_yaw_rate_radps * motion.dt_s  # a left turn moves the image to the right
         keep = [math.exp(-motion.dt_s / memory) for memory in (_YAW_MEMORY_S, _PITCH_MEMORY_S)]
         self._forward[:2] = self._mounted[:2] + keep * (shaken[:2] - self._mounted[:2])
         after = self._forward / np.linalg.norm(self._forward)
@@ -65,28 +65,28 @@ class Ego:
         self.sigma_rad += motion.rotation_sigma_rad  # mostly bias, which adds up
 
     def due(self) -> bool:
-        """Whether enough time went by to remember this picture."""
+        """Whether enough time went by to remember this image."""
         return self.number == 0 or float(self.elapsed_s[(self.number - 1) % SLOTS]) >= SPACING_S
 
     def remember(self) -> int:
-        """Remember this picture. Return its slot."""
+        """Remember this image. Return its slot."""
         slot = self.number % SLOTS
         self.rotation[slot], self.way_m[slot], self.elapsed_s[slot], self.sigma_rad[slot] = np.eye(3), 0, 0, 0
         self.number += 1
         return slot
 
     def slot_back(self, back_by: int) -> int | None:
-        """Slot of the picture remembered ``back_by`` ago, or the oldest; None: there is none yet."""
+        """Slot of the image remembered ``back_by`` ago, or the oldest; None: there is none yet."""
         back = min(back_by, self.number, SLOTS)
         return (self.number - back) % SLOTS if back else None
 
     def homography(self, slot: int) -> Vectors:
-        """(3, 3): carries positions of the slot's picture through the rotation since."""
+        """(3, 3): carries positions of the slot's image through the rotation since."""
         turned: Vectors = self.lens.matrix @ self.rotation[slot] @ self._inverse
         return turned
 
     def ground_homography(self, slot: int, camera_height_m: float) -> Vectors:
-        """(3, 3): carries positions of the slot's picture as the ground moves, under a level path.
+        """(3, 3): carries positions of the slot's image as the ground moves, under a level path.
 
         The ground is n·X = h with n down, at right angles to the heading: X' = (R - t nᵀ/h) X.
         """
@@ -98,12 +98,12 @@ class Ego:
         return self.lens.matrix @ moved @ self._inverse
 
     def last_homography(self) -> Vectors:
-        """(3, 3): the rotation since the picture before."""
+        """(3, 3): the rotation since the image before."""
         turned: Vectors = self.lens.matrix @ self.last.rotation @ self._inverse
         return turned
 
     def derotate(self, slot: Rows, x: Floats, y: Floats) -> tuple[Floats, Floats]:
-        """Positions (n,) px in the pictures of slots (n,), as if the camera had not turned since."""
+        """Positions (n,) px in the images of slots (n,), as if the camera had not turned since."""
         h = (self.lens.matrix @ self.rotation @ self._inverse).reshape(SLOTS, 9).astype(np.float32)[slot].T
         return warp(h, x, y)
 

@@ -1,4 +1,4 @@
-"""Frame difference: what does not fit when an earlier picture is laid over this one stands up or moves.
+"""Frame difference: what does not fit when an earlier image is laid over this one stands up or moves.
 
 A column of difference stands on the ground where its foot is; that tells range, time to contact and lateral
 miss. Columns in the way make blobs; what stands beside the path differs too, and is left out.
@@ -17,12 +17,12 @@ from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
 
 _SHRINK = 2
-_BACK = 8  # pictures
+_BACK = 8  # images
 _MIN_DIFFERENCE = 16  # grey levels
 _SLACK = np.ones((3, 3), np.uint8)  # so far may ground and distance be misplaced
 _OPEN = np.ones((3, 3), np.uint8)
 _CLOSE = np.ones((21, 13), np.uint8)
-_AREA_PX = 60  # of the small picture
+_AREA_PX = 60  # of the small image
 _FOOT_PX = 4.0  # least below the horizon: farther away the range says nothing
 _TALL_M, _TALL_SHARE = 0.4, 0.8  # least height of a column, and as a share of the camera's, whichever is less
 
@@ -40,7 +40,7 @@ class FrameDifference:
         self._x, self._y = np.ascontiguousarray(self._backdrop.pixels.T).reshape(2, rows, columns)
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Rebel circles of one picture."""
+        """Rebel circles of one image."""
         ego = self._ego
         ego.advance(motion)
         small = self._backdrop.shrink(np.asarray(cv2.GaussianBlur(image, (5, 5), 0), np.uint8))

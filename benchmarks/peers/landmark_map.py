@@ -34,7 +34,7 @@ class LandmarkMap:
         return self._forgotten + len(self._in_sight)
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Account for one picture; there are no circles."""
+        """Account for one image; there are no circles."""
         del motion
         if self._before is not None and len(self._in_sight):
             self._follow(self._before, image)

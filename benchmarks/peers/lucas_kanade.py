@@ -20,7 +20,7 @@ _RETURN_PX = 0.7  # a track that does not come back this near is lost
 _CELL_PX = 8  # one track in each such square
 _BORDER_PX = 4
 _LOOKS_PX = 4  # half a patch
-_LOOKS_LIKE = 0.7  # least correlation of a track's patch with that of its oldest picture
+_LOOKS_LIKE = 0.7  # least correlation of a track's patch with that of its oldest image
 _MIN_DURATION_S = 0.12  # a younger track says nothing
 _NOISE_PX = 0.3
 _MOVER_PX = 2.5
@@ -38,12 +38,12 @@ class LucasKanade:
         self._before: Grey | None = None
         self._points = np.empty((0, 2), np.float32)  # px of the input frame
         self._velocity = np.empty((0, 2), np.float32)  # px/s of the pinhole, without rotation
-        self._history = np.empty((SLOTS, 0, 2), np.float32)  # px of the pinhole, at remembered pictures
+        self._history = np.empty((SLOTS, 0, 2), np.float32)  # px of the pinhole, at remembered images
         self._looks = np.empty((0, (2 * _LOOKS_PX + 1) ** 2), np.float32)  # as it was first seen
-        self._born = np.empty(0, np.intp)  # number of the first remembered picture
+        self._born = np.empty(0, np.intp)  # number of the first remembered image
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Rebel circles of one picture."""
+        """Rebel circles of one image."""
         self._ego.advance(motion)
         if self._before is not None and len(self._points):
             self._follow(self._before, image)
@@ -56,7 +56,7 @@ class LucasKanade:
         return circles
 
     def _follow(self, before: Grey, image: Grey) -> None:
-        """Carry every track into this picture; the lost ones go."""
+        """Carry every track into this image; the lost ones go."""
         ego = self._ego
         ideal = ego.lens.undistort(self._points)
         h = ego.last_homography().astype(np.float32).ravel()

@@ -1,4 +1,4 @@
-"""ORB features, matched with those of the eighth and the fourth remembered picture before."""
+"""ORB features, matched with those of the eighth and the fourth remembered image before."""
 
 import cv2
 import numpy as np
@@ -14,7 +14,7 @@ from lcf_edge.lens import Lens
 _FEATURES_A_CORNER = 1.4
 _SCALE, _LEVELS = 1.2, 4
 _FAST_THRESHOLD = 10
-_BACK = (8, 4)  # pictures; what the first does not show may be in the second
+_BACK = (8, 4)  # images; what the first does not show may be in the second
 _REACH_PX = 80.0  # that a feature may go, at least
 _HAMMING = 48  # bits that may differ
 _NOISE_PX = 1.0
@@ -22,7 +22,7 @@ _MOVER_PX = 3.5
 
 
 class Orb:
-    """Features of this picture against those of earlier ones: long baselines without tracking."""
+    """Features of this image against those of earlier ones: long baselines without tracking."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
@@ -34,7 +34,7 @@ class Orb:
         self._looks = [np.empty((0, 32), np.uint8)] * SLOTS
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Rebel circles of one picture."""
+        """Rebel circles of one image."""
         ego = self._ego
         ego.advance(motion)
         points, looks = self._features(image)
@@ -54,7 +54,7 @@ class Orb:
         return self._ego.lens.undistort(found), np.asarray(looks, np.uint8)
 
     def _tracks(self, points: Floats, looks: Bytes) -> Tracks:
-        """Each feature with the oldest picture that shows it."""
+        """Each feature with the oldest image that shows it."""
         slot = np.zeros(len(points), np.intp)
         then = np.full_like(points, np.nan)
         for back in _BACK:

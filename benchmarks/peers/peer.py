@@ -23,4 +23,4 @@ class Peer(Protocol):
     def __init__(self, config: Config, lens: Lens) -> None: ...
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Rebel circles of one picture (height, width); ``motion``: since the picture before."""
+        """Rebel circles of one image (height, width); ``motion``: since the image before."""

@@ -27,7 +27,7 @@ _MIN_BIAS = 40  # points that show the gyro's bias
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """Points that were seen before, in the picture of ``slot``; (n,), px of the pinhole."""
+    """Points that were seen before, in the image of ``slot``; (n,), px of the pinhole."""
 
     slot: Rows
     x_then: Floats  # as if the camera had not turned since

@@ -45,7 +45,7 @@ class Outputs:
 def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) -> list[str]:
     """Run the pipeline over a recording. Return the summary, line by line.
 
-    ``outputs.recording`` is a new MCAP file, with pictures, samples and what was found. ``warn`` gets the recording's
+    ``outputs.recording`` is a new MCAP file, with images, samples and what was found. ``warn`` gets the recording's
     warnings, also when the replay fails. Raises ``RecordingError`` for a recording without a usable frame,
     ``SinkError`` for an output that cannot be written, ``CdrError``, ``PublishError``, ``UsageError``.
     """

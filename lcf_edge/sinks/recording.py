@@ -1,4 +1,4 @@
-"""A recording of the replay: pictures, samples and what was found in them, as ``lcf-edge record`` writes it."""
+"""A recording of the replay: images, samples and what was found in them, as ``lcf-edge record`` writes it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -36,7 +36,7 @@ class RecordingSink(Sink):
         self._transform_due_ns: int | None = None
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> None:  # noqa: ARG002
-        """Append a picture and its scene."""
+        """Append an image and its scene."""
         if self._transform_due_ns is None or frame.stamp_ns >= self._transform_due_ns:
             self._transform_due_ns = frame.stamp_ns + _TRANSFORM_EVERY_NS
             self._add(Statuses(frame.stamp_ns, ()), frame.stamp_ns)
