@@ -16,7 +16,7 @@ from lcf_edge.filter.memory import memory_of
 from lcf_edge.lens import Lens
 
 SQUARES = 192  # approximate number that an image is divided into
-MOST = 4.0  # times the mean: most corners of a square
+MAX_TIMES_MEAN = 4.0  # corners of a square, at most
 FEW = 2  # a square with fewer is poor
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 CLOSE_PX = 3  # corners as close as this are mistaken for each other if they look alike
@@ -51,7 +51,7 @@ class CornerDetector:
         self._fast = Fast(*size)
         self._budget_squares = Squares(*size, SPREAD_PX)
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
-        self._most = max(round(MOST * settings.corners_target / SQUARES), FEW)
+        self._most = max(round(MAX_TIMES_MEAN * settings.corners_target / SQUARES), FEW)
         self._rectangles = np.asarray(self._squares.rectangles)
         self._among = memory_of(self._touched(visible))
         self._strong = FollowingThreshold(settings.fast_threshold, *THRESHOLDS)

@@ -48,10 +48,10 @@ def clear(members: Members, g: int) -> None:
     members.x[g] = members.y[g] = members.variance_x[g] = members.variance_y[g] = 0.0
 
 
-def radius_of(members: Members, g: int, most_px: float) -> float:
+def radius_of(members: Members, g: int, max_px: float) -> float:
     """R that holds most of a group, px."""
     reach = RADIUS_SIGMAS * math.sqrt(members.variance_x[g] + members.variance_y[g])
-    return min(max(reach, MIN_RADIUS_PX), most_px)
+    return min(max(reach, MIN_RADIUS_PX), max_px)
 
 
 def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings) -> None:

@@ -99,7 +99,9 @@ def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion, dt_s: f
             members.variance_y[g] += share * (dy * dy + spread)
 
 
-def tell(groups: CoarseGroups, coarse: CoarseMotion, g: int, circles: CircleColumns, c: int, around: Situation) -> None:
+def set_cause(
+    groups: CoarseGroups, coarse: CoarseMotion, g: int, circles: CircleColumns, c: int, around: Situation
+) -> None:
     """The motion of a group's circle; what it moves on is no nearer than the ground that is seen under it."""
     circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
     circles.speed[c] = lengths.of(groups.mean_vx[g], groups.mean_vy[g])
@@ -147,5 +149,5 @@ def update(
             shared.blend(circles, c, groups.members, g, settings)
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
         updated[c] = 1
-        tell(groups, coarse, g, circles, c, around)
+        set_cause(groups, coarse, g, circles, c, around)
     return evicted

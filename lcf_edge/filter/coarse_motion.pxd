@@ -95,7 +95,7 @@ cdef void chain(CoarseMotion coarse, int k, double dt_s) noexcept nogil
 cdef bint put(CoarseMotion coarse, int k, ImagePlane plane) noexcept nogil
 @cython.locals(moves=bint)
 cdef bint see(CoarseMotion coarse, int k, int age, Situation around) noexcept nogil
-@cython.locals(k=int, back=int, pieces=int, known=bint, told=bint)
+@cython.locals(k=int, back=int, pieces=int, known=bint, is_measured=bint)
 cdef void see_all(CoarseMotion coarse, int age, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(k=int, slot=int)
 cpdef void measure(CoarseMotion coarse, KeyFrames keys, Baselines baselines, ImagePlane plane, Situation around) noexcept nogil

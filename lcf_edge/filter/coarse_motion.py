@@ -30,7 +30,7 @@ ANY_WAY_M = 1e3  # driven, where the speed is unknown: what stands may have come
 OFF_FLOW = 1.5  # small px beside the flow line, within which a piece may stand, and more
 ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
 TURN_SIGMAS = 2.0  # or the lens, in a turn
-MAX_OFF_FLOW = 3.0  # beyond, nothing is told
+MAX_OFF_FLOW = 3.0  # beyond, nothing is measured
 PLAIN_GREY = 2.0  # a pixel, by which neighbours differ at least, across and down together
 CALM_GREY = 3.0  # a pixel, by which a piece may differ from itself,
 BESIDE_PX = 0.6  # and by what lying so many small px beside whole ones changes
@@ -387,8 +387,8 @@ def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation
             continue
         if age == LAST:
             coarse.came_x[k], coarse.came_y[k] = coarse.base_x, coarse.base_y
-        told = coarse.came_x[k] >= 0 and coarse.off_flow < MAX_OFF_FLOW
-        if told and see(coarse, k, age, around):
+        is_measured = coarse.came_x[k] >= 0 and coarse.off_flow < MAX_OFF_FLOW
+        if is_measured and see(coarse, k, age, around):
             set_motion(coarse, k)
             chain(coarse, k, around.dt_s)
 

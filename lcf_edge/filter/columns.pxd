@@ -29,8 +29,6 @@ cdef class CircleColumns:
     cdef int[::1] support
     cdef double[::1] x, y, radius, beta, speed, expansion, trust, corr, width, height, ttc, range, lateral, unseen_s
     cdef int[::1] square
-    @cython.locals(number=int)
-    cpdef int rows(self) noexcept nogil
 
 @cython.final
 cdef class ObjectColumns:
@@ -42,8 +40,6 @@ cdef class ObjectColumns:
     cdef double[::1] reference, middle, middle_sigma, usual
     cdef double[::1] ttc, ttc_sigma, range, range_sigma, lateral, lateral_sigma, forward, forward_sigma
     cdef double[::1] right, right_sigma, closest, closest_sigma, probability
-    @cython.locals(number=int)
-    cpdef int rows(self) noexcept nogil
 
 @cython.final
 cdef class PsiColumns:
@@ -52,8 +48,6 @@ cdef class PsiColumns:
     cdef unsigned int[::1] id
     cdef double[::1] x, y, width, height, trust, expansion, life_s
     cdef int[::1] circle, edges, missing, new, live
-    @cython.locals(number=int)
-    cpdef int rows(self) noexcept nogil
 
 cdef class GroupColumns:
     cdef public Py_ssize_t count, capacity

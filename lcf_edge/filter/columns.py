@@ -66,13 +66,6 @@ class CircleColumns:
         self.ttc, self.range, self.lateral = memory["ttc"], memory["range"], memory["lateral"]
         self.unseen_s, self.square = memory["unseen_s"], memory["square"]
 
-    def rows(self) -> int:
-        """How many are in use."""
-        number = 0
-        for k in range(self.capacity):
-            number += self.active[k] != 0
-        return number
-
 
 class ObjectColumns:
     """Of an ``ObjectTable``."""
@@ -95,13 +88,6 @@ class ObjectColumns:
         self.closest, self.closest_sigma = memory["closest"], memory["closest_sigma"]
         self.probability = memory["probability"]
 
-    def rows(self) -> int:
-        """How many are in use."""
-        number = 0
-        for k in range(self.capacity):
-            number += self.active[k] != 0
-        return number
-
 
 class PsiColumns:
     """Of a ``PsiTable``. ``live_count``: entries of ``live``."""
@@ -119,13 +105,6 @@ class PsiColumns:
         self.edges, self.missing, self.new = memory["edges"], memory["missing"], memory["new"]
         self.live_count = 0
         self.live = memory["live"]
-
-    def rows(self) -> int:
-        """How many are in use."""
-        number = 0
-        for k in range(self.capacity):
-            number += self.active[k] != 0
-        return number
 
 
 class GroupColumns:

@@ -24,7 +24,7 @@ cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept
 cpdef void derotate_circles(CircleColumns circles, Homography h, double roll) noexcept nogil
 cpdef void derotate_psi(PsiColumns psi, Homography h) noexcept nogil
 cpdef void derotate_predictions(EdgeColumns edges, Homography h) noexcept nogil
-cdef bint tells_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
+cdef bint shows_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
 cpdef bint measure_off_line(OffLine off, EdgeColumns edges, CornerColumns corners, Pinhole pinhole, Settings settings) noexcept nogil
 cpdef void off_line(OffLine off, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Pinhole pinhole) noexcept nogil
 @cython.locals(weak=double, shared=double, variance=double, doubt=double)

@@ -69,8 +69,8 @@ class OffLine:
         self.equations = NormalEquations()
 
 
-def tells_rotation(edges: EdgeColumns, i: int, tr_s: float) -> bool:
-    """Whether the distance of an edge from its flow line tells about the rotation: trusted, normal, found."""
+def shows_rotation(edges: EdgeColumns, i: int, tr_s: float) -> bool:
+    """Whether the distance of an edge from its flow line shows the rotation: trusted, normal, found."""
     return edges.corner[i] >= 0 and edges.trust[i] >= tr_s and not edges.own_way(i)
 
 
@@ -84,14 +84,14 @@ def measure_off_line(
     off.count = 0
     telling = 0
     for i in range(edges.count):
-        if tells_rotation(edges, i, settings.tr_s):
+        if shows_rotation(edges, i, settings.tr_s):
             telling += 1
     if telling < MIN_EDGES:
         return False
     stride = 1 + telling // MAX_EDGES
     telling = 0
     for i in range(edges.count):
-        if tells_rotation(edges, i, settings.tr_s):
+        if shows_rotation(edges, i, settings.tr_s):
             if telling % stride == 0:
                 off_line(off, edges, i, corners, pinhole)
             telling += 1

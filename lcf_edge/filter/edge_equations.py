@@ -86,11 +86,11 @@ def update_speed(trust: float, tr_cr: float, speed: float, along: float, dt_s: f
 
 
 def update_gate(
-    bl: float, speed: float, predicted_speed: float, corr: float, dt_s: float, least_px: float, most_px: float
+    bl: float, speed: float, predicted_speed: float, corr: float, dt_s: float, min_px: float, max_px: float
 ) -> float:
     """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
     target = math.fabs(predicted_speed - speed) * dt_s / corr
-    return min(max(0.5 * (target + bl), least_px), most_px)
+    return min(max(0.5 * (target + bl), min_px), max_px)
 
 
 def update_deviation(deviation: float, turn: float) -> float:

@@ -54,10 +54,10 @@ cdef class FlowFit:
     cdef int[::1] cell, bins
     cdef public NormalEquations equations
 
-cdef bint tells(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
+cdef bint shows_flow(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
 cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
 cdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
-cdef bint tells_of_turn(FlowFit fit, Py_ssize_t k) noexcept nogil
+cdef bint shows_turn(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double quantile(FlowFit fit, double share, bint only_turned, double turn_share) noexcept nogil
 cpdef double weight_of(double rest_px, double width_px) noexcept nogil
 cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil

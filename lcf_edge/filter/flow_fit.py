@@ -89,8 +89,8 @@ class FlowFit:
         self.equations = NormalEquations()
 
 
-def tells(edges: EdgeColumns, i: int, keys: KeyFrames, settings: Settings) -> bool:
-    """Whether an edge tells about the flow: found in this frame, trusted, and seen for long enough."""
+def shows_flow(edges: EdgeColumns, i: int, keys: KeyFrames, settings: Settings) -> bool:
+    """Whether an edge shows the flow: found in this frame, trusted, and seen for long enough."""
     return (
         edges.matched[i] != 0
         and edges.trust[i] >= settings.tr_new
@@ -106,14 +106,14 @@ def gather(
     fit.count = 0
     telling = 0
     for i in range(edges.count):
-        if tells(edges, i, keys, settings):
+        if shows_flow(edges, i, keys, settings):
             telling += 1
     stride = 1 + telling // MAX_EDGES
     telling = 0
     for c in range(COLUMNS * ROWS):
         fit.cells[c] = 0
     for i in range(edges.count):
-        if tells(edges, i, keys, settings):
+        if shows_flow(edges, i, keys, settings):
             if telling % stride == 0:
                 note(fit, edges, i, key_frames.oldest_key(edges, i, keys) % KEYS, baselines, pinhole)
             telling += 1
@@ -148,7 +148,7 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     fit.count += 1
 
 
-def tells_of_turn(fit: FlowFit, k: int) -> bool:
+def shows_turn(fit: FlowFit, k: int) -> bool:
     """Whether a turn moved an edge by at least what it is off its line: what is off by more moves by itself."""
     return fit.turned[k] >= max(MIN_TURN_PX, math.fabs(fit.rest[k]))
 
@@ -162,7 +162,7 @@ def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -
         fit.bins[b] = 0
     counted = 0
     for k in range(fit.count):
-        if not only_turned or tells_of_turn(fit, k):
+        if not only_turned or shows_turn(fit, k):
             more = turn_share * fit.turned[k] / NOISE_PX
             rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
             fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
@@ -302,7 +302,7 @@ def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
     """What edges that a turn moved stay off their lines by, beyond the noise of all, as a share of that way."""
     turned, way2 = 0, 0.0
     for k in range(fit.count):
-        if tells_of_turn(fit, k):
+        if shows_turn(fit, k):
             turned += 1
             way2 += fit.turned[k] * fit.turned[k]
     if turned < MIN_TURNED:

@@ -20,4 +20,4 @@ cpdef void inflate(KeyFrames keys, double sigma_rad, double dt_s) noexcept nogil
 cpdef void scale(KeyFrames keys, double factor) noexcept nogil
 cpdef int mark(KeyFrames keys) noexcept nogil
 cdef int oldest_key(EdgeColumns edges, Py_ssize_t i, KeyFrames keys) noexcept nogil
-cdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double least_s) noexcept nogil
+cdef bint has_history(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, double min_s) noexcept nogil

@@ -105,7 +105,7 @@ def oldest_key(edges: EdgeColumns, i: int, keys: KeyFrames) -> int:
     return max(edges.born_key[i], keys.number - KEYS)
 
 
-def has_history(edges: EdgeColumns, i: int, keys: KeyFrames, least_s: float) -> bool:
+def has_history(edges: EdgeColumns, i: int, keys: KeyFrames, min_s: float) -> bool:
     """Whether an edge has been seen for so long."""
     oldest = oldest_key(edges, i, keys)
-    return oldest < keys.number and keys.elapsed_s[oldest % KEYS] >= least_s
+    return oldest < keys.number and keys.elapsed_s[oldest % KEYS] >= min_s

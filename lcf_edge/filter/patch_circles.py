@@ -206,7 +206,9 @@ def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
     return apart < AGREE_SIGMAS / math.sqrt(groups.weight) + AGREE_SHARE * groups.inverse
 
 
-def tell(groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
+def set_cause(
+    groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
+) -> None:
     """Cause, motion, time to contact, range and lateral miss of a circle, from the range of its patches."""
     range_m = 1 / groups.inverse
     right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
@@ -262,5 +264,5 @@ def update(
         claim(groups, p, patches, -1 if is_shown else c)
         if c >= 0 and not is_shown:
             updated[c] = 1
-            tell(groups, p, circles, c, around, settings)
+            set_cause(groups, p, circles, c, around, settings)
     return evicted

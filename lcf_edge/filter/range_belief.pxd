@@ -71,5 +71,5 @@ cdef void take(Belief belief, int quantity, double weight, double value, double 
 cdef void suppose(Belief belief, double weight, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef void conclude(Belief belief) noexcept nogil
 @cython.locals(half_width=double)
-cdef void tell_front(Belief belief, Evidence evidence) noexcept nogil
+cdef void set_front(Belief belief, Evidence evidence) noexcept nogil
 cpdef void consider(Belief belief, Evidence evidence, Situation around) noexcept nogil

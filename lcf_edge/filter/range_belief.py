@@ -264,7 +264,7 @@ def conclude(belief: Belief) -> None:
             belief.sigma[quantity] = WIDER * math.sqrt(max(belief.sigma[quantity] / weight - mean * mean, 0.0))
 
 
-def tell_front(belief: Belief, evidence: Evidence) -> None:
+def set_front(belief: Belief, evidence: Evidence) -> None:
     """Contact is with the front of an object, its edges lie on its sides too: by a share of its width behind it.
 
     Of the range the mean of the logarithm was taken.
@@ -297,4 +297,4 @@ def consider(belief: Belief, evidence: Evidence, around: Situation) -> None:
             suppose_moving(belief, evidence, inverse, around)
             suppose(belief, belief.moving[k], evidence, inverse, around)
     conclude(belief)
-    tell_front(belief, evidence)
+    set_front(belief, evidence)

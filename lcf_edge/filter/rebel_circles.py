@@ -122,13 +122,13 @@ def predict(circles: CircleColumns, around: Situation) -> None:
     """
     if around.is_blind:
         return
-    least_s = MIN_TTC_SHARE * around.horizon_s
+    min_s = MIN_TTC_SHARE * around.horizon_s
     for c in range(circles.capacity):
         if not circles.active[c]:
             continue
         grow = 1.0
-        if math.isfinite(circles.ttc[c]) and circles.ttc[c] > least_s:
-            grow = min(circles.ttc[c] / max(circles.ttc[c] - around.dt_s, least_s), MAX_GROWTH)
+        if math.isfinite(circles.ttc[c]) and circles.ttc[c] > min_s:
+            grow = min(circles.ttc[c] / max(circles.ttc[c] - around.dt_s, min_s), MAX_GROWTH)
         step = circles.speed[c] * around.dt_s * grow
         circles.x[c] += step * math.cos(circles.beta[c])
         circles.y[c] += step * math.sin(circles.beta[c])

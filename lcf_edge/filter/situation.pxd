@@ -9,7 +9,7 @@ cdef class Situation:
     cdef public double scene_depth_m, camera_height_m, half_width_m, height_m, horizon_s, pitch_sigma_rad, horizon_sigma_rad
     cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, ground_mps, turn_share, lever_m, yaw_rate_radps, scene_flow_pxps
     cdef public bint ground_is_still, flow_is_seen, is_blind
-    cdef public double noise_px, delta_px, least_noise_px, least_delta_px
+    cdef public double noise_px, delta_px, min_noise_px, min_delta_px
 
 cpdef void follow(Situation around, double ray_x, double ray_y, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil
 cpdef double ground_range_m(Situation around, double y) noexcept nogil

@@ -143,7 +143,7 @@ cdef double follow(double side, double shown, double outwards, Situation around)
 @cython.locals(whole=double, shown=double, per_m=double, bottom=double, kept=double)
 cdef void collect_evidence(Evidence evidence, ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around) noexcept nogil
 cdef void believe(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence, Situation around) noexcept nogil
-cdef void tell_contact(ObjectColumns objects, Py_ssize_t o, double rate, double sigma, Situation around) noexcept nogil
+cdef void set_contact(ObjectColumns objects, Py_ssize_t o, double rate, double sigma, Situation around) noexcept nogil
 @cython.locals(into_path=bint, goes_on=bint, goes_aside=bint)
 cdef int class_of(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence) noexcept nogil
 cdef bint rests(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil

@@ -663,11 +663,11 @@ def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, 
         objects.range[o] = objects.range_sigma[o] = NAN
     if math.fabs(objects.lateral[o]) > MAX_RANGE_M:
         objects.lateral[o] = objects.lateral_sigma[o] = NAN
-    tell_contact(objects, o, belief.mean[range_belief.RATE], belief.sigma[range_belief.RATE], around)
+    set_contact(objects, o, belief.mean[range_belief.RATE], belief.sigma[range_belief.RATE], around)
     objects.class_id[o] = class_of(objects, o, belief, evidence)
 
 
-def tell_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:
+def set_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:
     """Time to contact from its inverse, 1/s; none where the looming is not above its noise."""
     if rate > RATE_SIGMAS * sigma and rate * range_belief.MAX_HORIZONS * around.horizon_s > 1:
         objects.ttc[o], objects.ttc_sigma[o] = 1 / rate, sigma / (rate * rate)
@@ -711,7 +711,7 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
     share = lengths.of(objects.range_sigma[o] / range_m, objects.forward_sigma[o] / max(closing_mps, SLOW_MPS))
     objects.probability[o] = 0.0
     objects.lateral[o] = objects.lateral_sigma[o] = objects.closest[o] = objects.closest_sigma[o] = NAN
-    tell_contact(objects, o, closing_mps / range_m, share * math.fabs(closing_mps) / range_m, around)
+    set_contact(objects, o, closing_mps / range_m, share * math.fabs(closing_mps) / range_m, around)
     if not math.isfinite(objects.ttc[o]):
         return
     time_s, time_sigma_s = objects.ttc[o], objects.ttc_sigma[o]
@@ -737,7 +737,7 @@ def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, ar
     objects.closest[o] = objects.closest_sigma[o] = NAN
     objects.class_id[o] = UNKNOWN
     sigma = math.sqrt(evidence.mm)
-    tell_contact(objects, o, evidence.looming, sigma, around)
+    set_contact(objects, o, evidence.looming, sigma, around)
     beside = EVEN
     if around.camera_height_m > 0 and evidence.foot > 2 * evidence.foot_sigma and not evidence.is_cut:
         range_m = 1 / evidence.foot

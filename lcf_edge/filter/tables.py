@@ -347,43 +347,37 @@ class EdgeTable(Table):
         return rows[order[:number]]
 
 
-class CircleTable(Table):
-    """``CIRCLE_COLUMNS``: C_n or C_r; rows keep their place."""
+class PlacedTable(Table):
+    """Rows keep their place; ``active`` says which are in use."""
+
+    @property
+    def count(self) -> int:
+        """Rows in use."""
+        return int(np.count_nonzero(self.active))
+
+
+class CircleTable(PlacedTable):
+    """``CIRCLE_COLUMNS``: C_n or C_r."""
 
     def __init__(self, capacity: int) -> None:
         super().__init__(CIRCLE_COLUMNS, capacity)
         self.columns = CircleColumns(self.memory())
 
-    @property
-    def count(self) -> int:
-        """Rows in use."""
-        return int(self.columns.rows())
 
-
-class ObjectTable(Table):
-    """``OBJECT_COLUMNS``; rows keep their place."""
+class ObjectTable(PlacedTable):
+    """``OBJECT_COLUMNS``."""
 
     def __init__(self, capacity: int) -> None:
         super().__init__(OBJECT_COLUMNS, capacity)
         self.columns = ObjectColumns(self.memory())
 
-    @property
-    def count(self) -> int:
-        """Rows in use."""
-        return int(self.columns.rows())
 
-
-class PsiTable(Table):
-    """``PSI_COLUMNS``; rows keep their place."""
+class PsiTable(PlacedTable):
+    """``PSI_COLUMNS``."""
 
     def __init__(self, capacity: int) -> None:
         super().__init__(PSI_COLUMNS, capacity)
         self.columns = PsiColumns(self.memory())
-
-    @property
-    def count(self) -> int:
-        """Rows in use."""
-        return int(self.columns.rows())
 
 
 class GroupTable(Table):

@@ -64,7 +64,7 @@ cdef bint is_believed(Turmoil turmoil, int g) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
-cdef void tell(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
+cdef void set_cause(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(k=int, found=double, lost=double)
 cdef bint rages_on(Turmoil turmoil, CircleColumns circles, Py_ssize_t c) noexcept nogil
 @cython.locals(evicted=int, c=int, seen=bint)

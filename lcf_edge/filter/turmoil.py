@@ -287,7 +287,7 @@ def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settin
     return nearest if nearest >= 0 else shared.nearest_circle(turmoil.members, g, circles, settings)
 
 
-def tell(circles: CircleColumns, c: int, around: Situation) -> None:
+def set_cause(circles: CircleColumns, c: int, around: Situation) -> None:
     """Nothing is known of how a circle in turmoil moves; it is no farther than the ground that is seen under it."""
     circles.cause[c] = NONE
     circles.beta[c] = circles.speed[c] = 0.0
@@ -342,5 +342,5 @@ def update(
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
         updated[c] = 1
         if is_shown_by(circles, c):
-            tell(circles, c, around)
+            set_cause(circles, c, around)
     return evicted

@@ -144,7 +144,7 @@ def test_psi_on_what_does_not_threaten_is_its_purpose():
 def test_missing_result_is_a_miss_and_unknown_stamp_an_error():
     truths = [truth(seq, thing()) for seq in range(10)]
     assert score([], truths).misses == 5
-    with pytest.raises(ValueError, match="no truth for the picture"):
+    with pytest.raises(ValueError, match="no truth for the image"):
         score([scene(99)], truths)
 
 

@@ -17,7 +17,7 @@ def test_a_session_counts_what_the_daemon_sends_to_another_process() -> None:
 def test_every_part_of_a_frame_is_timed() -> None:
     drive = scenes.make("two_crossing", 1, seconds=2.0)
     parts = stages.measure_frame(drive, config_of(drive))
-    assert {"picture out of a YUYV buffer", "corners", "ego-motion", "filter", "scene as a message", "put"} <= {
+    assert {"image out of a YUYV buffer", "corners", "ego-motion", "filter", "scene as a message", "put"} <= {
         part.name for part in parts
     }
     assert all(part.median > 0 for part in parts)
