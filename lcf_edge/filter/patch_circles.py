@@ -200,7 +200,7 @@ def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Set
 
 def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
     """Whether a group is as far off as a circle that is known to be in the way."""
-    if c < 0 or circles.cause[c] != INCOMING or not circles.range[c] > 0:
+    if not circles.range[c] > 0:
         return False
     apart = math.fabs(groups.inverse - 1 / circles.range[c])
     return apart < AGREE_SIGMAS / math.sqrt(groups.weight) + AGREE_SHARE * groups.inverse
@@ -247,9 +247,9 @@ def update(
             continue
         gather(groups, p, patches)
         c = circle_of(groups, p, circles, settings)
-        if groups.members.size[p] < 2 and not continues(groups, circles, c):
-            continue
         is_known = c >= 0 and circles.cause[c] == INCOMING
+        if groups.members.size[p] < 2 and not (is_known and continues(groups, circles, c)):
+            continue
         if not is_in_way(groups, p, patches, is_known, around) or (c < 0 and not grows_evenly(groups)):
             continue
         is_shown = c >= 0 and updated[c] != 0  # by rebels, to which it is left

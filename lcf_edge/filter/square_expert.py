@@ -778,7 +778,6 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
     seem to grow while it comes closer. What is about to leave the image loses them by that, and still tells; what
     rests before a vehicle that does shows few.
     """
-    objects.usual[o] = max(objects.usual[o] * math.exp(-around.dt_s / USUAL_S), count)
     if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.usual[o]:
         return False
     if math.fabs(around.speed_mps) < RESTS_MPS:
@@ -1041,8 +1040,10 @@ def update(
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
-        remnant = count >= MIN_EDGES and is_remnant(objects, o, count, plane, around)
+        remnant = False
         if count >= MIN_EDGES:
+            objects.usual[o] = max(objects.usual[o] * math.exp(-around.dt_s / USUAL_S), count)
+            remnant = is_remnant(objects, o, count, plane, around)
             objects.unseen_s[o], objects.state[o] = 0.0, SEEN
             objects.support[o] = count
             believed = belief_in(objects, o, squares.wholes, around, settings)

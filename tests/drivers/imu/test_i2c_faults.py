@@ -238,21 +238,17 @@ def test_whatever_another_program_left_behind_is_reset(rig: RigMaker, driver: st
 
 
 @every_chip
-def test_a_chip_that_boots_is_left_alone(rig: RigMaker, driver: str) -> None:
+@pytest.mark.parametrize("acknowledged", [True, False])
+def test_a_reset_is_done_once_and_a_chip_that_boots_is_left_alone(
+    rig: RigMaker, driver: str, acknowledged: bool
+) -> None:
     bench = rig(driver)
     for chip in bench.chip.places.values():
-        chip.acknowledges_reset = True
-    assert_true(bench, bench.read_for(0.3), within_s=0.01)
-    assert bench.device.counts["nack"] == 0
-
-
-@every_chip
-def test_a_reset_that_is_not_acknowledged_is_done_once(rig: RigMaker, driver: str) -> None:
-    bench = rig(driver)
-    for chip in bench.chip.places.values():
-        chip.acknowledges_reset = False
+        chip.acknowledges_reset = acknowledged
     assert_true(bench, bench.read_for(0.3), within_s=0.01)
     assert all(chip.resets == (driver != "bno055") for chip in bench.chip.places.values())
+    if acknowledged:
+        assert bench.device.counts["nack"] == 0
 
 
 @pytest.mark.parametrize("driver", ST)

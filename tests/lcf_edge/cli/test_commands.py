@@ -277,7 +277,7 @@ def without_timing(line: bytes) -> dict[str, object]:
 def test_the_recording_of_a_replay_holds_all_that_went_in_and_what_was_found(
     recording: Path, replayed: tuple[Done, Path]
 ) -> None:
-    """To a reader that knows nothing of this program; picture, scene and annotations by the same stamp."""
+    """To a reader that knows nothing of this program; image, scene and annotations by the same stamp."""
     stamps_ns: dict[str, list[int]] = {}
     drawn = 0
     with AnyReader([replayed[1] / "found.mcap"]) as reader:

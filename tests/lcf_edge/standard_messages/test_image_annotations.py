@@ -29,7 +29,7 @@ def test_the_stamp_is_that_of_the_image(drawn: Callable[..., Any]) -> None:
 
 
 def test_so_is_that_of_each_annotation(drawn: Callable[..., Any]) -> None:
-    """Programs that do not know the stamp of the whole message pair picture and annotations by these."""
+    """Programs that do not know the stamp of the whole message pair image and annotations by these."""
     message = drawn()
     stamps = {(one.timestamp.sec, one.timestamp.nanosec) for one in (*message.circles, *message.points, *message.texts)}
     assert stamps == {(message.timestamp.sec, message.timestamp.nanosec)}
