@@ -162,6 +162,7 @@ class Pipeline:
         step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
+        self._motion.see_driving(self.filter.drives)
         if step.residual is not None:
             self._motion.correct(
                 step.residual.turn_rad, step.residual.sigma_rad, mean_expansion(self.filter.normal.columns)

@@ -60,6 +60,8 @@ _LAG_SHARE = 0.5  # of the correction by the flow that may stem from before: tra
 _TURN_SHARE = 0.05  # of the rate: error by the gyro's scale and time, and a shaken focus
 _ROLL_SHARE = 0.5  # roll moves the image's edge by this share of what yaw does
 
+_DRIVES_S = 0.5  # what comes close to a vehicle that stands may flow as well, but not for so long
+
 _SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
 
 
@@ -113,6 +115,8 @@ class EgoMotionEstimator:
         self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
         self._ground = GroundBelief()
+        self._drove_ns: int | None = None  # when the image last showed that it drives,
+        self._driven_s = 0.0  # and for how long it has
         self._path_yaw_radps = 0.0
         self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
         self._noisy = False  # as a real gyro; synthetic samples have no noise
@@ -301,6 +305,20 @@ class EgoMotionEstimator:
             again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
             self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
 
+    def see_driving(self, drives: bool) -> None:
+        """Take whether the flow of the present image shows that the vehicle drives.
+
+        A quiet IMU is no rest then: on a smooth floor, at a steady speed, it is as quiet. Nor does it know the speed of
+        a vehicle that it took to be standing.
+        """
+        if not drives:
+            self._driven_s = 0.0
+            return
+        self._drove_ns = self._stamp_ns
+        self._driven_s += self._interval.span.dt_s
+        if self._driven_s >= _DRIVES_S and self._inertial.may_stand():
+            self._inertial.lose()
+
     def _rotation(self) -> Floats:
         """Return the rotation of directions over the interval, (3, 3)."""
         rotation = np.empty((3, 3))
@@ -399,7 +417,8 @@ class EgoMotionEstimator:
                 and odometry.largest(window, 0) <= _REST_SPEED_MPS
                 and not odometry.largest(window, 1) > _REST_YAW_RADPS  # False for NaN
             )
-        if still is False and not self.bias.known:
+        drove = self._drove_ns is not None and stamp_ns - self._drove_ns < _REST_NS
+        if drove or (still is False and not self.bias.known):
             return False  # what moves may be others, but nothing else shows rest
         return None if self._inertial.may_stand() else False
 

@@ -23,7 +23,8 @@ in reading order (``line_circle_filter`` calls them in this order):
 ``edge_expert``      applies them to the table
 ``baselines``        what the displacement since each key frame implies for this image
 ``flow_fit``         what all edges together tell of the camera: errors of its rotation, and of O
-``rest``             whether the vehicle stands, as the image tells
+``rest``             whether the vehicle stands, as the image shows
+``driving``          whether it drives
 ``ground_speed``     how fast the vehicle is, as the ground tells
 ``rebel_detection``  what breaks the flow over a chain of key positions, as equations
 ``alpha``            applies them: chains become rebel edges, rebels that obey go home

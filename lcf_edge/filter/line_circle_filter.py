@@ -11,6 +11,7 @@ from lcf_edge.filter import (
     alpha,
     coarse_motion,
     derotation,
+    driving,
     edge_expert,
     feedback,
     flow,
@@ -35,6 +36,7 @@ from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.coarse_circles import CoarseGroups
 from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.derotation import OffLine
+from lcf_edge.filter.driving import DrivingTest
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
@@ -140,6 +142,7 @@ class LineCircleFilter:
         self._baselines = Baselines()
         self._fit = FlowFit()
         self._rest = RestTest()
+        self._driving = DrivingTest()
         self.ground = GroundSpeed()
         self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
         self._homography = Homography()
@@ -200,6 +203,11 @@ class LineCircleFilter:
     def stands(self) -> bool:
         """Whether the image says that the vehicle stands, although a speed is measured."""
         return bool(self._rest.stands)
+
+    @property
+    def drives(self) -> bool:
+        """Whether the image says that the vehicle drives, whatever speed is measured."""
+        return bool(self._driving.drives)
 
     def step(self, corners: Corners, motion: Motion, image: Grey | None = None, small: Grey | None = None) -> Step:
         """Take one frame. ``motion.dt_s`` must be positive.
@@ -403,6 +411,7 @@ class LineCircleFilter:
         coarse_motion.measure(self._coarse, keys, baselines, self._plane, around)
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
+        driving.measure(self._driving, verdicts, edges, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)
         requested = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)

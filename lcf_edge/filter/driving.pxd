@@ -1,0 +1,24 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport lengths, rebel_detection
+from lcf_edge.filter.baselines cimport Baselines
+from lcf_edge.filter.columns cimport EdgeColumns
+from lcf_edge.filter.rebel_detection cimport Verdicts
+from lcf_edge.filter.situation cimport Situation
+
+cdef double MIN_BASELINE_S
+cdef double MOVES_SIGMAS
+cdef double MIN_R_SHARE
+cdef int MIN_A_SIDE
+cdef double FLOW_SHARE
+cdef double MAX_ASTRAY
+cdef double MAX_DRIFT_SHARE
+
+cdef class DrivingTest:
+    cdef readonly int edges, left, right, astray
+    cdef readonly bint drives
+
+@cython.locals(too_near=bint, outward=double, drift=double)
+cdef void look(DrivingTest test, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(flow=int)
+cpdef void measure(DrivingTest test, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

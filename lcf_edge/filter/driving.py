@@ -1,0 +1,61 @@
+"""Whether the vehicle drives, as the image shows: most of what is seen flows out from O, to the left and the right."""
+
+import math
+
+from lcf_edge.filter import lengths, rebel_detection
+from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.situation import Situation
+
+MIN_BASELINE_S = 0.15  # motion over less than this is lost in noise
+MOVES_SIGMAS = 3.0
+MIN_R_SHARE = 0.1  # of the focal length; nearer to O an edge hardly flows
+MIN_A_SIDE = 8  # edges that flow outward left of O, and right of it
+FLOW_SHARE = 0.6  # of all edges
+MAX_ASTRAY = 0.2  # edges that move otherwise, as a share of those that flow
+MAX_DRIFT_SHARE = 0.5  # of the way outward; more is astray
+
+
+class DrivingTest:
+    """What one frame shows. ``drives``: the verdict.
+
+    ``edges``: those with a history, away from O; of these ``left`` and ``right`` of O flow outward, ``astray`` move
+    otherwise.
+    """
+
+    def __init__(self) -> None:
+        self.edges = self.left = self.right = self.astray = 0
+        self.drives = False
+
+
+def look(
+    test: DrivingTest, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
+) -> None:
+    """Note one edge."""
+    too_near = verdicts.r[j] < MIN_R_SHARE * around.pinhole.focal
+    if too_near or baselines.elapsed_s[verdicts.slot[j]] < MIN_BASELINE_S:
+        return
+    test.edges += 1
+    outward, drift = verdicts.outward[j], math.fabs(verdicts.drift[j])
+    if lengths.of(outward, drift) < MOVES_SIGMAS * rebel_detection.sigma_px(verdicts, j, around):
+        return
+    if drift > MAX_DRIFT_SHARE * outward:
+        test.astray += 1
+    elif edges.x[verdicts.row[j]] < around.focus_x:
+        test.left += 1
+    else:
+        test.right += 1
+
+
+def measure(test: DrivingTest, verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
+    """Set ``drives``. One thing that comes closer flows out from its own middle, seldom on both sides of O."""
+    test.edges = test.left = test.right = test.astray = 0
+    for j in range(verdicts.count):
+        look(test, verdicts, j, edges, baselines, around)
+    flow = test.left + test.right
+    test.drives = (
+        min(test.left, test.right) >= MIN_A_SIDE
+        and flow >= FLOW_SHARE * test.edges
+        and test.astray <= MAX_ASTRAY * flow
+    )
