@@ -35,6 +35,9 @@ cdef double SAME_SMALL_PX
 cdef double SAME_SHARE
 cdef int LAST
 cdef int OLDER
+cdef int UNKNOWN
+cdef int STANDS
+cdef int CHANGED
 cdef int WORST
 
 cdef class CoarseMotion:
@@ -47,6 +50,7 @@ cdef class CoarseMotion:
     cdef int pictures, keys, seen, searches, here, across, down, least_still, least_moving
     cdef const double[::1] x, y
     cdef int[::1] rough, links_before, block
+    cdef readonly int[::1] stance
     cdef int[::1] links
     cdef double[::1] came_x, came_y, vx_before, vy_before
     cdef double[:, ::1] shares

@@ -45,6 +45,7 @@ MIN_SLOW_S = 0.1  # nor younger
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
 SAME_SHARE = 0.25  # and by this share
 LAST, OLDER = 0, 1
+UNKNOWN, STANDS, CHANGED = 0, 1, 2
 WORST = 256 * 64
 
 
@@ -69,8 +70,8 @@ class CoarseMotion:
     much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last image, -1: it was not all in it; ``shares``
     (2, pieces), where it lately stood, in the last image and in the older one; ``links``: images through which its
     motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which it
-    was seen; ``links_before``, ``vx_before``, ``vy_before`` of the last image. ``block``: roughness of each ``STEP``
-    by ``STEP`` px.
+    was seen; ``stance``: whether it ``STANDS`` since the last image, or has ``CHANGED`` otherwise; ``links_before``,
+    ``vx_before``, ``vy_before`` of the last image. ``block``: roughness of each ``STEP`` by ``STEP`` px.
     """
 
     def __init__(self, lens: Lens, side: int) -> None:
@@ -99,6 +100,7 @@ class CoarseMotion:
         self.came_x, self.came_y, self.shares = doubles(pieces), doubles(pieces), doubles(2, pieces)
         self.vx, self.vy, self.vx_before, self.vy_before = [doubles(pieces) for _ in range(4)]
         self.elapsed_s = doubles(pieces)
+        self.stance = integers(pieces)
 
 
 # Images
@@ -361,7 +363,11 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
     end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
     coarse.share = coarse.shares[age, k]
-    if stands_as_lately(coarse, k, end_x, end_y) or coarse.seen >= MAX_SEEN:
+    if stands_as_lately(coarse, k, end_x, end_y):
+        if age == LAST:
+            coarse.stance[k] = STANDS
+        return False
+    if coarse.seen >= MAX_SEEN:
         return False
     coarse.seen += 1
     turned = lengths.of(
@@ -370,6 +376,8 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     off_flow = coarse.off_flow + TURN_SIGMAS * around.turn_share * turned
     seek_standing(coarse, k, end_x, end_y, off_flow)
     coarse.shares[age, k] = coarse.share
+    if age == LAST:
+        coarse.stance[k] = STANDS if coarse.least_still <= calm(coarse, k) else CHANGED
     if coarse.least_still <= calm(coarse, k) or coarse.searches >= MAX_SEARCHES:
         return False
     seek_moving(coarse, end_x, end_y, off_flow)
@@ -398,6 +406,7 @@ def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: 
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0
+        coarse.stance[k] = UNKNOWN
         coarse.came_x[k] = -1.0
     coarse.seen = coarse.searches = 0
     if coarse.pictures < 2 or not coarse.columns or not coarse.rows:

@@ -20,5 +20,5 @@ cdef class DrivingTest:
 
 @cython.locals(too_near=bint, outward=double, drift=double)
 cdef void look(DrivingTest test, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(flow=int)
+@cython.locals(flow=int, i=cython.Py_ssize_t, j=cython.Py_ssize_t)
 cpdef void measure(DrivingTest test, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

@@ -1,4 +1,4 @@
-"""Whether the vehicle drives, as the image shows: most of what is seen flows out from O, to the left and the right."""
+"""Whether the vehicle drives, as the image shows: most of what is seen flows outward, left and right of O."""
 
 import math
 
@@ -20,8 +20,8 @@ MAX_DRIFT_SHARE = 0.5  # of the way outward; more is astray
 class DrivingTest:
     """What one frame shows. ``drives``: the verdict.
 
-    ``edges``: those with a history, away from O; of these ``left`` and ``right`` of O flow outward, ``astray`` move
-    otherwise.
+    ``edges``: those with a history, away from O, and what may be parts of the vehicle; of these ``left`` and ``right``
+    of O flow outward, ``astray`` move otherwise.
     """
 
     def __init__(self) -> None:
@@ -49,8 +49,13 @@ def look(
 
 
 def measure(test: DrivingTest, verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
-    """Set ``drives``. One thing that comes closer flows out from its own middle, seldom on both sides of O."""
+    """Set ``drives``. What comes towards a vehicle that stands flows outward as well, but all around it stands.
+
+    What has stood for long counts as part of the vehicle and is not judged, but it is seen to stand.
+    """
     test.edges = test.left = test.right = test.astray = 0
+    for i in range(edges.count):
+        test.edges += edges.matched[i] != 0 and edges.is_own_part(i)
     for j in range(verdicts.count):
         look(test, verdicts, j, edges, baselines, around)
     flow = test.left + test.right

@@ -801,7 +801,7 @@ def update(
             edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
     evicted += patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
     evicted += coarse_circles.update(coarse_groups, coarse, edges, circles, groups.updated, around, settings, ids)
-    evicted += turmoil.update(disorder, edges, circles, groups.updated, around, settings, ids)
+    evicted += turmoil.update(disorder, edges, circles, groups.updated, coarse, around, settings, ids)
     lose_trust(groups, circles, around, settings)
     shared.release(edges, circles, True)
     return evicted

@@ -1,8 +1,9 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, lengths, rounding, situation
+from lcf_edge.filter cimport coarse_motion, edge_equations, lengths, rounding, situation
 from lcf_edge.filter.circles cimport Ids, Members
+from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
@@ -21,6 +22,7 @@ cdef double HIDDEN_FOUND_SHARE
 cdef int MIN_HIDDEN_CELLS
 cdef double MIN_HIDDEN_S
 cdef int MIN_CELLS
+cdef double CHANGED_SHARE
 cdef double MIN_S
 cdef double MET_S
 cdef double SLOW_MPS
@@ -32,6 +34,7 @@ cdef class Turmoil:
     cdef readonly double side_px
     cdef double per_px
     cdef readonly double[::1] found, lost, longest_s
+    cdef double[::1] standing, changed, all_standing, all_changed
     cdef double[::1] found_now, lost_now, trusted_now, hidden_now, lasts_s, weight
     cdef unsigned char[::1] unruly, hidden
     cdef readonly int[::1] place, size, hidden_size
@@ -42,6 +45,8 @@ cdef double middle_x(Turmoil turmoil, int k) noexcept nogil
 cdef double middle_y(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(k=int, trusted=int)
 cpdef void count(Turmoil turmoil, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
+@cython.locals(p=int, k=int)
+cdef void count_pieces(Turmoil turmoil, CoarseMotion coarse) noexcept nogil
 cpdef bint is_all_lost(Turmoil turmoil, bint before) noexcept nogil
 cdef bint is_inner(Turmoil turmoil, int k) noexcept nogil
 @cython.locals(total=double, row=int, middle=int)
@@ -63,9 +68,10 @@ cdef void gather(Turmoil turmoil) noexcept nogil
 cdef bint is_believed(Turmoil turmoil, int g) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
+cdef bint looks_changed(Turmoil turmoil, int g) noexcept nogil
 cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void set_cause(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(k=int, found=double, lost=double)
 cdef bint rages_on(Turmoil turmoil, CircleColumns circles, Py_ssize_t c) noexcept nogil
 @cython.locals(evicted=int, c=int, seen=bint)
-cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, CoarseMotion coarse, Situation around, Settings settings, Ids ids) noexcept nogil

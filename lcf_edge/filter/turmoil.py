@@ -9,8 +9,9 @@ frames, while the rest of the image is found, is a circle of C_r. When it is met
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, lengths, rounding, situation
+from lcf_edge.filter import coarse_motion, edge_equations, lengths, rounding, situation
 from lcf_edge.filter.circles import Ids, Members
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, octets
 from lcf_edge.filter.settings import Settings
@@ -31,6 +32,7 @@ HIDDEN_FOUND_SHARE = 0.05  # of these, that are found all the same, where someth
 MIN_HIDDEN_CELLS = 6  # of a place, that are hidden: smaller ones show what passes far off
 MIN_HIDDEN_S = 0.09  # that it lasts before it is believed; what is lost is soon trusted no more
 MIN_CELLS = 3  # of a place, that are in turmoil
+CHANGED_SHARE = 0.02  # of the pieces there of the image in small: fine texture keeps no corner either, but they stand
 MIN_S = 0.15  # that it lasts before it is believed
 MET_S = 1.0  # what is met later than this is found again
 SLOW_MPS = 0.5  # and by a slower vehicle, all that is farther off than it drives in that time
@@ -42,11 +44,12 @@ class Turmoil:
     """A row a cell, the cells of the image row by row.
 
     ``across``, ``down``: how many; ``side_px``, ``per_px``. ``found``, ``lost``: edges, the less the longer ago;
-    ``found_now``, ``lost_now``: in this frame. ``unruly``: whether it and those around it are in turmoil; ``lasts_s``:
+    ``found_now``, ``lost_now``: in this frame; ``standing``, ``changed``: pieces of the image in small that stand, and
+    that do not, the less the longer ago. ``unruly``: whether it and those around it are in turmoil; ``lasts_s``:
     for how long it or one beside it has been; ``place``: number of the place that it belongs to, -1: none.
 
     A row a place: ``members``, its edges; ``weight``, how many they were lately; ``size``, its cells in turmoil;
-    ``longest_s``, for how long it lasts.
+    ``longest_s``, for how long it lasts; ``all_standing``, ``all_changed``, its pieces.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -56,12 +59,14 @@ class Turmoil:
         cells = self.across * self.down
         self.found, self.lost, self.found_now, self.lost_now = [doubles(cells) for _ in range(4)]
         self.trusted_now, self.hidden_now = doubles(cells), doubles(cells)
+        self.standing, self.changed = doubles(cells), doubles(cells)
         self.unruly, self.hidden = octets(cells), octets(cells)
         self.lasts_s = doubles(cells)
         self.place = integers(cells)
         self.members = Members(cells)
         self.size, self.hidden_size = integers(cells), integers(cells)
         self.weight, self.longest_s = doubles(cells), doubles(cells)
+        self.all_standing, self.all_changed = doubles(cells), doubles(cells)
 
 
 def cell_at(turmoil: Turmoil, x: float, y: float) -> int:
@@ -91,6 +96,8 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
     for k in range(turmoil.across * turmoil.down):
         turmoil.found[k] *= kept
         turmoil.lost[k] *= kept
+        turmoil.standing[k] *= kept
+        turmoil.changed[k] *= kept
         turmoil.found_now[k] = turmoil.lost_now[k] = turmoil.trusted_now[k] = turmoil.hidden_now[k] = 0.0
     if math.fabs(around.yaw_rate_radps) * around.dt_s * around.pinhole.focal > settings.bl0_px:
         return
@@ -108,6 +115,16 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
     for k in range(turmoil.across * turmoil.down):
         turmoil.found[k] += turmoil.found_now[k]
         turmoil.lost[k] += turmoil.lost_now[k]
+
+
+def count_pieces(turmoil: Turmoil, coarse: CoarseMotion) -> None:
+    """Which pieces of the image in small stand, and which have changed otherwise than what stands."""
+    for p in range(coarse.columns * coarse.rows):
+        k = cell_at(turmoil, coarse.x[p], coarse.y[p])
+        if k >= 0 and coarse.stance[p] == coarse_motion.STANDS:
+            turmoil.standing[k] += 1
+        elif k >= 0 and coarse.stance[p] == coarse_motion.CHANGED:
+            turmoil.changed[k] += 1
 
 
 def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
@@ -232,13 +249,15 @@ def gather(turmoil: Turmoil) -> None:
     cells = turmoil.across * turmoil.down
     for g in range(cells):
         shared.clear(turmoil.members, g)
-        turmoil.weight[g] = turmoil.longest_s[g] = 0.0
+        turmoil.weight[g] = turmoil.longest_s[g] = turmoil.all_standing[g] = turmoil.all_changed[g] = 0.0
         turmoil.size[g] = turmoil.hidden_size[g] = 0
     for k in range(cells):
         g = turmoil.place[k]
         if g >= 0:
             weight = turmoil.found[k] + turmoil.lost[k]
             turmoil.weight[g] += weight
+            turmoil.all_standing[g] += turmoil.standing[k]
+            turmoil.all_changed[g] += turmoil.changed[k]
             turmoil.size[g] += turmoil.unruly[k]
             turmoil.hidden_size[g] += turmoil.hidden[k]
             turmoil.longest_s[g] = max(turmoil.longest_s[g], turmoil.lasts_s[k])
@@ -264,6 +283,11 @@ def is_believed(turmoil: Turmoil, g: int) -> bool:
     if turmoil.hidden_size[g] >= MIN_HIDDEN_CELLS and turmoil.longest_s[g] >= MIN_HIDDEN_S:
         return True
     return turmoil.size[g] >= MIN_CELLS and turmoil.longest_s[g] >= MIN_S
+
+
+def looks_changed(turmoil: Turmoil, g: int) -> bool:
+    """Whether the image in small shows a place changed as well, or does not say."""
+    return turmoil.all_changed[g] >= CHANGED_SHARE * (turmoil.all_standing[g] + turmoil.all_changed[g])
 
 
 def is_shown_by(circles: CircleColumns, c: int) -> bool:
@@ -308,6 +332,7 @@ def update(
     edges: EdgeColumns,
     circles: CircleColumns,
     updated: Bytes,
+    coarse: CoarseMotion,
     around: Situation,
     settings: Settings,
     ids: Ids,
@@ -321,6 +346,7 @@ def update(
     for c in range(circles.capacity):
         if is_shown_by(circles, c) and not updated[c]:
             updated[c] = rages_on(turmoil, circles, c)
+    count_pieces(turmoil, coarse)
     if not seen:
         return evicted
     join_cells(turmoil)
@@ -329,6 +355,8 @@ def update(
         if turmoil.place[g] != g or not is_believed(turmoil, g):
             continue
         c = circle_of(turmoil, g, circles, settings)
+        if c < 0 and not looks_changed(turmoil, g):
+            continue
         if c < 0:
             evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)

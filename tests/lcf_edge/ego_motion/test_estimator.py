@@ -318,6 +318,18 @@ class TestBias:
         ego.advance(ns(0.9), still=False)
         assert untouched(ego.bias)
 
+    def test_is_not_learnt_while_the_flow_shows_that_it_drives_however_quiet_the_imu_is(self) -> None:
+        """As on a smooth floor at a steady speed. Half a second after the flow has stopped it rests."""
+        ego = calibrated()
+        feed(ego, np.arange(0, 3, 0.01), gyro=lambda _: (0.0, 0.005, 0.0))
+        seen: list[tuple[float, bool]] = []
+        for t in np.arange(0.1, 3, 0.05):
+            motion = ego.advance(ns(t))
+            ego.see_driving(bool(t < 1.5))
+            seen.append((t, motion.speed_mps == 0.0))
+        assert not any(rests for t, rests in seen if 0.7 < t < 1.9)
+        assert all(rests for t, rests in seen if t > 2.1)
+
     @pytest.mark.parametrize(("speed", "yaw"), [(0.5, 0.0), (0.0, 0.05)], ids=["drives", "turns on the spot"])
     def test_is_not_learnt_while_odometry_moves(self, speed: float, yaw: float) -> None:
         ego = estimator()

@@ -307,3 +307,19 @@ def test_a_full_table_counts_it(calm: Any) -> None:
     for (corners, motion), (more, _) in both:
         evicted += tables.step(_with(corners, more), motion).sizes.evicted
     assert evicted > 0
+
+
+@pytest.mark.parametrize("changes", [True, False])
+def test_fine_texture_that_keeps_no_corner_is_none_if_the_image_in_small_stands(calm: Any, changes: bool) -> None:
+    """As foliage, gravel or a row of parked bicycles; what tumbles changes there too."""
+    random, tiles = np.random.default_rng(4), np.ones((6, 6), np.uint8)
+    small = np.kron(random.integers(0, 256, (10, 14), np.uint8), tiles)[:, :80].copy()
+    column, row = (round(each * 80 / 640) - 9 for each in AHEAD)
+    tables, told = LineCircleFilter(CONFIG, calm.lens), 0
+    for corners, motion in Storm(calm):
+        if changes:
+            small[row : row + 18, column : column + 18] = np.kron(random.integers(0, 256, (3, 3), np.uint8), tiles)
+        tables.step(corners, motion, small=small)
+        told += len(reported(tables))
+    assert (told > 10) == changes
+    assert (told == 0) != changes
