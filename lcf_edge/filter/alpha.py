@@ -1,4 +1,4 @@
-"""α: chains of three key positions become rebel edges; rebels that obey the flow again go home."""
+"""α: chains of three key positions become rebel edges; rebels that obey the flow again return to E_n."""
 
 import math
 
@@ -12,13 +12,13 @@ from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
-MIN_BASELINE_S = 0.08  # shorter links say nothing
+MIN_BASELINE_S = 0.08  # shorter histories are lost in noise
 PENDING = 2  # links of a chain that waits for its third key frame
-OBEYING_COSTS = 2.0  # trust that a rebel loses in a frame in which it follows the flow
+OBEYING_COSTS = 2.0  # trust that a rebel loses in each frame in which it follows the flow
 
 
 def is_still(edges: EdgeColumns, over_s: float, motion_px: float) -> bool:
-    """Whether the median edge has not moved by ``motion_px`` over a time."""
+    """Whether the median edge moved less than ``motion_px`` in ``over_s``."""
     slow = 0
     for i in range(edges.count):
         if math.fabs(edges.speed[i]) * over_s < motion_px:
@@ -27,7 +27,7 @@ def is_still(edges: EdgeColumns, over_s: float, motion_px: float) -> bool:
 
 
 def key_is_due(edges: EdgeColumns, keys: KeyFrames, dt_s: float, settings: Settings) -> bool:
-    """Whether there is motion enough to stand out from corner noise since the last key frame, or time is up."""
+    """Whether motion since the last key frame exceeds corner noise, or the longest interval is over."""
     waited_s = keys.since_s + 0.5 * dt_s
     if keys.number == 0:
         return True
@@ -39,7 +39,7 @@ def key_is_due(edges: EdgeColumns, keys: KeyFrames, dt_s: float, settings: Setti
 
 
 def mark_key(edges: EdgeColumns, keys: KeyFrames) -> None:
-    """Make this frame a key frame: every edge remembers its place. Where ψ had it predicted is no key position."""
+    """Make this frame a key frame: every edge stores its position. One held under ψ starts its history anew."""
     slot = key_frames.mark(keys)
     for i in range(edges.count):
         if edges.held[i]:
@@ -55,11 +55,11 @@ def judge_all(
     around: Situation,
     settings: Settings,
 ) -> None:
-    """Judge every edge that was seen and has a history, over the whole of it."""
+    """Judge every matched edge that has a history, over the whole of it."""
     verdicts.count = 0
     for i in range(edges.count):
         if edges.is_own_part(i):
-            edges.rebel[i] = edges.suspect_keys[i] = 0  # it moves with the camera, and is nothing that could be met
+            edges.rebel[i] = edges.suspect_keys[i] = 0  # it moves with the camera: no obstacle
         elif edges.matched[i] and key_frames.has_history(edges, i, keys, MIN_BASELINE_S):
             j = verdicts.count
             verdicts.count += 1
@@ -70,12 +70,12 @@ def judge_all(
 
 
 def breaks_flow(verdicts: Verdicts, j: int) -> bool:
-    """Whether an edge moves by itself, or will be met."""
+    """Whether an edge moves independently, or is on a collision course."""
     return verdicts.mover[j] != 0 or verdicts.incoming[j] != 0
 
 
 def outward_speed(edges: EdgeColumns, i: int, around: Situation) -> float:
-    """V along the flow line of an edge that went its own way until now, px/s."""
+    """V along its flow line of an edge that has been a rebel or chain, px/s."""
     beta = math.atan2(edges.y[i] - around.focus_y, edges.x[i] - around.focus_x)
     return edges.speed[i] * math.cos(flow.wrap(edges.beta[i] - beta))
 
@@ -89,7 +89,7 @@ def send_home(edges: EdgeColumns, i: int, around: Situation, settings: Settings)
 
 
 def release_obedient(verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """What follows the flow again: rebels lose trust and go home to E_n when it runs out, chains are freed."""
+    """Edges that follow the flow again: rebels lose trust and return to E_n below Tr_cr, chains are released."""
     for j in range(verdicts.count):
         i = verdicts.row[j]
         if breaks_flow(verdicts, j):
@@ -104,7 +104,7 @@ def release_obedient(verdicts: Verdicts, edges: EdgeColumns, around: Situation, 
 
 
 def wait(edges: EdgeColumns, i: int, key: bool, around: Situation) -> None:
-    """An edge that breaks the flow, and is too young to be judged, is a chain that waits for its third key frame."""
+    """Make an edge that breaks the flow a chain, to wait for its third key frame."""
     if edges.suspect_keys[i] == 0:  # until now it followed its flow line
         edges.beta[i] = math.atan2(edges.y[i] - around.focus_y, edges.x[i] - around.focus_x)
     suspect_keys = edges.suspect_keys[i] + (1 if key else 0)
@@ -112,7 +112,7 @@ def wait(edges: EdgeColumns, i: int, key: bool, around: Situation) -> None:
 
 
 def middle_key(verdicts: Verdicts, j: int, keys: KeyFrames, key: bool) -> int:
-    """Number of the key frame halfway between the oldest of a chain and now: the second of its three."""
+    """Number of the key frame halfway between a chain's oldest and now: the second of its three key positions."""
     return (verdicts.oldest[j] + keys.number - (1 if key else 0)) // 2
 
 
@@ -127,10 +127,10 @@ def decide(
     around: Situation,
     settings: Settings,
 ) -> int:
-    """Success or failure, both free the chain: three links that agree make a rebel.
+    """Decide each chain: if its younger link agrees with the whole it becomes a rebel. Either way the chain ends.
 
-    ``born``: (capacity,) rows of ``verdicts`` that become rebels; return how many. ``recent``: room for the verdict on
-    a younger link. ``key``: whether this frame is a key frame.
+    ``born``: (capacity,) rows of ``verdicts`` that become rebels; returns how many. ``recent``: scratch for the verdict
+    on the younger link. ``key``: whether this frame is a key frame.
     """
     births = 0
     for j in range(verdicts.count):
@@ -148,7 +148,7 @@ def decide(
             births += 1
             continue
         edges.suspect_keys[i] = 0
-        if verdicts.mover[j]:  # not one landmark: its history is worth nothing
+        if verdicts.mover[j]:  # not one landmark: discard its history
             edges.born_key[i] = keys.number
     return births
 
@@ -174,9 +174,9 @@ def give_births(
 
 
 def gather_rebels(verdicts: Verdicts, edges: EdgeColumns, breaking: Integers) -> int:
-    """Rebels that break the flow in this frame; their O slides with the window of key frames.
+    """Gather the rebels that break the flow in this frame; their O slides with the window of key frames.
 
-    ``breaking``: (capacity,) their rows of ``verdicts``; return how many.
+    ``breaking``: (capacity,) their rows of ``verdicts``; returns how many.
     """
     rebels = 0
     for j in range(verdicts.count):

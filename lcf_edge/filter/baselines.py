@@ -1,4 +1,4 @@
-"""What the displacement since each key frame implies for this image: where standing points may have gone."""
+"""The flow that the displacement since each key frame implies for this image."""
 
 import math
 
@@ -14,13 +14,13 @@ MIN_R_PX = 1.0
 
 
 class Baselines:
-    """A row a slot of ``KeyFrames``.
+    """One row for each slot of ``KeyFrames``.
 
     ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
-    ``depth_m``: ΔZ, its forward part. ``elapsed_s``. ``sigma_px``: what is uncertain of the rotation since, of this key
-    frame by itself: what the gyro leaves, or, once the flow measured it, what that leaves. ``is_fitted``,
-    ``rate_covariance`` (3, 3), (rad/s)²: of the error of the rotation's rate that stays of a fit, which all share.
-    ``turned``: work space, px that a turn of 1 rad about each axis moves a place.
+    ``depth_m``: ΔZ, its forward component. ``elapsed_s``. ``sigma_px``: uncertainty of the rotation since, of this key
+    frame alone: by the gyro, or by the flow once that has measured it. ``is_fitted``, ``rate_covariance`` (3, 3),
+    (rad/s)²: of the rotation-rate error after a fit, which all key frames share. ``turned``: scratch, image motion of a
+    point for 1 rad about each axis, px.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class Baselines:
 
 
 def measure(baselines: Baselines, keys: KeyFrames, h: Homography, pinhole: Pinhole, around: Situation) -> None:
-    """What the key frames tell about this frame. ``h``: room for a homography."""
+    """Set the baselines of this frame from the key frames. ``h``: scratch."""
     baselines.is_fitted = False
     for k in range(KEYS):
         flow.set_homography(h, pinhole, keys.rotation, k)
@@ -49,22 +49,22 @@ def measure(baselines: Baselines, keys: KeyFrames, h: Homography, pinhole: Pinho
 
 
 def then_x(baselines: Baselines, slot: int, x: float, y: float) -> float:
-    """x of a place at the key frame in ``slot``, derotated to now, px."""
+    """x of a position at the key frame in ``slot``, derotated to now, px."""
     scale = baselines.h[slot, 6] * x + baselines.h[slot, 7] * y + baselines.h[slot, 8]
     return (baselines.h[slot, 0] * x + baselines.h[slot, 1] * y + baselines.h[slot, 2]) / scale
 
 
 def then_y(baselines: Baselines, slot: int, x: float, y: float) -> float:
-    """y of a place at the key frame in ``slot``, derotated to now, px."""
+    """y of a position at the key frame in ``slot``, derotated to now, px."""
     scale = baselines.h[slot, 6] * x + baselines.h[slot, 7] * y + baselines.h[slot, 8]
     return (baselines.h[slot, 3] * x + baselines.h[slot, 4] * y + baselines.h[slot, 5]) / scale
 
 
 def turn(baselines: Baselines, k: int, pinhole: Pinhole, x: float, y: float, z: float) -> None:
-    """A small rotation, rad about each axis, comes on top of that since key frame ``k``: H ← K·R·K⁻¹·H."""
+    """Add a small rotation, rad about each axis, to that since key frame ``k``: H ← K·R·K⁻¹·H."""
     fx, fy, cx, cy = pinhole.fx, pinhole.fy, pinhole.cx, pinhole.cy
     for j in range(3):
-        # to rays, turned, and back to the image
+        # to rays, rotate, back to the image
         across, down, ahead = baselines.h[k, j], baselines.h[k, 3 + j], baselines.h[k, 6 + j]
         u, v = (across - cx * ahead) / fx, (down - cy * ahead) / fy
         turned_u, turned_v, turned_w = u - z * v + y * ahead, z * u + v - x * ahead, ahead - y * u + x * v
@@ -74,7 +74,7 @@ def turn(baselines: Baselines, k: int, pinhole: Pinhole, x: float, y: float, z: 
 
 
 def turn_px(pinhole: Pinhole, axis: int, x: float, y: float, cos: float, sin: float) -> float:
-    """px that a place moves in the direction (cos, sin) when the camera turns by 1 rad about x (0), y (1) or z (2)."""
+    """Image motion of a point in the direction (cos, sin) for 1 rad of rotation about x (0), y (1) or z (2), px."""
     u, v = (x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy
     if axis == 0:
         return -u * v * pinhole.fx * cos - (1 + v * v) * pinhole.fy * sin
@@ -84,7 +84,7 @@ def turn_px(pinhole: Pinhole, axis: int, x: float, y: float, cos: float, sin: fl
 
 
 def sigma_along(baselines: Baselines, pinhole: Pinhole, slot: int, x: float, y: float) -> float:
-    """1 sigma along the flow, px, that the rotation since a key frame leaves of an edge that was at (x, y) then."""
+    """1 sigma along the flow, px, of an edge that was at (x, y) at a key frame, by the rotation since."""
     if not baselines.is_fitted:
         return baselines.sigma_px[slot]
     dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]

@@ -1,4 +1,4 @@
-"""What normal and rebel circles share: identities, rows in the table, members, the blend of two circles."""
+"""What normal and rebel circles share: identities, rows of the table, members, and the update from members."""
 
 import math
 
@@ -7,33 +7,33 @@ from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
 
-RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members
+RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members from the centre
 MIN_RADIUS_PX = 6.0
 EXTENT_SIGMAS = 3.6  # full width of the members, in standard deviations
-TRUST_A_FRAME = 0.25  # above Tr_cr, that a predicted contact has for each frame that it is ahead
+TRUST_A_FRAME = 0.25  # trust above Tr_cr that a predicted contact gets for each frame until then
 LAST_ID = 0xFFFFFFFF
 INFINITY = float("inf")
 NAN = float("nan")
 
 
 class Ids:
-    """Identities for newborn circles: never 0, and none again before 4 billion others."""
+    """Identities of new circles: never 0, reused only after 4 billion others."""
 
     def __init__(self) -> None:
         self.next = 1
 
 
 def new_id(ids: Ids) -> int:
-    """The next identity."""
+    """Return the next identity."""
     number = ids.next
     ids.next = number % LAST_ID + 1
     return number
 
 
 class Members:
-    """Edges gathered into groups, and what a circle takes from them; a row a group.
+    """Statistics of the edges in each group, from which circles are updated; one row per group.
 
-    ``size``: edges. Means over them, px: ``x``, ``y``; px²: ``variance_x``, ``variance_y`` about the former.
+    ``size``: number of edges. ``x``, ``y``: their mean, px; ``variance_x``, ``variance_y`` about it, px².
     """
 
     def __init__(self, capacity: int) -> None:
@@ -43,19 +43,19 @@ class Members:
 
 
 def clear(members: Members, g: int) -> None:
-    """A group without edges."""
+    """Reset a group."""
     members.size[g] = 0
     members.x[g] = members.y[g] = members.variance_x[g] = members.variance_y[g] = 0.0
 
 
 def radius_of(members: Members, g: int, max_px: float) -> float:
-    """R that holds most of a group, px."""
+    """R that covers most of a group, px."""
     reach = RADIUS_SIGMAS * math.sqrt(members.variance_x[g] + members.variance_y[g])
     return min(max(reach, MIN_RADIUS_PX), max_px)
 
 
 def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings) -> None:
-    """The circle predicted and the circle that its edges show, weighed by trust (as eq. EnEstimation)."""
+    """Update a predicted circle from its members, weighted by trust (as eq. EnEstimation)."""
     trust, tr_cr = circles.trust[c], settings.tr_cr
     radius = radius_of(members, g, settings.bs_px)
     circles.x[c] = edge_equations.update_position(trust, tr_cr, circles.x[c], members.x[g])
@@ -65,10 +65,9 @@ def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Se
 
 
 def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, settings: Settings) -> float:
-    """1/TTC from what was predicted and what is seen, by the equation of L, 1/s.
+    """1/TTC from prediction and measurement, by the equation of L, 1/s.
 
-    The fewer frames a contact is ahead, the less surely it was predicted: else one that does not come would always be
-    about to come.
+    A prediction counts less the sooner the contact: otherwise one that never comes would be imminent for ever.
     """
     if not math.isfinite(circles.ttc[c]):
         return rate
@@ -78,14 +77,14 @@ def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, setti
 
 
 def describe(circles: CircleColumns, c: int, members: Members, g: int) -> None:
-    """Support and extent of a circle, from its members."""
+    """Set support and extent of a circle from its members."""
     circles.support[c] = members.size[g]
     circles.width[c] = EXTENT_SIGMAS * math.sqrt(members.variance_x[g])
     circles.height[c] = EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
 
 
 def give_birth(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings, ids: Ids) -> None:
-    """A newborn circle from its members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
+    """Make a new circle from its members: Tr = ½(Tr_cr + Tr_s), no time to contact yet."""
     begin(circles, c, ids)
     circles.x[c], circles.y[c] = members.x[g], members.y[g]
     circles.radius[c] = radius_of(members, g, settings.bs_px)
@@ -94,7 +93,7 @@ def give_birth(circles: CircleColumns, c: int, members: Members, g: int, setting
 
 
 def begin(circles: CircleColumns, c: int, ids: Ids) -> None:
-    """A new circle that nothing is known of yet."""
+    """Start a new circle in row ``c`` with a new identity and nothing else known."""
     circles.active[c] = 1
     circles.id[c] = new_id(ids)
     circles.corr[c] = 1.0
@@ -105,7 +104,7 @@ def begin(circles: CircleColumns, c: int, ids: Ids) -> None:
 
 
 def nearest_circle(members: Members, g: int, circles: CircleColumns, settings: Settings) -> int:
-    """The circle that shows the same as a group: it holds the group's middle, or the group its own; -1: none."""
+    """The nearest circle that contains a group's centre, or whose centre the group contains; -1: none."""
     nearest, least = -1, 0.0
     reach = radius_of(members, g, settings.bs_px) + settings.member_margin_px
     for c in range(circles.capacity):
@@ -118,7 +117,7 @@ def nearest_circle(members: Members, g: int, circles: CircleColumns, settings: S
 
 
 def free_row(circles: CircleColumns) -> int:
-    """The first row that is not in use, -1: none."""
+    """The first row not in use, -1: none."""
     for c in range(circles.capacity):
         if not circles.active[c]:
             return c
@@ -126,7 +125,7 @@ def free_row(circles: CircleColumns) -> int:
 
 
 def weakest_row(circles: CircleColumns, settings: Settings) -> int:
-    """Row of the circle with the least trust, if that is less than a newborn's; -1: none."""
+    """Row of the least trusted circle, if it is trusted less than a new one; -1: none."""
     weakest = -1
     for c in range(circles.capacity):
         if not circles.active[c] or circles.trust[c] >= settings.tr_new:
@@ -137,7 +136,7 @@ def weakest_row(circles: CircleColumns, settings: Settings) -> int:
 
 
 def release(edges: EdgeColumns, circles: CircleColumns, rebel: bool) -> None:
-    """Edges forget circles that are no more. ``rebel``: of C_r, else of C_n."""
+    """Detach edges from circles that ended. ``rebel``: C_r, else C_n."""
     for i in range(edges.count):
         c = edges.circle[i]
         if c >= 0 and (edges.rebel[i] != 0) == rebel and not circles.active[c]:
@@ -145,7 +144,7 @@ def release(edges: EdgeColumns, circles: CircleColumns, rebel: bool) -> None:
 
 
 def make_room(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings: Settings) -> int:
-    """End the circle that is trusted least, if less than a newborn is; return its row, -1: there is none."""
+    """End the least trusted circle, if it is trusted less than a new one; return its row, -1: there is none."""
     c = weakest_row(circles, settings)
     if c >= 0:
         circles.active[c] = 0
@@ -154,6 +153,6 @@ def make_room(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings:
 
 
 def row_for_newborn(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings: Settings) -> int:
-    """A row that is not in use, else one of which room is made; -1: there is none. ``rebel``: of C_r, else of C_n."""
+    """A row for a new circle, free or evicted; -1: there is none. ``rebel``: of C_r, else of C_n."""
     c = free_row(circles)
     return c if c >= 0 else make_room(edges, circles, rebel, settings)

@@ -1,11 +1,11 @@
-"""The tables' columns as the loops see them: typed memory, taken once. ``tables`` tells what each column means."""
+"""The tables' columns as typed memory for the loops. ``tables`` defines each column."""
 
 from collections.abc import Mapping
 from typing import Any
 
 Memory = Mapping[str, Any]
 
-OWN_PART_S = 1.0  # what has not moved a pixel for so long, while the rest flows, moves with the camera
+OWN_PART_S = 1.0  # an edge that stays on its pixel for this long moves with the camera
 
 
 class EdgeColumns:
@@ -27,11 +27,11 @@ class EdgeColumns:
         self.corner, self.best, self.cost, self.psi = memory["corner"], memory["best"], memory["cost"], memory["psi"]
 
     def own_way(self, i: int) -> bool:
-        """Whether an edge follows no flow line: rebels and chains."""
+        """Whether an edge is not bound to a flow line: rebels and chains."""
         return self.rebel[i] != 0 or self.suspect_keys[i] > 0
 
     def is_own_part(self, i: int) -> bool:
-        """Whether an edge has stayed where it is in the image: a part of the vehicle, or dirt on the lens."""
+        """Whether an edge has not moved in the image: a part of the vehicle, or dirt on the lens."""
         return self.fixed_s[i] >= OWN_PART_S
 
     def rebels(self) -> int:

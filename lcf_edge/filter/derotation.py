@@ -1,4 +1,4 @@
-"""Step 0: the camera's rotation is taken out of all that is stored; what the gyro missed, the flow tells."""
+"""Step 0: takes the camera's rotation out of all stored positions; the flow shows what the gyro missed."""
 
 import math
 
@@ -10,16 +10,16 @@ from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.settings import Settings
 
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
-MIN_EDGES = 25  # that a correction of the rotation needs
-MAX_EDGES = 200  # and that are enough
+MIN_EDGES = 25  # for a correction of the rotation
+MAX_EDGES = 200
 ROUNDS = 3
-WEAK_RAD = 1.0  # prior for what the flow alone tells
-SCATTER = 0.17  # of edges that lie as corners should, see ``weigh``
-MIN_SIGMA_PX = 0.15  # errors that corners of one frame share
+WEAK_RAD = 1.0  # prior of the rotation by the flow alone
+SCATTER = 0.17  # of edges with ordinary corner noise, see ``weigh``
+MIN_SIGMA_PX = 0.15  # error common to all corners of a frame
 
 
 def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
-    """H = K·R·K⁻¹ on every stored place of the edges; own directions turn with the image. ``roll``: rad."""
+    """Apply H = K·R·K⁻¹ to all positions of the edges; β of rebels and chains turns too. ``roll``: rad."""
     for i in range(edges.count):
         flow.warp(h, edges.x[i], edges.y[i])
         edges.x[i], edges.y[i] = h.x, h.y
@@ -30,7 +30,7 @@ def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
 
 
 def derotate_circles(circles: CircleColumns, h: Homography, roll: float) -> None:
-    """H = K·R·K⁻¹ on the centres of circles; their directions turn with the image."""
+    """Apply H = K·R·K⁻¹ to the centres of circles; their β turns with the image."""
     for c in range(circles.capacity):
         if circles.active[c]:
             flow.warp(h, circles.x[c], circles.y[c])
@@ -39,7 +39,7 @@ def derotate_circles(circles: CircleColumns, h: Homography, roll: float) -> None
 
 
 def derotate_psi(psi: PsiColumns, h: Homography) -> None:
-    """H = K·R·K⁻¹ on the centres of ψ."""
+    """Apply H = K·R·K⁻¹ to the centres of ψ."""
     for p in range(psi.capacity):
         if psi.active[p]:
             flow.warp(h, psi.x[p], psi.y[p])
@@ -47,18 +47,18 @@ def derotate_psi(psi: PsiColumns, h: Homography) -> None:
 
 
 def derotate_predictions(edges: EdgeColumns, h: Homography) -> None:
-    """H = K·R·K⁻¹ on L'."""
+    """Apply H = K·R·K⁻¹ to L'."""
     for i in range(edges.count):
         flow.warp(h, edges.predicted_x[i], edges.predicted_y[i])
         edges.predicted_x[i], edges.predicted_y[i] = h.x, h.y
 
 
 class OffLine:
-    """Edges that tell about the rotation, a row each, at most ``MAX_EDGES``.
+    """Edges off their flow lines, which show the rotation that the gyro missed; one row each, at most ``MAX_EDGES``.
 
     ``pitch``, ``yaw``, ``roll``: px across the flow line for 1 rad about x, y and z; ``px``: distance from it. The
-    answer: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad. ``alone``, ``alone_sigma``: (3,), the same rotation
-    and 1 sigma of it as the flow tells it by itself, without the gyro's prior.
+    solution: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad. ``alone``, ``alone_sigma``: (3,), the same rotation
+    by the flow alone, without the gyro's prior, and its 1 sigma.
     """
 
     def __init__(self) -> None:
@@ -70,14 +70,14 @@ class OffLine:
 
 
 def shows_rotation(edges: EdgeColumns, i: int, tr_s: float) -> bool:
-    """Whether the distance of an edge from its flow line shows the rotation: trusted, normal, found."""
+    """Whether an edge may measure the rotation: trusted, normal, found."""
     return edges.corner[i] >= 0 and edges.trust[i] >= tr_s and not edges.own_way(i)
 
 
 def measure_off_line(
     off: OffLine, edges: EdgeColumns, corners: CornerColumns, pinhole: Pinhole, settings: Settings
 ) -> bool:
-    """How far trusted normal edges were found from their flow lines, which does not depend on depth.
+    """Measure the distances of trusted normal edges from their flow lines, which do not depend on depth.
 
     Return whether there are enough of them.
     """
@@ -99,7 +99,7 @@ def measure_off_line(
 
 
 def off_line(off: OffLine, edges: EdgeColumns, i: int, corners: CornerColumns, pinhole: Pinhole) -> None:
-    """Note one edge: its distance from the flow line, and what a small rotation would make of it, px a rad."""
+    """Add one edge: its distance from the flow line, and the derivative of that by a small rotation, px/rad."""
     k, corner = off.count, edges.corner[i]
     x, y, cos, sin = corners.x[corner], corners.y[corner], edges.cos[i], edges.sin[i]
     u, v = (x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy
@@ -111,11 +111,11 @@ def off_line(off: OffLine, edges: EdgeColumns, i: int, corners: CornerColumns, p
 
 
 def missing_rotation(off: OffLine, focal: float, prior_sigma_rad: float) -> None:
-    """The small rotation that puts edges back on their flow lines, and what stays uncertain of it.
+    """Solve for the small rotation that puts edges back on their flow lines, and its uncertainty.
 
-    Least squares, robust against what moves, with the gyro's uncertainty as prior: (Σ w·aᵀa + prior)·turn = Σ w·a·px,
-    a = (pitch, yaw, roll) of an edge, w = 1/(1 + (rest/2σ)²)². What the flow tells by itself is the less certain the
-    more the edges scatter.
+    Least squares, robust against movers, with the gyro's uncertainty as prior: (Σ w·aᵀa + prior)·turn = Σ w·a·px,
+    a = (pitch, yaw, roll) of an edge, w = 1/(1 + (rest/2σ)²)². The sigma of the flow alone grows with the scatter of
+    the edges.
     """
     prior = CORNER_SIGMA_PX / prior_sigma_rad
     prior = prior * prior
@@ -145,9 +145,9 @@ def missing_rotation(off: OffLine, focal: float, prior_sigma_rad: float) -> None
 
 
 def weigh(off: OffLine, prior: float) -> float:
-    """Enter all edges, weighed by what the rotation found so far leaves of them.
+    """Add all edges to the normal equations, weighted by their residuals after the rotation so far.
 
-    Return the mean of q/(1 + q), q = (rest/2σ)²: how much they scatter.
+    Return the mean of q/(1 + q), q = (rest/2σ)²: their scatter.
     """
     scatter = 0.0
     least_squares.begin(off.equations, 3)

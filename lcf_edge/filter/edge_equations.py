@@ -4,8 +4,8 @@ import math
 
 from lcf_edge.filter import flow
 
-CORNER_NOISE_PX = 0.7  # below this a displacement has no direction
-MAX_DEVIATION_RAD = 0.5  # DL is bounded
+CORNER_NOISE_PX = 0.7  # a shorter displacement has no direction
+MAX_DEVIATION_RAD = 0.5  # bound of DL
 
 # λ*: how a corner relates to an estimated edge (section Edge Classifications)
 BEYOND = 1  # outside the gate, but within the error span
@@ -30,7 +30,7 @@ def predict_speed(speed: float, expected_speed: float) -> float:
 
 
 def predict_place(place: float, speed: float, direction: float, dt_s: float) -> float:
-    """L' = L + V'·t_f along β; either coordinate, px. ``direction``: cos β or sin β."""
+    """L' = L + V'·t_f along β, for one coordinate, px. ``direction``: cos β or sin β."""
     return place + speed * dt_s * direction
 
 
@@ -46,12 +46,12 @@ def classify(
     delta_px: float,
     eps_beta_rad: float,
 ) -> int:
-    """λ* of an edge and its corner, in the order 2, 3, 5, 1, 4: λ*5 is a part of λ*1 and would never come after it.
+    """λ* of an edge and its corner, tested in the order 2, 3, 5, 1, 4, since λ*5 is a special case of λ*1.
 
     ``moved``: from L, where the edge was (derotated), to the corner, px. ``ahead``: from L' to the corner, px.
-    ``speed``: V'. ``bl``: BL, px. ``delta_px``: δ. Speed agrees when the corner lies within half of BL of L' along the
-    line, direction when the corner moved along the flow within ``eps_beta_rad`` (displacements below corner noise have
-    none).
+    ``speed``: V'. ``bl``: BL, px. ``delta_px``: δ. Speed agrees when the corner lies within BL/2 of L' along the line,
+    direction when the corner moved along the flow within ``eps_beta_rad`` (displacements below corner noise have no
+    direction).
     """
     if math.fabs(moved_y * cos - moved_x * sin) > delta_px:
         return BREAKS
@@ -70,7 +70,7 @@ def classify(
 
 
 def update_position(trust: float, tr_cr: float, predicted: float, measured: float) -> float:
-    """L = ((Tr - Tr_cr)·L' + L_edge) / ((Tr - Tr_cr) + 1) (eq. EnEstimation, first line); any coordinate, px."""
+    """L = ((Tr - Tr_cr)·L' + L_edge) / ((Tr - Tr_cr) + 1) (eq. EnEstimation, first line), for one coordinate, px."""
     weight = max(trust - tr_cr, 0.0)
     return (weight * predicted + measured) / (weight + 1)
 
@@ -79,8 +79,8 @@ def update_speed(trust: float, tr_cr: float, speed: float, along: float, dt_s: f
     """V = V' ± distance/t_f, plus when the corner lies beyond L' along the line (eq. EnEstimation, second line).
 
     ``along``: px from L' to the corner along the line. The printed equation squares pixels and starts from V_ν; the
-    residual along the line has the unit of a speed. It enters with the weight that the corner has in L,
-    1/((Tr - Tr_cr) + 1): with its full weight the corner noise of one frame, divided by t_f, would be the noise of V.
+    residual along the line over t_f has the unit of a speed. It is weighted as the corner is in L,
+    1/((Tr - Tr_cr) + 1): unweighted, V would have the corner noise of one frame divided by t_f.
     """
     return speed + along / (dt_s * (max(trust - tr_cr, 0.0) + 1))
 
@@ -88,7 +88,7 @@ def update_speed(trust: float, tr_cr: float, speed: float, along: float, dt_s: f
 def update_gate(
     bl: float, speed: float, predicted_speed: float, corr: float, dt_s: float, min_px: float, max_px: float
 ) -> float:
-    """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), kept within [least, most] px."""
+    """BL = ½(|V' - V|·t_f / Corr + BL) (eq. EnEstimation, third line), within [``min_px``, ``max_px``]."""
     target = math.fabs(predicted_speed - speed) * dt_s / corr
     return min(max(0.5 * (target + bl), min_px), max_px)
 
@@ -96,14 +96,14 @@ def update_gate(
 def update_deviation(deviation: float, turn: float) -> float:
     """DL follows the turn of β (eq. of DL), rad; ``turn``: Δβ.
 
-    As printed, DL(k) = DL(k-1) - [Δβ - DL(k-1)], an error in DL doubles at every step; with the sign of the bracket
-    turned and half its weight it halves.
+    As printed, DL(k) = DL(k-1) - [Δβ - DL(k-1)], an error in DL doubles at every step; with the bracket's sign reversed
+    and weighted by one half, the error halves.
     """
     return flow.wrap(deviation + 0.5 * flow.wrap(flow.wrap(turn) - deviation))
 
 
 def bound_deviation(deviation: float) -> float:
-    """DL between -``MAX_DEVIATION_RAD`` and ``MAX_DEVIATION_RAD``."""
+    """Clamp DL to ±``MAX_DEVIATION_RAD``."""
     return min(max(deviation, -MAX_DEVIATION_RAD), MAX_DEVIATION_RAD)
 
 

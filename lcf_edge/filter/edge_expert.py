@@ -1,4 +1,4 @@
-"""Circle expert, edges: predicts E', classifies (λ*), updates, adds and deletes edges."""
+"""Circle expert, edges: predict E', classify (λ*), update, add and delete edges."""
 
 import math
 
@@ -12,19 +12,19 @@ from lcf_edge.messages import Cause
 
 MIN_CORR = 0.25
 CROSSING = int(Cause.CROSSING)
-SWING_SHARE = 0.2  # of its own motion, by which a rebel may miss its prediction
+SWING_SHARE = 0.2  # prediction error that a rebel may have, as a share of its motion
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
-MIN_RADIUS_PX = 1e-3  # nearer to the focus there is no direction from it
-STRAY_GATE_SHARE = 0.5  # BL of what has just shown how it moves, in shares of BL at birth
-FIXED_PX = 1  # a corner that stays may jump by the width of a pixel
-MAX_FIXED_STEP_S = 0.1  # of one frame: a few images minutes apart show no part of the vehicle
-JOIN_GATE_SHARE = 0.25  # and of its own motion, where it is expected to move as its circle
+MIN_RADIUS_PX = 1e-3  # nor one nearer to the focus
+STRAY_GATE_SHARE = 0.5  # BL of a new suspect, as a share of BL at birth
+FIXED_PX = 1  # jitter of a corner that does not move
+MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
+JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 
 
 def direct(edges: EdgeColumns, i: int, around: Situation) -> float:
-    """Set the direction in which an edge goes on; return its distance from O, px.
+    """Set the direction in which an edge is predicted; return its distance from O, px.
 
-    Normal edges go out along their flow line, rebels along β + DL, chains along β.
+    Normal edges move outward along their flow line, rebels along β + DL, chains along β.
     """
     dx, dy = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
     r = lengths.of(dx, dy)
@@ -37,10 +37,10 @@ def direct(edges: EdgeColumns, i: int, around: Situation) -> float:
 
 
 def predict(edges: EdgeColumns, normal: CircleColumns, around: Situation, settings: Settings) -> None:
-    """E': normal edges go out along their flow line, rebels and chains as they went.
+    """E': normal edges move outward along their flow line, rebels and chains continue their motion.
 
-    A newborn takes half of its speed from its circle; an edge that has proven itself, from itself: pulled towards a
-    circle of another depth, it would run beside its corner.
+    A new edge takes half of its speed from its circle; a trusted edge keeps its own: pulled towards a circle at another
+    depth, it would lose its corner.
     """
     for i in range(edges.count):
         r = direct(edges, i, around)
@@ -72,7 +72,7 @@ def relation_of(edges: EdgeColumns, i: int, x: float, y: float, delta_px: float,
 
 
 def go_on(edges: EdgeColumns, i: int) -> None:
-    """An edge goes on as predicted."""
+    """Move an edge to its prediction."""
     edges.x[i], edges.y[i], edges.speed[i] = edges.predicted_x[i], edges.predicted_y[i], edges.predicted_speed[i]
 
 
@@ -85,7 +85,7 @@ def update(
     dt_s: float,
     settings: Settings,
 ) -> None:
-    """Classify the pairs, update or predict every edge. ``delta_px``: δ. Corners that an edge claims are taken."""
+    """Classify the matched pairs and update every edge; unmatched ones follow their prediction. ``delta_px``: δ."""
     for i in range(edges.count):
         edges.matched[i] = 0
         corner = edges.corner[i]
@@ -107,7 +107,7 @@ def update(
 
 
 def take_corner(edges: EdgeColumns, i: int, corners: CornerColumns, corner: int, dt_s: float) -> None:
-    """An edge was seen, and looks as its corner does. ``dt_s``: t_f."""
+    """Mark an edge as matched; it takes its corner's appearance. ``dt_s``: t_f."""
     away_x, away_y = corners.pixel_x[corner] - edges.fixed_x[i], corners.pixel_y[corner] - edges.fixed_y[i]
     if max(away_x, -away_x) <= FIXED_PX and max(away_y, -away_y) <= FIXED_PX:
         edges.fixed_s[i] += min(dt_s, MAX_FIXED_STEP_S)
@@ -129,7 +129,7 @@ def correct(
     dt_s: float,
     settings: Settings,
 ) -> None:
-    """L, V, BL of an edge whose corner was found at (x, y) (eq. EnEstimation); β and DL of rebels and chains."""
+    """Update L, V, BL of an edge with its corner at (x, y) (eq. EnEstimation), and β and DL of rebels and chains."""
     trust, tr_cr = trust_in_prediction(edges, i, rebel, x, y, dt_s, settings), settings.tr_cr
     predicted = edges.predicted_speed[i]
     along = (x - edges.predicted_x[i]) * edges.cos[i] + (y - edges.predicted_y[i]) * edges.sin[i]
@@ -144,7 +144,7 @@ def correct(
         edges.bl[i], speed, predicted, corr, dt_s, settings.bl_min_px, settings.bl0_px
     )
     if edges.own_way(i):
-        swing = SWING_SHARE * dt_s * math.fabs(speed)  # what comes near accelerates in the image
+        swing = SWING_SHARE * dt_s * math.fabs(speed)  # what approaches accelerates in the image
         edges.bl[i] = max(edges.bl[i], swing)
         turn_own_way(edges, i)
 
@@ -152,10 +152,10 @@ def correct(
 def trust_in_prediction(
     edges: EdgeColumns, i: int, rebel: CircleColumns, x: float, y: float, dt_s: float, settings: Settings
 ) -> float:
-    """Tr of an edge, by which L' counts: less where what crosses goes on faster than it did.
+    """Tr that weights L' of an edge; reduced for a crossing rebel that outruns its prediction.
 
-    What comes near accelerates along its way: weighed by trust alone L' would fall behind by more and more, and miss
-    its gate where ``SWING_SHARE`` of the motion is more than that. So L is no more than δ behind its corner.
+    What approaches accelerates in the image: weighted by trust alone L' would lag ever farther behind, and leave its
+    gate where ``SWING_SHARE`` of the motion exceeds it. So L lags its corner by at most δ.
     """
     if not edges.rebel[i] or edges.circle[i] < 0 or rebel.cause[edges.circle[i]] != CROSSING:
         return edges.trust[i]
@@ -169,7 +169,7 @@ def trust_in_prediction(
 
 
 def turn_own_way(edges: EdgeColumns, i: int) -> None:
-    """β of a rebel or chain is the direction from its O, and DL follows its turn."""
+    """Update β of a rebel or chain, the direction from its O, and DL, which follows the turn of β."""
     dx, dy, before = edges.x[i] - edges.origin_x[i], edges.y[i] - edges.origin_y[i], edges.beta[i]
     if lengths.of(dx, dy) > MIN_ORIGIN_PX:
         edges.beta[i] = math.atan2(dy, dx)
@@ -187,7 +187,7 @@ def stray(
     dt_s: float,
     settings: Settings,
 ) -> None:
-    """λ*4 and λ*5: the corner goes to α, with the history of the edge whose law it broke, which was at (x0, y0)."""
+    """λ*4 and λ*5: the corner goes to α as a copy of the edge whose law it broke, which was at (x0, y0)."""
     row = edges.count
     edges.count += 1
     edge_rows.copy_row(edges, i, row)
@@ -205,7 +205,7 @@ def stray(
 
 
 def delete(edges: EdgeColumns, plane: ImagePlane, dead: Bytes, tr_cr: float) -> None:
-    """Edges whose trust ran out, or that left the frame. ``dead``: (capacity,) to note them in."""
+    """Delete edges below Tr_cr or outside the frame. ``dead``: (capacity,), scratch."""
     for i in range(edges.count):
         seen = image_plane.project(plane, edges.x[i], edges.y[i])
         dead[i] = 0 if seen and edges.trust[i] >= tr_cr else 1
@@ -213,7 +213,7 @@ def delete(edges: EdgeColumns, plane: ImagePlane, dead: Bytes, tr_cr: float) -> 
 
 
 def count_unclaimed(corners: CornerColumns) -> int:
-    """Corners outside ψ that no edge claims."""
+    """Number of corners outside ψ that no edge took."""
     unclaimed = 0
     for k in range(corners.count):
         if not corners.omitted[k] and not corners.taken[k]:
@@ -231,7 +231,7 @@ def add(
     key_number: int,
     settings: Settings,
 ) -> None:
-    """Corners that no edge claims are new landmarks (λ*1 among them), at most ``room``."""
+    """Add corners that no edge took as new landmarks (those of λ*1 too), at most ``room``."""
     for k in range(corners.count):
         if room > 0 and not corners.omitted[k] and not corners.taken[k]:
             room -= 1
@@ -250,7 +250,7 @@ def add(
 def first_expansion(
     x: float, y: float, normal: CircleColumns, groups: GroupColumns, around: Situation, settings: Settings
 ) -> float:
-    """V/r of a new landmark: what the circle of its λ group implies, else the ground, else a configured depth."""
+    """V/r of a new landmark: of its λ group's circle, else of the ground, else at the configured depth."""
     circle = line_expert.circle_at(groups, x, y)
     if circle >= 0:
         return normal.expansion[circle]
@@ -265,10 +265,7 @@ def first_expansion(
 
 
 def join_rebels(edges: EdgeColumns, start: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """New landmarks inside a rebel circle are expected to move as it does: they start in α with its motion.
-
-    ``start``: row of the first of them.
-    """
+    """Start new landmarks inside a rebel circle in α, with the circle's motion. ``start``: row of the first of them."""
     for i in range(start, edges.count):
         c = rebel_circles.circle_at(circles, edges.x[i], edges.y[i], settings)
         if c >= 0:

@@ -6,7 +6,7 @@ from lcf_edge.filter.memory import Bytes
 
 
 def copy_row(edges: EdgeColumns, source: int, target: int) -> None:
-    """One row over another, with its history."""
+    """Copy a row, with its history."""
     edges.x[target], edges.y[target] = edges.x[source], edges.y[source]
     edges.beta[target], edges.speed[target] = edges.beta[source], edges.speed[source]
     edges.bl[target], edges.trust[target] = edges.bl[source], edges.trust[source]
@@ -24,7 +24,7 @@ def copy_row(edges: EdgeColumns, source: int, target: int) -> None:
 
 
 def empty_row(edges: EdgeColumns, i: int) -> None:
-    """A row without a history."""
+    """Reset a row."""
     edges.x[i] = edges.y[i] = edges.beta[i] = edges.speed[i] = 0.0
     edges.bl[i] = edges.trust[i] = edges.deviation[i] = 0.0
     edges.origin_x[i] = edges.origin_y[i] = 0.0

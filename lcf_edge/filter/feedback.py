@@ -1,4 +1,4 @@
-"""Feedback: circles that are fully trusted become ψ, and ψ gives way to whatever breaks the flow."""
+"""Feedback: fully trusted normal circles become ψ, and ψ gives way to whatever breaks the flow."""
 
 import math
 
@@ -13,19 +13,19 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Shape
 
 PI = 3.141592653589793
-SURE_BASELINE_S = 0.2  # a history this long tells what moves from what stands
-RECTANGLE_FITS = 0.6  # a rectangle around the members of less than this share of the circle's area fits better
+SURE_BASELINE_S = 0.2  # history that distinguishes movers from the static scene
+RECTANGLE_FITS = 0.6  # ψ is a rectangle if that has less than this share of the circle's area
 MIN_PSI_FRAMES = 3.5
-CIRCLE_MARGINS = 2.0  # kept between ψ and a rebel circle, where an edge that breaks the flow has one
+CIRCLE_MARGINS = 2.0  # margins between ψ and a rebel circle; for a rebel edge it is one
 CIRCLE_SHAPE = int(Shape.CIRCLE)  # Ty
 RECTANGLE_SHAPE = int(Shape.RECTANGLE)
 
 
 class Candidates:
-    """Normal circles, a row each.
+    """Normal circles, one row each.
 
     ``ignored``: under an active ψ. ``passing``: the vehicle passes it at a distance. ``ready``: may write ψ.
-    ``members``: its edges; ``watched``: those with a history that tells what moves.
+    ``members``: number of its edges; ``watched``: of those with a history of ``SURE_BASELINE_S``.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -34,7 +34,7 @@ class Candidates:
 
 
 def advance(psi: PsiColumns, normal: CircleColumns, around: Situation) -> None:
-    """ψ moves with its circle's prediction and grows with it; it expires, and ends with its circle."""
+    """Move and grow ψ as its circle is predicted; ψ ends when it expires, or with its circle."""
     for p in range(psi.capacity):
         if not psi.active[p]:
             continue
@@ -49,7 +49,7 @@ def advance(psi: PsiColumns, normal: CircleColumns, around: Situation) -> None:
 
 
 def mark_ignored(candidates: Candidates, psi: PsiColumns) -> None:
-    """Normal circles under an active ψ."""
+    """Mark the normal circles under an active ψ."""
     for c in range(candidates.ignored.shape[0]):
         candidates.ignored[c] = 0
     for p in range(psi.capacity):
@@ -58,7 +58,7 @@ def mark_ignored(candidates: Candidates, psi: PsiColumns) -> None:
 
 
 def mark_ready(candidates: Candidates, normal: CircleColumns, around: Situation, settings: Settings) -> bool:
-    """Normal circles at Tr_max that are passed at a distance and have no ψ; return whether there are any."""
+    """Mark normal circles at Tr_max that are passed at a distance and have no ψ; return whether there are any."""
     some = False
     for c in range(normal.capacity):
         candidates.passing[c] = 1 if normal_circles.passes_by(normal, c, around) else 0
@@ -70,7 +70,7 @@ def mark_ready(candidates: Candidates, normal: CircleColumns, around: Situation,
 
 
 def keep_watched(candidates: Candidates, normal: CircleColumns, edges: EdgeColumns, keys: KeyFrames) -> None:
-    """Only circles most of whose edges have a history that tells what moves stay ready."""
+    """Keep only circles ready of whose edges most have a history of ``SURE_BASELINE_S``."""
     for c in range(normal.capacity):
         candidates.members[c] = candidates.watched[c] = 0
     for i in range(edges.count):
@@ -85,7 +85,7 @@ def keep_watched(candidates: Candidates, normal: CircleColumns, edges: EdgeColum
 
 
 def best_supported(candidates: Candidates, normal: CircleColumns) -> int:
-    """The circle that is ready with the most edges, -1: none is."""
+    """The ready circle with the most edges, -1: none."""
     best = -1
     for c in range(normal.capacity):
         if candidates.ready[c] and (best < 0 or normal.support[c] > normal.support[best]):
@@ -94,7 +94,7 @@ def best_supported(candidates: Candidates, normal: CircleColumns) -> int:
 
 
 def free_row(psi: PsiColumns) -> int:
-    """The first row that is not in use, -1: none."""
+    """The first row not in use, -1: none."""
     for p in range(psi.capacity):
         if not psi.active[p]:
             return p
@@ -102,7 +102,7 @@ def free_row(psi: PsiColumns) -> int:
 
 
 def write_region(psi: PsiColumns, p: int, normal: CircleColumns, c: int, life_s: float, ids: Ids) -> None:
-    """A circle writes ψ: with its centre and radius, or as a rectangle where that fits better."""
+    """Write the ψ of a circle: with its centre and radius, or as a rectangle where that fits better."""
     width, height, diameter = normal.width[c], normal.height[c], 2 * normal.radius[c]
     psi.active[p] = 1
     psi.id[p] = circles.new_id(ids)
@@ -125,9 +125,9 @@ def write(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """Normal circles at Tr_max write ψ, those with the most support first, their trust falls back to Tr_s.
+    """Write ψ for normal circles at Tr_max, best supported first; their trust falls back to Tr_s.
 
-    Return how many found no place.
+    Return how many did not fit.
     """
     mark_ignored(candidates, psi)
     if not mark_ready(candidates, normal, around, settings):
@@ -165,9 +165,9 @@ def end_near(psi: PsiColumns, x: float, y: float, reach_px: float) -> None:
 
 
 def end_aside(psi: PsiColumns, candidates: Candidates, plane: ImagePlane, margin_px: float) -> None:
-    """End the regions on the path, as in a turn what was beside may come to lie on it, and at the sides of the frame.
+    """End the regions that a turn brings onto the path, and those at the left or right side of the frame.
 
-    At the sides appears what nobody has seen yet.
+    At the sides new things appear.
     """
     for p in range(psi.capacity):
         if not psi.active[p]:

@@ -1,30 +1,30 @@
-"""Where what stands still goes in the image: angles, flow lines, the ideal camera, rotations as homographies."""
+"""Geometry of the flow: angles, flow lines, the pinhole camera, rotations as homographies."""
 
 import math
 
 from lcf_edge.filter.memory import Doubles
 
 PI = 3.141592653589793
-MIN_SCALE = 1e-6  # of a homography: what is behind the camera goes far away
+MIN_SCALE = 1e-6  # of a homography: points behind the camera are sent far away
 
 
 def wrap(angle: float) -> float:
-    """Angle in (-π, π]."""
+    """Wrap an angle to (-π, π]."""
     turned = math.fmod(PI - angle, 2 * PI)
     return PI - (turned + 2 * PI if turned < 0 else turned)
 
 
 def line_distance(dx: float, dy: float, cos: float, sin: float) -> float:
-    """Signed distance in px of an offset (dx, dy) from the line through the origin in the direction (cos β, sin β).
+    """Signed distance of an offset (dx, dy) from the line through the origin in the direction (cos β, sin β), px.
 
-    The paper's error-span condition with O as IC and tan β as the slope; signed, and without a pole at vertical
-    lines. Positive: to the right of the direction of flow as the image shows it (y down).
+    The paper's error-span condition with O as IC and tan β as the slope, but signed, and without the pole at vertical
+    lines. Positive: to the right of the direction of flow in the image (y down).
     """
     return dy * cos - dx * sin
 
 
 class Pinhole:
-    """The ideal camera that positions refer to, px. ``focal``: mean of ``fx`` and ``fy``."""
+    """The ideal pinhole camera, px. ``focal``: mean of ``fx`` and ``fy``."""
 
     def __init__(self, fx: float, fy: float, cx: float, cy: float) -> None:
         self.fx, self.fy, self.cx, self.cy = fx, fy, cx, cy
@@ -32,9 +32,9 @@ class Pinhole:
 
 
 class Homography:
-    """H = K·R·K⁻¹, row after row: where the image of distant points goes when the camera turns.
+    """H = K·R·K⁻¹, row-major: the image motion of points at infinity under a rotation.
 
-    ``x``, ``y``: the place that ``warp`` found, px.
+    ``x``, ``y``: result of ``warp``, px.
     """
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class Homography:
 
 
 def set_homography(h: Homography, pinhole: Pinhole, rotation: Doubles, k: int) -> None:
-    """H = K·R·K⁻¹ of the ``k``-th of rotations (n, 3, 3)."""
+    """Set H = K·R·K⁻¹ from the ``k``-th of rotations (n, 3, 3)."""
     h.xx = (pinhole.fx * rotation[k, 0, 0] + pinhole.cx * rotation[k, 2, 0]) / pinhole.fx
     h.yx = (pinhole.fy * rotation[k, 1, 0] + pinhole.cy * rotation[k, 2, 0]) / pinhole.fx
     h.wx = rotation[k, 2, 0] / pinhole.fx
@@ -57,7 +57,7 @@ def set_homography(h: Homography, pinhole: Pinhole, rotation: Doubles, k: int) -
 
 
 def warp(h: Homography, x: float, y: float) -> None:
-    """Set ``x``, ``y`` of a homography to where it takes an image position, px."""
+    """Map an image position, px; the result is in ``x``, ``y`` of the homography."""
     scale = 1 / max(h.wx * x + h.wy * y + h.ww, MIN_SCALE)
     h.x = (h.xx * x + h.xy * y + h.xw) * scale
     h.y = (h.yx * x + h.yy * y + h.yw) * scale

@@ -1,16 +1,16 @@
-"""What all edges together tell of the camera, over the window of key frames: errors of its rotation, and of O.
+"""Errors of the camera's rotation and of O, fitted to all edges over the window of key frames.
 
-What the gyro gets wrong in one frame hardly shows; over the window it does. An edge that stands still, was seen t
-seconds ago r px from the focus, and went outward by μ·r since, lies off its flow line by
+The gyro's error in one frame hardly shows; over the window it does. A stationary edge that was seen t seconds ago, r px
+from the focus, and has moved outward by μ·r since, lies off its flow line by
 
     drift = t·(a·ω) + μ·(sin β·ΔO_x - cos β·ΔO_y) + noise
 
-with ω the error of the rotation's rate, a the px across the flow for a turn of 1 rad about each axis, and ΔO the
-error of the focus. Least squares over edges from all over the image, robust against what moves, gives ω and ΔO with
-their covariance; a second one gives each key frame that edges enough have seen a rotation of its own, which it keeps
-when those edges are gone. How far edges stay off their lines after that (``scale_px``) tells how far they can be
-believed. What a turn moves in the image, only the lens tells; where it is guessed, edges stay off their lines by a
-share of that way (``turn_share``), which is learnt.
+with ω the error of the rotation rate, a the px across the flow for a rotation of 1 rad about each axis, and ΔO the
+error of the focus. Least squares over edges from all over the image, robust against movers, gives ω and ΔO with their
+covariance; a second fit gives each key frame seen by enough edges a rotation of its own, which it keeps when those
+edges are gone. The residuals after that (``scale_px``) are the noise that edges are judged by. How a turn moves the
+image depends on the lens; where that is guessed, the residuals grow with the motion by the turn, by a learnt share of
+it (``turn_share``).
 """
 
 import math
@@ -27,36 +27,36 @@ from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
 
 MIN_EDGES = 15
-MAX_EDGES = 320  # and so many are enough
-MIN_ELAPSED_S = 0.15  # over a shorter time an edge tells nothing
+MAX_EDGES = 320
+MIN_ELAPSED_S = 0.15  # shorter histories show nothing
 MIN_R_PX = 6.0  # nearer to the focus there is no flow line
-TURN_SHARE = 0.03  # of the way that a turn moves an edge, by which that may be wrong, before it is learnt
-TURN_MEMORY_S = 2.0  # over which it is
-MIN_TURN_PX = 4.0  # a shorter way tells nothing
-MIN_TURNED = 12  # edges that have it
-COLUMNS = 8  # cells of the image, that count alike however many edges they hold
+TURN_SHARE = 0.03  # error of the image motion by a turn, as a share of it, before it is learnt
+TURN_MEMORY_S = 2.0  # time constant of learning it
+MIN_TURN_PX = 4.0  # image motion by a turn that an edge needs to show that,
+MIN_TURNED = 12  # and edges that need it
+COLUMNS = 8  # cells of the image, whose edges count for no more than ``CELL_EDGES`` each
 ROWS = 6
-CELL_EDGES = 6.0  # edges of a cell that count fully
-NOISE_PX = 0.6  # 1 sigma of the drift of an edge that stands
-RATE_SIGMA_RADPS = 0.03  # of ω at least, over a window of ``WINDOW_S``, less over longer ones
+CELL_EDGES = 6.0
+NOISE_PX = 0.6  # 1 sigma of the drift of a stationary edge
+RATE_SIGMA_RADPS = 0.03  # least prior sigma of ω over a window of ``WINDOW_S``, less over longer ones
 WINDOW_S = 0.75
 ROUNDS = 8
-NARROWING = 0.7  # of the width beyond which an edge is an outlier, from round to round,
-MIN_WIDTH_PX = 0.7  # down to this
-FIRST_WIDTH = 3.0  # of the median drift, to begin with
-SLOT_EDGES = 10  # for a rotation of a key frame's own,
-UNSURE_SLOT_EDGES = 5  # where the gyro's bias leaves that uncertain by more than
+NARROWING = 0.7  # factor of the outlier width from round to round,
+MIN_WIDTH_PX = 0.7  # its minimum,
+FIRST_WIDTH = 3.0  # and its start, in median drifts
+SLOT_EDGES = 10  # edges for a key frame's own rotation,
+UNSURE_SLOT_EDGES = 5  # and where the gyro's bias leaves that uncertain by more than
 UNSURE_PX = 2.0
-UNSURE_SIGMAS = 2.0  # of that uncertainty by which an edge is no outlier yet
+UNSURE_SIGMAS = 2.0  # of that uncertainty, the outlier width to begin with
 SLOT_ROUNDS = 4
-SLOT_WIDTH_PX = 1.0  # beyond which an edge is an outlier in the end,
-SLOT_NARROWING = 0.5  # and how much narrower that is from round to round
-SLOT_SHARE = 0.3  # of the sigma of ω, by which key frames may differ,
-SLOT_SIGMA_RAD = 0.002  # and at least by this
-SCALE_SHARE = 0.35  # of the edges stay nearer to their lines than the quantile that tells the scale: movers do not,
-SCALE_SIGMAS = 0.4538  # which is so many sigmas of a normal distribution
-BINS = 256  # of a histogram of distances,
-BIN_PX = 0.05  # each so wide
+SLOT_WIDTH_PX = 1.0  # outlier width in the end,
+SLOT_NARROWING = 0.5  # and its factor from round to round
+SLOT_SHARE = 0.3  # prior sigma of a key frame's own rotation, as a share of that of ω,
+SLOT_SIGMA_RAD = 0.002  # plus this
+SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do not reach it;
+SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
+BINS = 256  # of the histogram of residuals,
+BIN_PX = 0.05  # and their width
 UNKNOWNS = 5
 FOCUS_X = 3
 FOCUS_Y = 4
@@ -65,14 +65,13 @@ FOCUS_Y = 4
 class FlowFit:
     """The fit of one frame.
 
-    ``count``: edges behind it, 0: too few, and the rest is as of no fit. ``focus_x``, ``focus_y``: ΔO, px;
-    ``focus_sigma_x``, ``focus_sigma_y``: 1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``turn_share``: 1
-    sigma of where a turn moves an edge, as a share of that way, learnt from frame to frame. ``scale_px``: 1 sigma of
-    what stays off the flow lines besides.
+    ``count``: edges used, 0: too few for a fit. ``focus_x``, ``focus_y``: ΔO, px; ``focus_sigma_x``, ``focus_sigma_y``:
+    1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``turn_share``: 1 sigma of the image motion by a turn,
+    as a share of it, learnt from frame to frame. ``scale_px``: 1 sigma of the residuals apart from that.
 
-    A row an edge: ``drift``, px; ``turned``: how far the turn moved it across the flow, px; ``pitch``, ``yaw``,
-    ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: what ΔO does to
-    the drift; ``share``: weight by its cell; ``slot``; ``cell``; ``rest``: what is left of the drift, px.
+    One row per edge: ``drift``, px; ``turned``: image motion across the flow by the turn, px; ``pitch``, ``yaw``,
+    ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: derivative of the drift by ΔO; ``share``: weight by its cell;
+    ``slot``; ``cell``; ``rest``: residual, px.
     """
 
     def __init__(self) -> None:
@@ -102,7 +101,7 @@ def shows_flow(edges: EdgeColumns, i: int, keys: KeyFrames, settings: Settings) 
 def gather(
     fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, settings: Settings
 ) -> None:
-    """Take the edges that tell, at most ``MAX_EDGES``, evenly."""
+    """Gather the edges that show the flow, evenly thinned to at most ``MAX_EDGES``."""
     fit.count = 0
     telling = 0
     for i in range(edges.count):
@@ -122,7 +121,7 @@ def gather(
 
 
 def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole) -> None:
-    """Note one edge: its drift since the key frame in ``slot``, and what each unknown would make of it."""
+    """Add one edge: its drift since the key frame in ``slot``, and its derivative by each unknown."""
     x = lines.then_x(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     y = lines.then_y(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
@@ -149,14 +148,14 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
 
 
 def shows_turn(fit: FlowFit, k: int) -> bool:
-    """Whether a turn moved an edge by at least what it is off its line: what is off by more moves by itself."""
+    """Whether a turn moved an edge by at least its residual: with a larger one it is a mover."""
     return fit.turned[k] >= max(MIN_TURN_PX, math.fabs(fit.rest[k]))
 
 
 def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -> float:
-    """Distance that this share of the edges stay within, px, of ``rest``; at most ``BINS``·``BIN_PX``.
+    """Quantile of |``rest``|, px, from a histogram; at most ``BINS``·``BIN_PX``.
 
-    Of all or of those that tell of a turn, their distances less what ``turn_share`` makes of them.
+    Over all edges or those that show a turn, each residual reduced by what ``turn_share`` explains of it.
     """
     for b in range(BINS):
         fit.bins[b] = 0
@@ -177,21 +176,21 @@ def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -
 
 
 def weight_of(rest_px: float, width_px: float) -> float:
-    """Weight of an edge by what is left of its drift (Geman and McClure): what moves by itself hardly counts."""
+    """Weight of an edge by its residual (Geman and McClure): movers hardly count."""
     ratio = rest_px / width_px
     outlying = 1 + ratio * ratio
     return 1 / (outlying * outlying)
 
 
 def set_row(fit: FlowFit, k: int) -> None:
-    """What each unknown does to the drift of an edge."""
+    """Set the row of the normal equations for an edge."""
     t = fit.elapsed_s[k]
     fit.equations.row[0], fit.equations.row[1], fit.equations.row[2] = t * fit.pitch[k], t * fit.yaw[k], t * fit.roll[k]
     fit.equations.row[FOCUS_X], fit.equations.row[FOCUS_Y] = fit.on_x[k], fit.on_y[k]
 
 
 def explained(fit: FlowFit) -> float:
-    """Drift that the answer explains of the edge whose row was set, px."""
+    """Drift that the solution explains, of the edge whose row was set, px."""
     drift = 0.0
     for i in range(fit.equations.unknowns):
         drift += fit.equations.row[i] * fit.equations.solution[i]
@@ -199,7 +198,7 @@ def explained(fit: FlowFit) -> float:
 
 
 def rate_sigma(fit: FlowFit, baselines: Baselines, focal: float) -> float:
-    """1 sigma of ω before the fit, rad/s: of the gyro, as its key frames add it up, but never too sure."""
+    """Prior sigma of ω, rad/s: by the gyro's accumulated uncertainty, with a lower bound."""
     longest, sigma = WINDOW_S, 0.0
     for k in range(fit.count):
         t = fit.elapsed_s[k]
@@ -209,7 +208,7 @@ def rate_sigma(fit: FlowFit, baselines: Baselines, focal: float) -> float:
 
 
 def solve(fit: FlowFit, sigma_radps: float) -> None:
-    """ω and ΔO, round by round narrower."""
+    """Solve for ω and ΔO by reweighted least squares; the outlier width narrows from round to round."""
     for k in range(fit.count):
         fit.rest[k] = fit.drift[k]
     width = max(1.0, FIRST_WIDTH * quantile(fit, 0.5, False, 0.0))
@@ -234,10 +233,7 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
 def turn_slot(
     fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float, width: float
 ) -> None:
-    """A rotation of key frame ``k``'s own, of what is left; the key frame keeps it.
-
-    ``width``: px, beyond which an edge is an outlier at first.
-    """
+    """Fit key frame ``k``'s own rotation to the residuals, and keep it there. ``width``: first outlier width, px."""
     fit.equations.solution[0] = fit.equations.solution[1] = fit.equations.solution[2] = 0.0
     for _ in range(SLOT_ROUNDS):
         least_squares.begin(fit.equations, 3)
@@ -263,7 +259,7 @@ def turn_slot(
 
 
 def slot_edges(fit: FlowFit, k: int) -> int:
-    """Edges that were first seen at key frame ``k``."""
+    """Number of edges whose history begins at key frame ``k``."""
     edges = 0
     for j in range(fit.count):
         if fit.slot[j] == k:
@@ -272,7 +268,7 @@ def slot_edges(fit: FlowFit, k: int) -> int:
 
 
 def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
-    """Correct the baselines by ω and ΔO, and note what stays uncertain."""
+    """Correct the baselines by ω and ΔO, and set their remaining uncertainty."""
     turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
     fit.focus_x, fit.focus_y = fit.equations.solution[FOCUS_X], fit.equations.solution[FOCUS_Y]
     least_squares.invert(fit.equations)
@@ -299,7 +295,7 @@ def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole,
 
 
 def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
-    """What edges that a turn moved stay off their lines by, beyond the noise of all, as a share of that way."""
+    """Learn ``turn_share`` from the residuals, beyond noise, of the edges that a turn moved."""
     turned, way2 = 0, 0.0
     for k in range(fit.count):
         if shows_turn(fit, k):
@@ -322,7 +318,7 @@ def measure(
     dt_s: float,
     settings: Settings,
 ) -> None:
-    """Fit the frame, and correct the baselines by it. ``prior_x``, ``prior_y`` must be set."""
+    """Fit this frame and correct the baselines. ``prior_x``, ``prior_y`` must be set."""
     fit.focus_x = fit.focus_y = fit.scale_px = 0.0
     fit.focus_sigma_x, fit.focus_sigma_y = fit.prior_x, fit.prior_y
     gather(fit, edges, keys, baselines, pinhole, settings)
