@@ -1,9 +1,9 @@
-"""How fast the vehicle is, as the ground tells that is seen below the horizon.
+"""The vehicle's speed from the flow of the ground below the horizon.
 
-The ground at a row b px below the horizon lies at Z = h·f/b. A point of it that has gone outwards by μ of its distance
-from O over a time T says V = μ·Z/T. What stands above the ground is nearer than the ground in its row and says more;
-what is farther, or moves along, says less. The ground is one plane: most of what is below the horizon agrees, in rows
-near and far; of a wall, only those of some rows do.
+The ground at a row b px below the horizon lies at Z = h·f/b. A point on it that has moved outward by μ of its distance
+from O in a time T gives V = μ·Z/T. A point above the ground is nearer than the ground in its row and gives more; one
+farther off, or moving along, gives less. Points on the ground plane agree in rows near and far, those on a wall only
+in some rows.
 """
 
 import math
@@ -15,25 +15,25 @@ from lcf_edge.filter.memory import integers
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.situation import Situation
 
-BINS = 60  # of the speed, in equal ratios
+BINS = 60  # of the speed, spaced logarithmically
 SLOWEST_MPS = 0.05
-BIN_RATIO = 0.125  # of the logarithm of the speed
-SPREAD = 0.15  # within which what is on the ground agrees, of the logarithm
+BIN_RATIO = 0.125  # width of a bin, of ln(speed)
+SPREAD = 0.15  # within which points on the ground agree, of ln(speed)
 MIN_EDGES = 12
-MIN_SHARE = 0.3  # of the edges below the horizon, that agree
-MIN_BELOW = 0.06  # px below the horizon for each px of the focal length; farther off a row has no range
-OUTWARD_SIGMAS = 3.0  # by which a way outwards is above its noise
-MIN_ROWS = 0.15  # 1 sigma of the logarithm of b, of those that agree; on a wall it is less
-SLOPE_SIGMA_RAD = 0.02  # 1 sigma of the ground against the horizon, with the camera's pitch
-MIN_SIGMA = 0.06  # of the logarithm
+MIN_SHARE = 0.3  # of the edges below the horizon, that must agree
+MIN_BELOW = 0.06  # least b/f; higher rows are too near the horizon to have a range
+OUTWARD_SIGMAS = 3.0  # by which outward motion must exceed its noise
+MIN_ROWS = 0.15  # least standard deviation of ln(b) of those that agree; a wall has less
+SLOPE_SIGMA_RAD = 0.02  # 1 sigma of the ground's slope and the camera's pitch together
+MIN_SIGMA = 0.06  # of ln(speed)
 NAN = float("nan")
 
 
 class GroundSpeed:
-    """``speed_mps``: V as the ground shows it, mean of the window, NaN: unknown; ``sigma_mps``: 1 sigma of it.
+    """``speed_mps``: V from the ground, mean over the window, NaN: unknown; ``sigma_mps``: 1 sigma of it.
 
-    ``measured_mps``: V over the same window by IMU, odometry or configuration. ``elapsed_s``: the window. ``votes``:
-    (BINS,).
+    ``measured_mps``: V over the same window by IMU, odometry or configuration. ``elapsed_s``: length of the window.
+    ``votes``: (BINS,).
     """
 
     def __init__(self) -> None:
@@ -45,12 +45,12 @@ class GroundSpeed:
 
 
 def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> float:
-    """V by one edge, if it is on the ground, m/s; 0: it tells nothing."""
+    """V from one edge, if it lies on the ground, m/s; 0: unknown."""
     below = edges.y[verdicts.row[j]] - around.horizon_y
     if below < MIN_BELOW * around.pinhole.focal:
         return 0.0
     slot = verdicts.slot[j]
-    outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # backwards
+    outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # reversing
     if outward < OUTWARD_SIGMAS * (verdicts.sigma[j] + around.noise_px) or verdicts.r[j] <= 0:
         return 0.0
     range_m = around.camera_height_m * around.pinhole.focal / below
@@ -66,7 +66,7 @@ def bin_of(speed_mps: float) -> int:
 
 
 def fullest(ground: GroundSpeed) -> int:
-    """The bin that most edges lie in and beside, -1: too few do."""
+    """The bin with the most votes in it and its neighbours, -1: too few."""
     most = best = -1
     for k in range(1, BINS - 1):
         votes = ground.votes[k - 1] + ground.votes[k] + ground.votes[k + 1]
@@ -78,7 +78,7 @@ def fullest(ground: GroundSpeed) -> int:
 def measure(
     ground: GroundSpeed, edges: EdgeColumns, verdicts: Verdicts, baselines: Baselines, around: Situation
 ) -> None:
-    """What the ground tells in this frame."""
+    """Measure the speed in this frame."""
     ground.speed_mps = ground.sigma_mps = ground.measured_mps = NAN
     if not around.camera_height_m > 0:
         return

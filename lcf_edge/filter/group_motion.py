@@ -1,9 +1,9 @@
-"""How edges that go together move in the image: mean velocity and rate of expansion, by weighted least squares.
+"""Image motion of edges that move together: mean velocity and rate of expansion, by weighted least squares.
 
 An edge that was at x' a time T ago and is at x now has the velocity v = (x - x')/T halfway between, with the standard
-deviation √2·σ/T of two places. What its rotation leaves uncertain is common to all and added once. Of a set of edges
-v = v̄ + e·(x - x̄): an object that comes nearer expands by e in all directions, one that goes to the side does not. Two
-that part to the side, taken for one, expand in width alone: then their height tells e.
+deviation √2·σ/T of two positions. The uncertainty of the rotation is common to all and added once. For a set of edges
+v = v̄ + e·(x - x̄): an approaching object expands by e in all directions, one that moves sideways does not. Two things
+that move apart sideways, taken for one, expand in width alone: then e is that of the height.
 """
 
 import math
@@ -17,24 +17,24 @@ from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.situation import Situation
 
 FAR_PX = 1e9
-PIECE_NOISE = 0.35  # 1 sigma of the place of a piece, small px
-PIECE_HALF = 2.0  # and what it shows reaches so far from its middle, small px
+PIECE_NOISE = 0.35  # 1 sigma of the position of a piece, small px
+PIECE_HALF = 2.0  # distance from its centre of the two edges that stand for it, small px
 MIN_SPREAD = 1e-9
-PARTS_SIGMAS = 5.0  # of both, by which the expansions in width and in height differ where there is more than one thing,
-PARTS_SHARE = 0.3  # and by this share of the larger
-MIN_GROUND = 4  # edges that tell a plane from what stands upright
-LIKE_GROUND = 0.25  # of the logarithm of a speed: moves no otherwise than the ground does
-GROUND_GAIN = 16.0  # χ² that it must gain, in mean squares of what it leaves
+PARTS_SIGMAS = 5.0  # of both, by which the expansions in width and height differ where there is more than one thing,
+PARTS_SHARE = 0.3  # plus this share of the larger
+MIN_GROUND = 4  # edges needed to distinguish a level plane from something upright
+LIKE_GROUND = 0.25  # of ln(speed), within which edges move as the ground does
+GROUND_GAIN = 16.0  # by which the plane must reduce χ², in mean squared residuals
 
 
 class MotionSums:
-    """Sums over the edges of a circle or an object, a row each; the sums of parts add up to those of the whole.
+    """Sums over the edges of a circle or object, one row each; the sums of parts add up to those of the whole.
 
-    ``count``: edges. With the weight w = 1/σ_v² of each edge, s²/px²: ``weight`` Σw; ``x``, ``y`` Σw·x of the places
+    ``count``: edges. With the weight w = 1/σ_v² of each edge, s²/px²: ``weight`` Σw; ``x``, ``y`` Σw·x of the positions
     halfway, px; ``vx``, ``vy`` Σw·v, px/s; ``xx``, ``yy`` Σw·x², Σw·y²; ``xvx``, ``yvy`` Σw·x·v_x, Σw·y·v_y;
     ``focus_x``, ``focus_y`` Σw·O of the displacement since; ``forward`` Σw·(ΔZ/T), m/s; ``elapsed`` Σw·T; ``common``
     Σw·σ of the rotation's rate, px/s. With b, px below the horizon: ``b2v0`` Σw·b², ``b4v0`` Σw·b⁴, ``b1v1`` Σw·b·v_y,
-    ``b2v1`` Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: where the edges are now, px.
+    ``b2v1`` Σw·b²·v_y, ``b0v2`` Σw·v_y². ``left``, ``top``, ``right``, ``bottom``: bounding box of the edges now, px.
 
     ``expansion``, 1/s, and ``spread``, s²: see ``fit_expansion``.
     """
@@ -51,7 +51,7 @@ class MotionSums:
 
 
 def clear(sums: MotionSums, k: int) -> None:
-    """No edges."""
+    """Reset the sums of a row."""
     sums.count[k] = 0
     sums.weight[k] = sums.x[k] = sums.y[k] = sums.vx[k] = sums.vy[k] = 0.0
     sums.xx[k] = sums.yy[k] = sums.xvx[k] = sums.yvy[k] = sums.focus_x[k] = sums.focus_y[k] = 0.0
@@ -62,7 +62,7 @@ def clear(sums: MotionSums, k: int) -> None:
 
 
 def add_motion(sums: MotionSums, k: int, weight: float, x: float, y: float, vx: float, vy: float) -> None:
-    """Take the velocity of one place."""
+    """Add the velocity of one point."""
     sums.weight[k] += weight
     sums.x[k] += weight * x
     sums.y[k] += weight * y
@@ -77,7 +77,7 @@ def add_motion(sums: MotionSums, k: int, weight: float, x: float, y: float, vx: 
 def add_edge(
     sums: MotionSums, k: int, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
 ) -> None:
-    """Take one edge, as it moved since the key frame that its verdict looks back to."""
+    """Add one edge, as it moved since the key frame of its verdict."""
     i, slot = verdicts.row[j], verdicts.slot[j]
     elapsed_s = baselines.elapsed_s[slot]
     weight = elapsed_s * elapsed_s / (2 * around.noise_px * around.noise_px)
@@ -101,7 +101,7 @@ def add_edge(
 
 
 def add_patch(sums: MotionSums, k: int, patches: Patches, p: int, around: Situation) -> None:
-    """Take a patch, as four edges that grow as it does and move with its middle."""
+    """Add a patch, as four edges that move with its centre and expand as it does."""
     elapsed_s, half = patches.elapsed_s[p], patches.half_px[p]
     then, now = half, half * patches.scale[p]
     reach, sigma = 0.5 * (then + now), patches.sigma[p] * half / elapsed_s
@@ -123,7 +123,7 @@ def add_patch(sums: MotionSums, k: int, patches: Patches, p: int, around: Situat
 
 
 def add_piece(sums: MotionSums, k: int, coarse: CoarseMotion, p: int, around: Situation) -> None:
-    """Take a piece of the image in small, as two edges in its middle."""
+    """Add a piece of the downscaled image, as two edges about its centre."""
     elapsed_s, noise_px, half = coarse.elapsed_s[p], PIECE_NOISE * coarse.side, PIECE_HALF * coarse.side
     weight = elapsed_s * elapsed_s / (2 * noise_px * noise_px)
     vx, vy = coarse.vx[p], coarse.vy[p]
@@ -139,7 +139,7 @@ def add_piece(sums: MotionSums, k: int, coarse: CoarseMotion, p: int, around: Si
 
 
 def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
-    """Take all edges of a part."""
+    """Add all edges of a part."""
     sums.count[k] += part.count[c]
     sums.weight[k] += part.weight[c]
     sums.x[k] += part.x[c]
@@ -165,10 +165,10 @@ def add(sums: MotionSums, k: int, part: MotionSums, c: int) -> None:
 
 
 def fit_expansion(sums: MotionSums, k: int) -> None:
-    """``expansion``: Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|², and ``spread``, 1/σ² of it, Σw·|x - x̄|².
+    """Set ``expansion`` = Σw·(x - x̄)·(v - v̄) / Σw·|x - x̄|², and ``spread``, 1/σ² of it, Σw·|x - x̄|².
 
-    Where edges expand otherwise in width than in height they are of things that part, or meet, to the side: then the
-    height alone tells.
+    Where width and height expand differently, the edges belong to things that move apart or together sideways: then the
+    height alone counts.
     """
     weight, x, y = sums.weight[k], sums.x[k], sums.y[k]
     wide, tall = max(sums.xx[k] - x * x / weight, MIN_SPREAD), max(sums.yy[k] - y * y / weight, MIN_SPREAD)
@@ -183,11 +183,11 @@ def fit_expansion(sums: MotionSums, k: int) -> None:
 
 
 def is_ground(sums: MotionSums, k: int, around: Situation) -> bool:
-    """Whether edges move as a level plane does, rather than as what stands upright on it.
+    """Whether edges move as a level plane rather than as something upright on it.
 
-    All of an upright thing is equally far: its edges move by v_y = m·b. Those of a plane are the nearer the lower they
-    are seen: v_y = κ·b². Neither m nor κ need be known, nor the vehicle's speed; the better fit tells, by χ². Nor is it
-    upright where κ is that of the ground all around.
+    An upright thing is all at one range: its edges move by v_y = m·b. Points of a plane are nearer the lower they are
+    seen: v_y = κ·b². The better fit by χ² decides; neither m, nor κ, nor the vehicle's speed need be known. It is a
+    plane, too, where κ is that of the ground around.
     """
     if sums.top[k] <= around.horizon_y or not sums.b2v0[k] > 0:
         return False
@@ -198,5 +198,5 @@ def is_ground(sums: MotionSums, k: int, around: Situation) -> bool:
         return False
     upright = sums.b1v1[k] * sums.b1v1[k] / sums.b2v0[k]
     level = sums.b2v1[k] * sums.b2v1[k] / sums.b4v0[k]
-    left = max(sums.b0v2[k] - level, sums.count[k])  # of χ², by the level plane
+    left = max(sums.b0v2[k] - level, sums.count[k])  # residual χ² of the level plane
     return level - upright > GROUND_GAIN * left / sums.count[k]

@@ -1,6 +1,6 @@
-"""Where the camera goes in its own axes: how it is mounted, how it shakes, and what turns add.
+"""Direction of travel in camera axes: how the camera is mounted, how it shakes, and what turns add.
 
-A camera that sits L before the axle that does not steer goes sideways by ω·L in a turn, so that O lies L·ω/V beside
+A camera mounted L ahead of the axle that does not steer moves sideways at ω·L in a turn, so that O lies L·ω/V beside
 the heading. L, the lever arm, is learnt together with the yaw of the mounting.
 """
 
@@ -11,29 +11,29 @@ from lcf_edge.filter.flow_fit import FlowFit
 from lcf_edge.filter.memory import Doubles
 from lcf_edge.filter.situation import Situation
 
-PITCH_MEMORY_S = 1.0  # shaking faster than this turns the camera, not the way of the vehicle
+PITCH_MEMORY_S = 1.0  # faster shaking turns the camera, not the vehicle's direction of travel
 YAW_MEMORY_S = 0.3
-MOUNTING_SIGMA_RAD = 0.05  # by which the configured mounting may be wrong
-SHAKE_SIGMA_RAD = 0.004  # and by which the heading differs from it from frame to frame
-MOUNTING_DRIFT_RAD = 0.0005  # in a second
-FIT_WINDOW_S = 0.7  # fits nearer to each other in time tell the same
-MAX_MOUNTING_SIGMAS = 3.0  # that one fit may ask for
-LEVER_WIDTHS = 1.0  # half widths of the vehicle by which the camera may sit before the axle, 1 sigma
-LEVER_DRIFT = 0.1  # half widths by which that may be more in a second of turning, as wheels slip
+MOUNTING_SIGMA_RAD = 0.05  # of the configured mounting
+SHAKE_SIGMA_RAD = 0.004  # of the heading about the mounting, from frame to frame
+MOUNTING_DRIFT_RAD = 0.0005  # per √s
+FIT_WINDOW_S = 0.7  # fits closer in time are not independent
+MAX_MOUNTING_SIGMAS = 3.0  # largest shift that one fit may ask for
+LEVER_WIDTHS = 1.0  # 1 sigma of the lever arm, half widths of the vehicle
+LEVER_DRIFT = 0.1  # its growth in a second of turning, as wheels slip, half widths
 MIN_SPEED_MPS = 0.1
-MAX_CURVATURE = 2.0  # 1/m; a path with more is a turn on the spot, where O is of no use
+MAX_CURVATURE = 2.0  # 1/m; beyond, it is a turn on the spot, where O is of no use
 MIN_VARIANCE = 1e-12
-STRAIGHT_RADPS = 0.03  # a slower turn is as good as none, whatever the speed
+STRAIGHT_RADPS = 0.03  # slower turns are negligible at any speed
 INFINITY = float("inf")
 
 
 class Heading:
-    """The direction in which the camera goes, in its axes: the mounting, how it shakes, and what turns add.
+    """Direction of travel of the camera, in its axes.
 
-    ``ray_x``, ``ray_y``: x/z and y/z of the vehicle's heading, now; ``aside_x``: what a turn adds to ``ray_x``;
-    ``mounted_x``, ``mounted_y``: the heading at rest, with 1 sigma of that, ``sigma_x``, ``sigma_y``, rad; ``lever_m``:
-    how far the camera sits before the axle, with ``lever_sigma_m``; ``shared``: covariance of both with each other,
-    rad m. ``curvature``: ω/V of a turn that shows, 1/m.
+    ``ray_x``, ``ray_y``: x/z and y/z of the vehicle's heading now; ``aside_x``: what a turn adds to ``ray_x``;
+    ``mounted_x``, ``mounted_y``: the same without shaking, by the mounting, with 1 sigma ``sigma_x``, ``sigma_y``, rad;
+    ``lever_m``: lever arm from the axle ahead to the camera, with ``lever_sigma_m``; ``shared``: covariance of
+    ``mounted_x`` and ``lever_m``, rad m. ``curvature``: ω/V, 1/m, 0 in a turn too slight to show.
     """
 
     def __init__(self, camera: Camera, half_width_m: float) -> None:
@@ -46,7 +46,7 @@ class Heading:
 
 
 def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_s: float) -> None:
-    """Shaking turns the camera and not the heading, a turn of the vehicle both. ``rotation``: (1, 3, 3)."""
+    """Update the heading: shaking turns the camera alone, a turn of the vehicle both. ``rotation``: (1, 3, 3)."""
     x = rotation[0, 0, 0] * heading.ray_x + rotation[0, 0, 1] * heading.ray_y + rotation[0, 0, 2]
     y = rotation[0, 1, 0] * heading.ray_x + rotation[0, 1, 1] * heading.ray_y + rotation[0, 1, 2]
     z = rotation[0, 2, 0] * heading.ray_x + rotation[0, 2, 1] * heading.ray_y + rotation[0, 2, 2]
@@ -57,7 +57,7 @@ def turn_heading(heading: Heading, rotation: Doubles, yaw_rate_radps: float, dt_
 
 
 def turn_aside(heading: Heading, speed_mps: float, yaw_rate_radps: float) -> None:
-    """O lies L·ω/V beside the heading, to the left in a left turn; not in one on the spot, or at an unknown speed."""
+    """Set ``curvature`` and ``aside_x``: O lies L·ω/V beside the heading; nothing where the speed is unknown or 0."""
     heading.curvature = 0.0
     if math.fabs(speed_mps) > MIN_SPEED_MPS:
         curvature = min(max(yaw_rate_radps / speed_mps, -MAX_CURVATURE), MAX_CURVATURE)
@@ -67,19 +67,19 @@ def turn_aside(heading: Heading, speed_mps: float, yaw_rate_radps: float) -> Non
 
 
 def focus_sigma_rad(mounting_sigma_rad: float) -> float:
-    """1 sigma of O before the flow tells, rad: of the mounting, and of how the heading shakes."""
+    """Prior sigma of O, rad: of the mounting, and of the shaking heading."""
     return math.sqrt(mounting_sigma_rad * mounting_sigma_rad + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD)
 
 
 def sideways_sigma_rad(heading: Heading) -> float:
-    """1 sigma of the way O lies to the side, rad: of the mounting's yaw and of the lever arm in this turn."""
+    """1 sigma of O to the side, rad: of the mounting's yaw and of the lever arm in this turn."""
     lever_rad = heading.lever_sigma_m * heading.curvature
     variance = heading.sigma_x * heading.sigma_x + lever_rad * lever_rad - 2 * heading.curvature * heading.shared
     return math.sqrt(max(variance, MIN_VARIANCE))
 
 
 def learn_mounting(heading: Heading, around: Situation, fit: FlowFit) -> None:
-    """Kalman filter over mounting and lever arm: what a frame's fit tells of O, slowly."""
+    """Update the Kalman filters of mounting and lever arm with the O of one frame's fit."""
     fx, fy, dt_s = around.pinhole.fx, around.pinhole.fy, around.dt_s
     shift_rad = unpulled(fit.focus_x / fx, fit.prior_x / fx, fit.focus_sigma_x / fx)
     noise = fit_noise(fit.prior_x / fx, fit.focus_sigma_x / fx, dt_s)
@@ -92,7 +92,7 @@ def learn_mounting(heading: Heading, around: Situation, fit: FlowFit) -> None:
 
 
 def knows_curvature(around: Situation) -> bool:
-    """Whether ω/V is what ``turn_aside`` takes it for; not at an unknown speed, but straight ahead."""
+    """Whether ω/V is known: neither too tight a turn, nor a turn at an unknown speed."""
     turning = math.fabs(around.yaw_rate_radps)
     if math.fabs(around.speed_mps) > MIN_SPEED_MPS:
         return turning <= MAX_CURVATURE * math.fabs(around.speed_mps)
@@ -100,9 +100,9 @@ def knows_curvature(around: Situation) -> bool:
 
 
 def learn_sideways(heading: Heading, shift_rad: float, noise: float, dt_s: float) -> None:
-    """One step for the mounting's yaw x and the lever arm L, of O beside where it was taken to be: Δx - ΔL·ω/V.
+    """Kalman update of the mounting's yaw x and the lever arm L by a sideways shift of O, Δx - ΔL·ω/V.
 
-    ``noise``: variance of that shift, rad².
+    ``noise``: variance of the shift, rad².
     """
     lever_variance = heading.lever_sigma_m * heading.lever_sigma_m
     of_x = heading.sigma_x * heading.sigma_x - heading.curvature * heading.shared
@@ -121,16 +121,17 @@ def learn_sideways(heading: Heading, shift_rad: float, noise: float, dt_s: float
 
 
 def unpulled(shift_rad: float, prior_rad: float, sigma_rad: float) -> float:
-    """Shift of O that the flow alone tells, without the pull of the fit's prior, rad; no more than a few sigmas."""
+    """Shift of O by the flow alone, without the pull of the fit's prior, rad; clamped to ``MAX_MOUNTING_SIGMAS``."""
     alone = shift_rad * prior_rad * prior_rad / max(prior_rad * prior_rad - sigma_rad * sigma_rad, MIN_VARIANCE)
     most = MAX_MOUNTING_SIGMAS * prior_rad
     return min(max(alone, -most), most)
 
 
 def fit_noise(prior_rad: float, sigma_rad: float, dt_s: float) -> float:
-    """Variance of what one fit tells of the mounting, rad²; infinite: nothing. 1 sigma of O before and after the fit.
+    """Variance of one fit as a measurement of the mounting, rad²; infinite: it measures nothing.
 
-    The heading shakes besides, and fits close in time tell the same.
+    ``prior_rad``, ``sigma_rad``: 1 sigma of O before and after the fit. The heading shakes, too, and fits close in time
+    are not independent.
     """
     information = 1 / max(sigma_rad * sigma_rad, MIN_VARIANCE) - 1 / (prior_rad * prior_rad)  # by the flow alone
     if information <= 0:
@@ -144,5 +145,5 @@ def mounting_gain(mounting_rad: float, noise: float) -> float:
 
 
 def drifted(sigma_rad: float, gain: float, dt_s: float) -> float:
-    """1 sigma of the mounting after a fit and a frame interval, rad."""
+    """1 sigma of the mounting after an update and a frame interval, rad."""
     return math.sqrt((1 - gain) * sigma_rad * sigma_rad + MOUNTING_DRIFT_RAD * MOUNTING_DRIFT_RAD * dt_s)

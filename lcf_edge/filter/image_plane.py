@@ -1,15 +1,15 @@
-"""Where positions of the ideal pinhole are seen in the input frame: the lens, one position at a time."""
+"""Projection from the ideal pinhole through the lens into the input frame, one position at a time."""
 
 import math
 
 from lcf_edge.lens import Lens
 
 NAN = float("nan")
-MIN_RADIUS = 1e-9  # of a ray, x/z and y/z; nearer to the axis a lens changes nothing
+MIN_RADIUS = 1e-9  # of a ray, in x/z and y/z; nearer to the axis the lens changes nothing
 
 
 class ImagePlane:
-    """The input frame of a lens, with its model (see ``lens``). ``u``, ``v``: the place that ``project`` found, px."""
+    """The input frame and lens model (see ``lens``). ``u``, ``v``: result of ``project``, px."""
 
     def __init__(self, lens: Lens) -> None:
         self.width, self.height = lens.width, lens.height
@@ -22,7 +22,7 @@ class ImagePlane:
 
 
 def distort(plane: ImagePlane, x: float, y: float) -> None:
-    """Set ``u``, ``v`` to where the lens shows a position of the ideal pinhole, px; NaN beyond its model's reach."""
+    """Distort a position of the ideal pinhole into ``u``, ``v``, px; NaN beyond the reach of the lens model."""
     x = (x - plane.cx) / plane.fx
     y = (y - plane.cy) / plane.fy
     s = x * x + y * y
@@ -34,13 +34,13 @@ def distort(plane: ImagePlane, x: float, y: float) -> None:
     q = ray * ray
     gain = 1 + q * (plane.k1 + q * (plane.k2 + q * (plane.k3 + q * plane.k4))) + 2 * (plane.p2 * x + plane.p1 * y)
     if plane.is_equidistant:
-        gain *= ray / max(r, MIN_RADIUS)  # θ/r; the middle stays where it is
+        gain *= ray / max(r, MIN_RADIUS)  # θ/r; the principal point stays where it is
     plane.u = (x * gain + plane.p2 * s) * plane.fx + plane.cx
     plane.v = (y * gain + plane.p1 * s) * plane.fy + plane.cy
 
 
 def project(plane: ImagePlane, x: float, y: float) -> bool:
-    """Set ``u``, ``v`` to where a position of the ideal pinhole is seen, px. Return whether that is in the image."""
+    """Project a position of the ideal pinhole into ``u``, ``v``, px; return whether it is in the image."""
     plane.u, plane.v = x, y
     if plane.is_distorted:
         distort(plane, x, y)

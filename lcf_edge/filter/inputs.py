@@ -1,4 +1,4 @@
-"""What one step of the filter takes."""
+"""Input of one step of the filter."""
 
 from dataclasses import dataclass
 
@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 APPEARANCE_SAMPLES = 16
-KEYS = 16  # key frames that an edge remembers
+KEYS = 16  # key frames in an edge's history
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +14,7 @@ class Corners:
     """The corners of one frame (the paper's Edge).
 
     ``pixel``: int32 (n, 2), x and y in the input frame. ``position``: float32 (n, 2), px of the ideal pinhole, lens
-    distortion removed. ``appearance``: uint8 (n, 16), grey samples around the corner, their mean moved to 128.
+    distortion removed. ``appearance``: uint8 (n, 16), grey samples around the corner, shifted to a mean of 128.
     """
 
     pixel: npt.NDArray[np.int32]

@@ -1,4 +1,4 @@
-"""The key frames of α: how the vehicle has turned and moved since each."""
+"""The key frames of α: rotation and displacement since each."""
 
 import math
 
@@ -10,10 +10,10 @@ from lcf_edge.filter.memory import Doubles, doubles, memory_of
 
 
 class KeyFrames:
-    """A point that stands still at X in the axes of key frame k is now at ``rotation[k]``·X - ``displacement[k]``.
+    """A stationary point at X in the axes of key frame k is now at ``rotation[k]``·X - ``displacement[k]``.
 
     ``elapsed_s``: since each. ``sigma_rad``: uncertainty of the rotation since. ``number``: key frames so far; the slot
-    of key frame i is i mod KEYS. ``since_s``: time since the last one. ``step``: (1, 3, 3), room for a rotation.
+    of key frame i is i mod KEYS. ``since_s``: time since the last one. ``step``: (1, 3, 3), scratch for a rotation.
     """
 
     def __init__(self) -> None:
@@ -26,7 +26,7 @@ class KeyFrames:
 
 
 def turn_one(keys: KeyFrames, k: int, rotation: Doubles) -> None:
-    """A rotation (1, 3, 3) comes on top of that since the key frame in slot ``k``."""
+    """Add a rotation (1, 3, 3) to that since the key frame in slot ``k``."""
     for j in range(3):
         x, y, z = keys.rotation[k, 0, j], keys.rotation[k, 1, j], keys.rotation[k, 2, j]
         for i in range(3):
@@ -37,9 +37,9 @@ def turn_one(keys: KeyFrames, k: int, rotation: Doubles) -> None:
 
 
 def learn(keys: KeyFrames, k: int, x: float, y: float, z: float, sigma_rad: float) -> None:
-    """The flow tells the rotation since the key frame in slot ``k``: it was mistaken by so much, rad about each axis.
+    """Correct the rotation since the key frame in slot ``k`` by a measured error, rad about each axis.
 
-    ``sigma_rad``: what stays uncertain.
+    ``sigma_rad``: remaining uncertainty.
     """
     keys.step[0, 0, 0] = keys.step[0, 1, 1] = keys.step[0, 2, 2] = 1.0
     keys.step[0, 0, 1], keys.step[0, 0, 2], keys.step[0, 1, 2] = -z, y, -x
@@ -49,7 +49,7 @@ def learn(keys: KeyFrames, k: int, x: float, y: float, z: float, sigma_rad: floa
 
 
 def turn(keys: KeyFrames, rotation: Doubles) -> None:
-    """A rotation (1, 3, 3) comes on top of those since each key frame: R ← rotation·R, d ← rotation·d."""
+    """Add a rotation (1, 3, 3) to those since all key frames: R ← rotation·R, d ← rotation·d."""
     for k in range(KEYS):
         turn_one(keys, k, rotation)
 
@@ -57,10 +57,10 @@ def turn(keys: KeyFrames, rotation: Doubles) -> None:
 def advance(
     keys: KeyFrames, rotation: Doubles, ahead_x: float, ahead_y: float, ahead_z: float, way_m: float, dt_s: float
 ) -> None:
-    """Account for the motion of one frame interval.
+    """Add the motion of one frame interval.
 
     ``rotation``: (1, 3, 3). ``ahead_x``, ``ahead_y``, ``ahead_z``: unit direction of travel, camera axes. ``way_m``:
-    how far the vehicle drove, as the chord of an arc.
+    distance driven, as the chord of an arc.
     """
     turn(keys, rotation)
     for i in range(3):
@@ -74,14 +74,14 @@ def advance(
 
 
 def inflate(keys: KeyFrames, sigma_rad: float, dt_s: float) -> None:
-    """Account for what the rotation of the last interval leaves uncertain."""
+    """Add the uncertainty of the last interval's rotation."""
     keys.rate_sigma_radps = sigma_rad / dt_s
     for k in range(KEYS):
         keys.sigma_rad[k] = math.sqrt(keys.sigma_rad[k] * keys.sigma_rad[k] + sigma_rad * sigma_rad)
 
 
 def scale(keys: KeyFrames, factor: float) -> None:
-    """The vehicle has driven so many times as far since each; 0: it has stood all the while."""
+    """Scale the displacements since all key frames; 0: the vehicle was stationary."""
     for k in range(KEYS):
         for i in range(3):
             keys.displacement[k, i] *= factor
@@ -101,11 +101,11 @@ def mark(keys: KeyFrames) -> int:
 
 
 def oldest_key(edges: EdgeColumns, i: int, keys: KeyFrames) -> int:
-    """Number of the oldest key frame within the window that an edge has seen."""
+    """Number of the oldest key frame within the window in which an edge was seen."""
     return max(edges.born_key[i], keys.number - KEYS)
 
 
 def has_history(edges: EdgeColumns, i: int, keys: KeyFrames, min_s: float) -> bool:
-    """Whether an edge has been seen for so long."""
+    """Whether an edge has a history of at least ``min_s``."""
     oldest = oldest_key(edges, i, keys)
     return oldest < keys.number and keys.elapsed_s[oldest % KEYS] >= min_s

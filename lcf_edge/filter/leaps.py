@@ -1,8 +1,8 @@
-"""What leaps across the image: its corners are found by what neighbours agree on, not by what is predicted.
+"""Leaps across the image: corners that prediction loses are found by a shift that neighbours agree on.
 
-Where most of the edges that were just seen have no corner where the camera's motion and their own put them, nothing
-that is predicted fits. There every pair of such an edge and a free corner that look alike votes for its shift; a shift
-that most of them share, and no other one, is how that part of the image moved.
+Where most of the edges just seen have no corner where camera motion and their own motion predict it, prediction is no
+help. There every pair of such an edge and a similar free corner votes for its shift; if one shift has most of the
+votes and no rival, that part of the image moved by it.
 """
 
 from lcf_edge.filter import image_plane, matching, rounding
@@ -14,22 +14,23 @@ from lcf_edge.filter.settings import Settings
 
 COLUMNS = 8  # parts of the image
 ROWS = 6
-REACH_SHARE = 0.16  # of the image's width, by which something may leap
-BINS = 50  # of shifts, each way
+REACH_SHARE = 0.16  # longest leap, as a share of the image's width
+BINS = 50  # of shifts, in each direction
 SIDE = BINS + 1  # of the table of shifts
-MIN_LOST = 4  # edges without a corner that a part needs
-LOST_SHARE = 0.6  # of those that were just seen
+MIN_LOST = 4  # lost edges that a part needs,
+LOST_SHARE = 0.6  # as a share of those just seen, too
 MIN_VOTES = 4
-AGREEING_SHARE = 0.25  # of the edges that ask
-RIVAL_SHARE = 0.4  # of the votes, that no other shift may have
-MAX_ASKING = 120  # edges in a frame
+AGREEING_SHARE = 0.25  # of the lost edges, that must vote for the shift
+RIVAL_SHARE = 0.4  # of the best shift's votes, that no other may exceed
+MAX_ASKING = 120  # lost edges in a frame that are searched for
 
 
 class Leaps:
-    """Work space. A row an asking edge: ``rows``, its own; ``part``; ``u``, ``v``: where it was, px of the input frame.
+    """Work space. One row per lost ("asking") edge: ``rows``, its own; ``part``; ``u``, ``v``: its position, px of the
+    input frame.
 
-    A row a part: ``seen``, ``lost``. A row a shift, which is ``across`` * ``SIDE`` + ``down``: ``votes``, and ``voter``
-    (the edge that voted for it last). ``shifts``: the ``count`` of them that have votes; the others have 0 and -1.
+    One row per part: ``seen``, ``lost``. One row per shift, ``across`` * ``SIDE`` + ``down``: ``votes``, and ``voter``,
+    the edge that voted for it last. ``shifts``: the ``count`` of them that have votes; the others have 0 and -1.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -43,7 +44,7 @@ class Leaps:
 
 
 def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
-    """Which edges were seen in the last frame and have no corner now, by parts of the image."""
+    """Gather the edges seen in the last frame that have no corner now, by parts of the image."""
     for p in range(COLUMNS * ROWS):
         leaps.seen[p] = leaps.lost[p] = 0
     leaps.asking = 0
@@ -64,12 +65,12 @@ def ask(leaps: Leaps, plane: ImagePlane, edges: EdgeColumns) -> None:
 
 
 def is_lost(leaps: Leaps, part: int) -> bool:
-    """Whether nothing that is predicted fits in a part of the image."""
+    """Whether prediction failed in a part of the image."""
     return leaps.lost[part] >= MIN_LOST and leaps.lost[part] > LOST_SHARE * leaps.seen[part]
 
 
 def list_far(index: CornerIndex, corners: CornerColumns, u: float, v: float, reach: float, near_px: float) -> int:
-    """List the places of the free corners within ``reach`` of (u, v), px, but not near by. Return how many."""
+    """List the free corners farther than ``near_px`` from (u, v) and nearer than ``reach``; return how many."""
     count, reach2, near2 = 0, reach * reach, near_px * near_px
     left, right = matching.first_cell(u, reach, index.columns), matching.last_cell(u, reach, index.columns)
     for row in range(matching.first_cell(v, reach, index.rows), matching.last_cell(v, reach, index.rows) + 1):
@@ -90,7 +91,7 @@ def vote(
     reach: float,
     settings: Settings,
 ) -> None:
-    """An asking edge votes for its shift to each free corner that looks like it: within ``reach``, px, not near by."""
+    """Vote for the shift of an asking edge to each similar free corner in the ring up to ``reach``, px."""
     i, u, v = leaps.rows[k], leaps.u[k], leaps.v[k]
     most = matching.likeness_needed(matching.contrast(edges, i), settings)
     for n in range(list_far(index, corners, u, v, reach, settings.leap_px)):
@@ -105,7 +106,7 @@ def vote(
 
 
 def add_vote(leaps: Leaps, shift: int, i: int) -> None:
-    """One edge votes for a shift, once."""
+    """Count an edge's vote for a shift, once."""
     if leaps.voter[shift] == i:
         return
     if not leaps.votes[shift]:
@@ -116,7 +117,7 @@ def add_vote(leaps: Leaps, shift: int, i: int) -> None:
 
 
 def most_votes(leaps: Leaps) -> None:
-    """The shift with the most votes; of equals the first in the table."""
+    """Find the shift with the most votes, of equals the first in the table."""
     best = leaps.most = 0
     for k in range(leaps.count):
         shift = leaps.shifts[k]
@@ -127,7 +128,7 @@ def most_votes(leaps: Leaps) -> None:
 
 
 def rival_votes(leaps: Leaps) -> int:
-    """How many votes the best shift has that is another one."""
+    """Votes of the best shift that is not next to the winner."""
     rival = 0
     for k in range(leaps.count):
         shift = leaps.shifts[k]
@@ -138,7 +139,7 @@ def rival_votes(leaps: Leaps) -> int:
 
 
 def forget(leaps: Leaps) -> None:
-    """Take back all votes."""
+    """Reset all votes."""
     for k in range(leaps.count):
         leaps.votes[leaps.shifts[k]] = 0
         leaps.voter[leaps.shifts[k]] = -1
@@ -154,9 +155,9 @@ def take(
     reach: float,
     settings: Settings,
 ) -> int:
-    """An asking edge takes the corner that looks most like it where the shift of its part puts it; how many it found.
+    """Give an asking edge the most similar corner where the shift of its part puts it; return 1 if there is one.
 
-    A shift of ``across`` stands for all between it and the next one but one.
+    A shift of ``across`` stands for all between it and the next but one.
     """
     step = reach / (BINS / 2.0)
     i = leaps.rows[k]
@@ -187,7 +188,7 @@ def find(
     corners: CornerColumns,
     settings: Settings,
 ) -> int:
-    """Corners for the edges of what leaps; return how many were found. After ``matching.find``."""
+    """Find corners for the edges of parts that leapt, after ``matching.find``; return how many were found."""
     ask(leaps, plane, edges)
     reach = REACH_SHARE * plane.width
     found = 0

@@ -1,18 +1,18 @@
-"""Weighted linear least squares of a few unknowns, by the normal equations and Cholesky's factors."""
+"""Weighted linear least squares with a few unknowns, by the normal equations and Cholesky factorisation."""
 
 import math
 
 from lcf_edge.filter.memory import doubles
 
 MAX_UNKNOWNS = 5
-MIN_PIVOT = 1e-12  # of a matrix that priors keep positive definite
+MIN_PIVOT = 1e-12  # guards a matrix that priors keep positive definite
 
 
 class NormalEquations:
     """(Σ w·aᵀa + prior)·solution = Σ w·a·b, for up to ``MAX_UNKNOWNS``.
 
-    ``row``: a, to be filled before ``add``. ``solution``: after ``solve``. ``inverse``: of the matrix, after
-    ``invert``; times the variance of a measurement of weight 1 it is the covariance of the solution.
+    ``row``: a, to be set before ``add``. ``solution``: after ``solve``. ``inverse``: of the matrix, after ``invert``;
+    times the variance of a measurement of weight 1 it is the covariance of the solution.
     """
 
     def __init__(self) -> None:
@@ -22,7 +22,7 @@ class NormalEquations:
 
 
 def begin(equations: NormalEquations, unknowns: int) -> None:
-    """Nothing is measured yet."""
+    """Reset the equations."""
     equations.unknowns = unknowns
     for i in range(unknowns):
         equations.right[i] = 0.0
@@ -31,12 +31,12 @@ def begin(equations: NormalEquations, unknowns: int) -> None:
 
 
 def add_prior(equations: NormalEquations, i: int, weight: float) -> None:
-    """The ``i``-th unknown is 0, with this weight."""
+    """Add the prior that the ``i``-th unknown is 0, with this weight."""
     equations.matrix[i, i] += weight
 
 
 def add(equations: NormalEquations, weight: float, measured: float) -> None:
-    """``row``·solution = ``measured``, with this weight."""
+    """Add the measurement ``row``·solution = ``measured``, with this weight."""
     for i in range(equations.unknowns):
         weighted = weight * equations.row[i]
         equations.right[i] += weighted * measured
@@ -45,7 +45,7 @@ def add(equations: NormalEquations, weight: float, measured: float) -> None:
 
 
 def factorise(equations: NormalEquations) -> None:
-    """matrix = factor·factorᵀ, the factor lower triangular."""
+    """Factorise: matrix = factor·factorᵀ, the factor lower triangular."""
     for i in range(equations.unknowns):
         for j in range(i + 1):
             rest = equations.matrix[i, j]
@@ -58,7 +58,7 @@ def factorise(equations: NormalEquations) -> None:
 
 
 def substitute(equations: NormalEquations) -> None:
-    """``solution`` from ``right``, with the factors as they are."""
+    """Solve for ``right`` with the present factor."""
     last = equations.unknowns - 1
     for i in range(equations.unknowns):
         rest = equations.right[i]
@@ -80,7 +80,7 @@ def solve(equations: NormalEquations) -> None:
 
 
 def invert(equations: NormalEquations) -> None:
-    """Set ``inverse``, after ``solve``; ``right`` and ``solution`` are used up."""
+    """Set ``inverse``, after ``solve``; overwrites ``right`` and ``solution``."""
     for j in range(equations.unknowns):
         for i in range(equations.unknowns):
             equations.right[i] = 1.0 if i == j else 0.0

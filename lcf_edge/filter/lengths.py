@@ -1,4 +1,4 @@
-"""Lengths of offsets in the image; the .pxd beside it is a header that serves the compiled modules."""
+"""Lengths of offsets in the image; the .pxd beside it is a header for the compiled modules."""
 
 import math
 

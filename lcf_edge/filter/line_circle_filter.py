@@ -1,4 +1,4 @@
-"""The filter: one step takes a frame's corners and the vehicle's motion, and leaves its tables up to date."""
+"""The filter: one step takes a frame's corners and the vehicle's motion, and updates the tables."""
 
 import math
 from dataclasses import dataclass, replace
@@ -66,19 +66,19 @@ from lcf_edge.small_image import SmallImage
 Matrix = npt.NDArray[np.float64]
 Grey = npt.NDArray[np.uint8]
 
-SURPRISE_PX = 4.0  # a rotation may exceed the latest ones by this
-SURPRISES = 3.0  # and by so many times what the gyro lately missed
-GYRO_SIGMAS = 3.0  # within which a rotation is looked for
-NOISE_SHARE = 0.7  # of what stays off the flow lines, which is of two places, is the noise of one
-DELTA_SIGMAS = 4.0  # of it, within which an edge of the flow stays
-GROUND_SLOPE_RAD = 0.002  # 1 sigma by which the ground ahead slopes otherwise than the way of the vehicle
-SLOWEST_MPS = 0.05  # that tells a direction
-FORGET = 0.3  # share of what the gyro missed that the latest frame tells
+SURPRISE_PX = 4.0  # slack of the gates for an unpredicted rotation,
+SURPRISES = 3.0  # plus this many times the rotation that the gyro lately missed,
+GYRO_SIGMAS = 3.0  # but at most this many sigmas of the gyro
+NOISE_SHARE = 0.7  # noise of one position, as a share of the residual, which has that of two
+DELTA_SIGMAS = 4.0  # of the residual, within which an edge follows the flow
+GROUND_SLOPE_RAD = 0.002  # 1 sigma of the slope of the ground ahead, against the path
+SLOWEST_MPS = 0.05  # slower motion has no direction
+FORGET = 0.3  # weight of the latest frame in the mean of what the gyro missed
 
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """The rotation that the flow alone shows to be missing, without the gyro's prior.
+    """The rotation that the gyro missed, by the flow alone, without the gyro's prior.
 
     ``turn_rad``: rotation vector (3,) of directions, as in ``Motion.rotation``; ``sigma_rad``: (3,), 1 sigma.
     """
@@ -89,9 +89,10 @@ class Residual:
 
 @dataclass(frozen=True, slots=True)
 class Mounting:
-    """How the camera is mounted, as the flow tells it while the vehicle drives; signs as in ``camera.*_rad``.
+    """How the camera is mounted, learnt from the flow while driving; signs as in ``camera.*_rad``.
 
-    ``ahead_m``: of the axle that does not steer. ``pitch_sigma_rad``, ``yaw_sigma_rad``, ``ahead_sigma_m``: 1 sigma.
+    ``ahead_m``: distance ahead of the axle that does not steer. ``pitch_sigma_rad``, ``yaw_sigma_rad``,
+    ``ahead_sigma_m``: 1 sigma.
     """
 
     pitch_rad: float
@@ -104,10 +105,9 @@ class Mounting:
 
 @dataclass(frozen=True, slots=True)
 class Step:
-    """What one step tells besides the tables.
+    """Results of one step besides the tables.
 
-    ``omitted``: bool (corners,), inside ψ. ``residual``: the rotation that the gyro missed, None: too few edges tell
-    it.
+    ``omitted``: bool (corners,), inside ψ. ``residual``: the rotation that the gyro missed, None: too few edges.
     """
 
     omitted: Mask
@@ -119,7 +119,7 @@ class LineCircleFilter:
     """The Line-Circle filter. Pure: no I/O, no clock, no threads; the same input gives the same bytes.
 
     All tables are allocated here, from ``config.memory``. Positions are px of the ideal pinhole of ``lens``; the lens
-    itself is used only to find corners by their place in the frame.
+    itself is used only to look up corners by their position in the frame.
     """
 
     def __init__(self, config: Config, lens: Lens) -> None:
@@ -144,13 +144,13 @@ class LineCircleFilter:
         self._rest = RestTest()
         self._driving = DrivingTest()
         self.ground = GroundSpeed()
-        self._scale_px = 0.0  # of the last fit: what has become of it is not known until the next
+        self._scale_px = 0.0  # of the last fit, kept until the next
         self._homography = Homography()
         self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
         self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
         self._off_line = OffLine()
         self._speed_mps = math.nan  # of the last frame
-        self._missing_px = self._settings.leap_px  # by which the gyro lately missed the rotation
+        self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
         self._leaps = Leaps(capacity)
@@ -163,11 +163,11 @@ class LineCircleFilter:
         self._turmoil = Turmoil(lens.width, lens.height)
         self._squares = Squares(memory.circles_rebel, memory.objects, capacity)
         self._candidates = Candidates(memory.circles_normal)
-        self._ids = Ids()  # one count, so that an id names one circle of either kind
+        self._ids = Ids()  # one count, so that an id is unique among both kinds
         self._psi_ids, self._object_ids = Ids(), Ids()
 
     def table_bytes(self) -> dict[str, int]:
-        """Bytes of each preallocated table; the work space of a step, which is kept too, takes less than the edges."""
+        """Bytes of each preallocated table; the work space of a step, also kept, takes less than the edges."""
         return {
             "edges (E_n, E_r, α)": self.edges.nbytes,
             "circles_normal (C_n)": self.normal.nbytes,
@@ -178,17 +178,17 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
-            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its images, three laid out
+            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its images, three repacked
         }
 
     @property
     def focus(self) -> tuple[float, float]:
-        """O: where the vehicle is heading, px."""
+        """O, the focus of expansion, px."""
         return self._around.focus_x, self._around.focus_y
 
     @property
     def mounting(self) -> Mounting:
-        """How the camera is mounted, as far as it is learnt."""
+        """The mounting as learnt so far."""
         heading = self._heading
         return Mounting(
             math.atan(heading.mounted_y),
@@ -201,7 +201,7 @@ class LineCircleFilter:
 
     @property
     def stands(self) -> bool:
-        """Whether the image says that the vehicle stands, although a speed is measured."""
+        """Whether the vehicle is stationary by the image, although a speed is measured."""
         return bool(self._rest.stands)
 
     @property
@@ -210,10 +210,10 @@ class LineCircleFilter:
         return bool(self._driving.drives)
 
     def step(self, corners: Corners, motion: Motion, image: Grey | None = None, small: Grey | None = None) -> Step:
-        """Take one frame. ``motion.dt_s`` must be positive.
+        """Process one frame. ``motion.dt_s`` must be positive.
 
-        ``image``: uint8 (height, width), which the corners are of; without one no patches are followed.
-        ``small``: the same as ``small_image`` makes it; without one no coarse motion is seen.
+        ``image``: uint8 (height, width), from which the corners come; without it no patches are tracked.
+        ``small``: the same, downscaled by ``small_image``; without it no coarse motion is measured.
         """
         motion = self._rested(motion)
         self._take(corners)
@@ -244,7 +244,7 @@ class LineCircleFilter:
         )
 
     def _rested(self, motion: Motion) -> Motion:
-        """The motion, at speed 0 where the image says that the vehicle stands, whatever speed was measured."""
+        """The motion, with speed 0 where the vehicle is stationary by the image."""
         self._rest.measured_mps = motion.speed_mps
         if not self._rest.stands:
             return motion
@@ -252,7 +252,7 @@ class LineCircleFilter:
         return replace(motion, speed_mps=0.0)
 
     def _take(self, corners: Corners) -> None:
-        """The frame's corners, and the index that finds them by their place."""
+        """Take the frame's corners, and index them by position."""
         if len(corners) > self.corners.capacity:
             self.corners = CornerTable(len(corners))
             self._index = CornerIndex(self._plane.width, self._plane.height, len(corners))
@@ -263,7 +263,7 @@ class LineCircleFilter:
         matching.fill(self._index, self.corners.columns)
 
     def _derotate(self, motion: Motion) -> None:
-        """Step 0, and the predictions of circles and ψ."""
+        """Step 0, and the prediction of circles, patches, objects and ψ."""
         rotation = _memory(motion.rotation)
         headings.turn_heading(self._heading, rotation, motion.path_yaw_rate_radps, motion.dt_s)
         headings.turn_aside(self._heading, motion.speed_mps, motion.path_yaw_rate_radps)
@@ -280,10 +280,10 @@ class LineCircleFilter:
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
     def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
-        """Account for the motion; of an unknown speed only the direction counts, as if it were 1 m/s.
+        """Add the motion to the key frames; an unknown speed counts as 1 m/s, as only the direction matters then.
 
-        Once it is known the vehicle is taken to have driven at it all the while: else what stands still would seem to
-        have kept up with a metre a second.
+        Once the speed is known, the vehicle is taken to have driven at it since the key frames: otherwise the static
+        scene would seem to have kept up with 1 m/s.
         """
         before, self._speed_mps = self._speed_mps, motion.speed_mps
         if math.isfinite(motion.speed_mps) and not math.isfinite(before):
@@ -296,7 +296,7 @@ class LineCircleFilter:
         key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, speed * motion.dt_s, motion.dt_s)
 
     def _warp(self, rotation: Doubles) -> None:
-        """H = K·R·K⁻¹ on every stored image position."""
+        """Apply H = K·R·K⁻¹ to every stored image position."""
         flow.set_homography(self._homography, self._pinhole, rotation, 0)
         coarse_motion.turn(self._coarse, rotation)
         roll = math.atan2(rotation[0, 1, 0], rotation[0, 0, 0])
@@ -312,7 +312,7 @@ class LineCircleFilter:
         edge_expert.predict(self.edges.columns, self.normal.columns, self._around, self._settings)
 
     def _omit(self) -> int:
-        """Corners inside ψ; how many."""
+        """Omit corners inside ψ; return how many."""
         return line_expert.omit(
             self.psi.columns,
             self._index,
@@ -324,24 +324,24 @@ class LineCircleFilter:
         )
 
     def _collect(self) -> int:
-        """λ; how many circles found no place."""
+        """Fill λ; return how many circles did not fit."""
         normal, rebel = self.normal.columns, self.rebel.columns
         return line_expert.collect(self.groups.columns, normal, rebel, self._settings.tr_cr)
 
     def _find(self, motion: Motion) -> None:
-        """Corners for edges."""
+        """Match edges and corners."""
         slack_px = self._slack_px(motion)
         edges, corners, settings = self.edges.columns, self.corners.columns, self._settings
         matching.find(self._index, self._plane, edges, corners, slack_px, settings)
         leaps.find(self._leaps, self._index, self._plane, edges, corners, settings)
 
     def _slack_px(self, motion: Motion) -> float:
-        """By how much the rotation may shift the image: as the gyro says, or, without one, as it lately did."""
+        """Uncertainty of the image shift by the rotation, px: by the gyro, or, if less, by what it lately missed."""
         gyro_px = GYRO_SIGMAS * motion.rotation_sigma_rad * self._pinhole.focal
         return min(gyro_px, SURPRISE_PX + SURPRISES * self._missing_px, self._settings.leap_px)
 
     def _refine(self, motion: Motion) -> tuple[float, Residual | None]:
-        """Take out the rotation that the gyro missed; return what stays uncertain, rad, and what the flow tells."""
+        """Take out the rotation that the gyro missed; return the remaining sigma, rad, and the residual."""
         residual = None
         sigma_rad, off, edges = motion.rotation_sigma_rad, self._off_line, self.edges.columns
         corners, settings = self.corners.columns, self._settings
@@ -355,12 +355,12 @@ class LineCircleFilter:
             self._warp(rotation)
             derotation.derotate_predictions(edges, self._homography)
         else:
-            self._missing_px = settings.leap_px  # lost: look everywhere
+            self._missing_px = settings.leap_px  # lost: search everywhere
         key_frames.inflate(self._keys, sigma_rad, self._around.dt_s)
         return sigma_rad, residual
 
     def _update(self, sigma_rad: float) -> None:
-        """Edges classified, updated, deleted."""
+        """Classify, update and delete edges."""
         edges, settings = self.edges.columns, self._settings
         delta_px = settings.delta_px + 2 * sigma_rad * self._pinhole.focal
         dt_s = self._around.dt_s
@@ -370,9 +370,9 @@ class LineCircleFilter:
         edge_expert.delete(edges, self._plane, self._dead, settings.tr_cr)
 
     def _add(self) -> int:
-        """New landmarks; how many edges, old or new, found no place.
+        """Add new landmarks; return how many edges, old or new, did not fit.
 
-        When the table is full, newborns take the place of edges that are trusted less than they are.
+        When the table is full, new edges replace those trusted less than they are.
         """
         edges, settings = self.edges, self._settings
         room = min(edges.normal_room(), edges.capacity - edges.count)
@@ -399,7 +399,7 @@ class LineCircleFilter:
         return evicted
 
     def _detect(self) -> tuple[int, int]:
-        """α: judge every edge that was seen and has a history; return how many rebels break the flow, and evictions."""
+        """α: judge every matched edge that has a history; return how many rebels break the flow, and evictions."""
         edges, keys, baselines, around = self.edges.columns, self._keys, self._baselines, self._around
         verdicts, recent, settings = self._verdicts, self._recent, self._settings
         key = bool(alpha.key_is_due(edges, keys, around.dt_s, settings))
@@ -420,7 +420,7 @@ class LineCircleFilter:
         return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
 
     def _fit_flow(self) -> None:
-        """What the whole image tells of rotation, O and noise; the mounting learns from it; whether it stands."""
+        """Fit rotation, O and noise to the whole image; learn the mounting; test whether the vehicle is stationary."""
         fit, around, heading, pinhole = self._fit, self._around, self._heading, self._pinhole
         fit.prior_x = headings.focus_sigma_rad(headings.sideways_sigma_rad(heading)) * pinhole.fx
         fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy
@@ -442,7 +442,7 @@ class LineCircleFilter:
         rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)
 
     def _make_room(self, requested: int) -> tuple[int, int]:
-        """Room for so many new rebels: weak ones go home. Return how many may be born, and how many found no place."""
+        """Make room for new rebels by releasing weak ones; return how many may be born, and how many did not fit."""
         edges, settings = self.edges, self._settings
         room = edges.rebel_capacity - edges.rebels
         excess = max(0, requested - room)
@@ -455,7 +455,7 @@ class LineCircleFilter:
         return min(requested, max(0, room) + len(weak)), excess
 
     def _update_circles(self, rebels: int) -> int:
-        """Circles, ψ; return evictions."""
+        """Update circles, objects and ψ; return evictions."""
         edges, normal, rebel, psi = self.edges.columns, self.normal.columns, self.rebel.columns, self.psi.columns
         candidates, around, settings = self._candidates, self._around, self._settings
         feedback.mark_ignored(candidates, psi)
@@ -516,5 +516,5 @@ class LineCircleFilter:
 
 
 def _memory(rotation: Matrix) -> Doubles:
-    """A rotation (3, 3) as the loops take it, (1, 3, 3)."""
+    """A rotation (3, 3) as memory for the loops, (1, 3, 3)."""
     return memory_of(np.ascontiguousarray(rotation, np.float64).reshape(1, 3, 3))

@@ -1,4 +1,4 @@
-"""Line expert: omit what lies inside ψ, group the rest by λ."""
+"""Line expert: omit corners inside ψ, group the rest by λ."""
 
 import math
 
@@ -9,8 +9,8 @@ from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.settings import Settings
 from lcf_edge.messages import Shape
 
-MISSING_SHARE = 0.4  # of the edges under ψ may have no corner where they are predicted
-NEW_SHARE = 0.4  # and so many corners, for each edge, may lie where none is
+MISSING_SHARE = 0.4  # of the edges under ψ, that may have no corner where predicted
+NEW_SHARE = 0.4  # corners per edge that may lie where none is predicted
 SPARE_CORNERS = 2
 CIRCLE_SHAPE = int(Shape.CIRCLE)  # Ty
 
@@ -24,7 +24,7 @@ def holds(psi: PsiColumns, p: int, x: float, y: float) -> bool:
 
 
 def psi_at(psi: PsiColumns, x: float, y: float) -> int:
-    """Row of the ψ region that holds a point, px, of those that are listed; -1: none. Where they overlap, the last."""
+    """Row of the listed ψ region that contains a point, px, -1: none. Where they overlap, the last."""
     for k in range(psi.live_count):
         p = psi.live[k]
         if holds(psi, p, x, y):
@@ -33,7 +33,7 @@ def psi_at(psi: PsiColumns, x: float, y: float) -> int:
 
 
 def list_live(psi: PsiColumns) -> None:
-    """List the rows in use, the last first."""
+    """List the rows in use, last first."""
     psi.live_count = 0
     for p in range(psi.capacity - 1, -1, -1):
         if psi.active[p]:
@@ -44,9 +44,9 @@ def list_live(psi: PsiColumns) -> None:
 def coincides(
     index: CornerIndex, plane: ImagePlane, corners: CornerColumns, x: float, y: float, reach_px: float
 ) -> bool:
-    """Whether a corner under ψ lies within ``reach_px`` of a place, whatever it looks like; such corners are expected.
+    """Whether a corner under ψ lies within ``reach_px`` of a position, whatever its appearance; it is then expected.
 
-    ``x``, ``y``: px of the ideal pinhole; the square around it is one of the input frame.
+    ``x``, ``y``: px of the ideal pinhole; the square around them is in the input frame.
     """
     if not image_plane.project(plane, x, y):
         return False
@@ -71,7 +71,7 @@ def place_in_psi(
     corners: CornerColumns,
     reach_px: float,
 ) -> None:
-    """Which region holds each corner and each L', and how many of a region's are not where the others let expect."""
+    """Find the region of each corner and each L', and count missing and new corners of each region."""
     for p in range(psi.capacity):
         psi.edges[p] = psi.missing[p] = psi.new[p] = 0
     for k in range(corners.count):
@@ -89,9 +89,9 @@ def place_in_psi(
 
 
 def end_surprised(psi: PsiColumns) -> None:
-    """End the ψ regions whose corners are not where the edges under them let expect.
+    """End the ψ regions with too many missing or new corners.
 
-    This look in passing costs a few places in an index, and lets nothing walk through ψ unseen.
+    This check costs a few look-ups, and nothing crosses ψ unseen.
     """
     for p in range(psi.capacity):
         if psi.missing[p] > MISSING_SHARE * psi.edges[p] + SPARE_CORNERS:
@@ -101,9 +101,9 @@ def end_surprised(psi: PsiColumns) -> None:
 
 
 def hold(edges: EdgeColumns, psi: PsiColumns, key_number: int, tr_s: float) -> None:
-    """Edges under ψ are held: predicted without being looked for.
+    """Hold the edges under ψ: predicted without being matched.
 
-    What is only predicted is no history, and is trusted like its circle, so that its corner soon corrects it.
+    Their history restarts, and they are trusted at most Tr_s, so that their corners soon correct them.
     """
     for i in range(edges.count):
         p = edges.psi[i]
@@ -124,7 +124,7 @@ def omit(
 ) -> int:
     """Omit the corners inside ψ, hold the edges under it; return how many corners are omitted.
 
-    Regions where corners are not where, or not as many as, the edges let expect, end first.
+    Regions with too many missing or new corners end first.
     """
     for i in range(edges.count):
         edges.held[i] = 0
@@ -147,7 +147,7 @@ def omit(
 
 
 def insert_group(groups: GroupColumns, circles: CircleColumns, c: int, row: int) -> bool:
-    """Enter a circle by its trust; in a full table the least trusted leaves. Return whether one found no place."""
+    """Insert a circle by its trust; a full table drops the least trusted. Return whether one did not fit."""
     trust = circles.trust[c]
     full = groups.count == groups.capacity
     if full:
@@ -167,13 +167,13 @@ def insert_group(groups: GroupColumns, circles: CircleColumns, c: int, row: int)
 
 
 def copy_group(groups: GroupColumns, source: int, target: int) -> None:
-    """One row over another."""
+    """Copy a row."""
     groups.x[target], groups.y[target], groups.bs[target] = groups.x[source], groups.y[source], groups.bs[source]
     groups.trust[target], groups.row[target] = groups.trust[source], groups.row[source]
 
 
 def collect(groups: GroupColumns, normal: CircleColumns, rebel: CircleColumns, tr_cr: float) -> int:
-    """λ ← C_n and C_r above Tr_cr, the least trusted first; return how many found no place."""
+    """λ ← C_n and C_r above Tr_cr, least trusted first; return how many did not fit."""
     groups.count = 0
     evicted = 0
     for c in range(normal.capacity):
@@ -186,7 +186,7 @@ def collect(groups: GroupColumns, normal: CircleColumns, rebel: CircleColumns, t
 
 
 def group_at(groups: GroupColumns, x: float, y: float) -> int:
-    """Group that holds a point (eq. 1: |L_λ - Edge| < BS_λ), the most trusted of several; -1: none."""
+    """Group that contains a point (eq. 1: |L_λ - Edge| < BS_λ), the most trusted of several; -1: none."""
     for g in range(groups.count - 1, -1, -1):
         dx, dy = x - groups.x[g], y - groups.y[g]
         if dx * dx + dy * dy < groups.bs[g] * groups.bs[g]:
@@ -195,6 +195,6 @@ def group_at(groups: GroupColumns, x: float, y: float) -> int:
 
 
 def circle_at(groups: GroupColumns, x: float, y: float) -> int:
-    """Row of the normal circle behind the group that holds a point, -1: none."""
+    """Row of the normal circle of the group that contains a point, -1: none."""
     g = group_at(groups, x, y)
     return groups.row[g] if g >= 0 else -1

@@ -1,4 +1,4 @@
-"""Corners and predicted edges find each other: by place through cells, by appearance, one to one."""
+"""Matching of corners and predicted edges, one to one: by position, through an index of cells, and by appearance."""
 
 import math
 
@@ -12,21 +12,21 @@ from lcf_edge.filter.memory import Doubles, Integers, Words, doubles, integers, 
 from lcf_edge.filter.settings import Settings
 
 CELL_SHIFT = 4  # cells of 16x16 px hold a few corners
-DISTANCE_COST = 0.4  # grey levels a px, so that of equal looks the nearest wins
+DISTANCE_COST = 0.4  # grey levels per px, so that the nearest of similar corners wins
 LIKENESS_FLOOR = 3.0  # grey levels of camera noise
-WIDE_LIKENESS = 0.5  # a wider look needs a better likeness, by this factor
+WIDE_LIKENESS = 0.5  # factor of the allowed difference in a wide search
 MEAN_GREY = 128  # of an appearance
 MEAN_OF_SUM = 1 / 16.0  # over the samples of an appearance
 ROUNDS = 2  # of mutual best choice
 
 
 class CornerIndex:
-    """Corners sorted by cell, row after row: those near a place are a few runs of neighbours in that order.
+    """Corners sorted by cell, row by row: those near a position are a few contiguous runs.
 
-    What a look-up costs follows from the corners that it finds, not from the size of the gate or of the image.
-    ``start``: of each cell's run. In that order: ``order``, row of the frame's corners; and what a look needs, copied,
-    so that a run of corners is a run of memory: ``x``, ``y`` (px of the input frame), ``appearance``. ``listed``: work
-    space of a look. ``nbytes``: that all of it occupies.
+    The cost of a look-up depends on the corners found, not on the size of the gate or image. ``start``: of each cell's
+    run. In sorted order: ``order``, row of the frame's corners, and copies of what a look-up needs, so that a run is
+    contiguous in memory: ``x``, ``y`` (px of the input frame), ``appearance``. ``listed``: scratch. ``nbytes``: total
+    size.
     """
 
     def __init__(self, width: int, height: int, capacity: int) -> None:
@@ -61,7 +61,7 @@ def cell_of(index: CornerIndex, x: int, y: int) -> int:
 
 
 def fill(index: CornerIndex, corners: CornerColumns) -> None:
-    """Enter the corners of a frame, sorted by counting; those of one cell stay in their order."""
+    """Index the corners of a frame, by a stable counting sort."""
     cells = index.columns * index.rows
     for k in range(cells + 1):
         index.start[k] = 0
@@ -72,7 +72,7 @@ def fill(index: CornerIndex, corners: CornerColumns) -> None:
     for i in range(corners.count):
         cell = cell_of(index, corners.pixel_x[i], corners.pixel_y[i])
         place = index.start[cell]
-        index.start[cell] += 1  # for now the start is where the next one goes
+        index.start[cell] += 1  # holds the next free place until the loop ends
         index.order[place] = i
         index.x[place], index.y[place] = corners.pixel_x[i], corners.pixel_y[i]
         index.words[place, 0], index.words[place, 1] = corners.words[i, 0], corners.words[i, 1]
@@ -82,17 +82,17 @@ def fill(index: CornerIndex, corners: CornerColumns) -> None:
 
 
 def first_cell(middle: float, gate: float, cells: int) -> int:
-    """First of so many rows or columns of cells that an interval around ``middle`` meets; ``cells``: none."""
+    """First of ``cells`` rows or columns that the interval ``middle`` ± ``gate`` meets; ``cells``: none."""
     return min(rounding.whole(max(middle - gate, 0.0)) >> CELL_SHIFT, cells)
 
 
 def last_cell(middle: float, gate: float, cells: int) -> int:
-    """Last of so many rows or columns of cells that an interval around ``middle`` meets; -1: none."""
+    """Last of ``cells`` rows or columns that the interval ``middle`` ± ``gate`` meets; -1: none."""
     return max(min(rounding.whole(middle + gate) >> CELL_SHIFT, cells - 1), -1)
 
 
 def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> float:
-    """Mean absolute grey difference of two appearances."""
+    """Mean absolute difference of two appearances, grey levels."""
     total = 0
     for k in range(16):  # APPEARANCE_SAMPLES, as a number: one vector instruction
         total += abs(edges.appearance[i, k] - index.appearance[place, k])
@@ -100,7 +100,7 @@ def difference(edges: EdgeColumns, i: int, index: CornerIndex, place: int) -> fl
 
 
 def contrast(edges: EdgeColumns, i: int) -> float:
-    """Mean absolute grey difference of an appearance from its mean."""
+    """Mean absolute deviation of an appearance from its mean, grey levels."""
     total = 0
     for k in range(16):  # APPEARANCE_SAMPLES
         total += abs(edges.appearance[i, k] - MEAN_GREY)
@@ -108,21 +108,21 @@ def contrast(edges: EdgeColumns, i: int) -> float:
 
 
 def likeness_needed(own_contrast: float, settings: Settings) -> float:
-    """Largest mean grey difference at which an appearance still counts as the same: a share of its own contrast.
+    """Largest mean difference at which an appearance is still the same, by its own contrast, grey levels.
 
-    A faint corner must look more alike than a strong one, else it is taken for its neighbours.
+    A faint corner must match more closely than a strong one, or it would be confused with its neighbours.
     """
     return min(LIKENESS_FLOOR + settings.appearance_share * own_contrast, settings.appearance_max)
 
 
 def list_near(index: CornerIndex, corners: CornerColumns, x: float, y: float, gate: float) -> int:
-    """List the places of the free corners within ``gate`` of (x, y), px. Return how many there are."""
+    """List the free corners within ``gate`` of (x, y), px; return how many."""
     count, gate2 = 0, gate * gate
     left, right = first_cell(x, gate, index.columns), last_cell(x, gate, index.columns)
     for row in range(first_cell(y, gate, index.rows), last_cell(y, gate, index.rows) + 1):
         for place in range(index.start[row * index.columns + left], index.start[row * index.columns + right + 1]):
             dx, dy = index.x[place] - x, index.y[place] - y
-            index.listed[count] = place  # no branch: which corners are near cannot be guessed
+            index.listed[count] = place  # no branch: it would be mispredicted
             count += (dx * dx + dy * dy <= gate2) & corners.free[index.order[place]]
     return count
 
@@ -130,9 +130,9 @@ def list_near(index: CornerIndex, corners: CornerColumns, x: float, y: float, ga
 def choose(
     index: CornerIndex, edges: EdgeColumns, i: int, corners: CornerColumns, x: float, y: float, gate: float, most: float
 ) -> None:
-    """The free corner within ``gate`` of (x, y), px, that suits an edge best; each corner notes the edge that suits it.
+    """Choose the best free corner for an edge within ``gate`` of (x, y), px, and offer the edge to each corner.
 
-    ``most``: mean grey difference of its looks that is still the same corner.
+    ``most``: largest mean difference of the appearances, grey levels.
     """
     for k in range(list_near(index, corners, x, y, gate)):
         place = index.listed[k]
@@ -141,7 +141,7 @@ def choose(
         far = DISTANCE_COST * math.sqrt(dx * dx + dy * dy)
         edge_has_better = edges.best[i] >= 0 and far >= edges.cost[i]
         if edge_has_better and corners.edge[corner] >= 0 and far >= corners.cost[corner]:
-            continue  # however alike they look
+            continue  # even if identical
         unlike = difference(edges, i, index, place)
         if unlike >= most:
             continue
@@ -153,7 +153,7 @@ def choose(
 
 
 def gate_px(edges: EdgeColumns, i: int, slack_px: float, wide: bool, settings: Settings) -> float:
-    """Radius of the gate in which an edge's corner is looked for, px: BL, or, ``wide``, how far it may have leapt."""
+    """Radius of the gate around an edge, px: BL, or, if ``wide``, how far it may have leapt."""
     gate = edges.bl[i] + slack_px
     if not wide:
         return gate
@@ -171,9 +171,9 @@ def choose_all(
     settings: Settings,
     again: bool,
 ) -> int:
-    """Every edge without a corner chooses; return how many did.
+    """Let every edge without a corner choose; return how many did.
 
-    They look near L', or, ``wide``, farther around L. ``again``: only those that found something before.
+    They search near L', or, if ``wide``, farther around L. ``again``: only those that found something before.
     """
     for k in range(corners.count):
         corners.edge[k] = -1
@@ -195,7 +195,7 @@ def choose_all(
 
 
 def take_mutual(edges: EdgeColumns, corners: CornerColumns) -> int:
-    """Pairs that chose each other are taken, and their corners are free no more; return how many."""
+    """Match the pairs that chose each other, whose corners are then no longer free; return how many."""
     pairs = 0
     for i in range(edges.count):
         corner = edges.best[i]
@@ -216,7 +216,7 @@ def look(
     wide: bool,
     settings: Settings,
 ) -> int:
-    """Rounds of mutual best choice: near L', or, ``wide``, farther around L; return how many pairs they give."""
+    """Rounds of mutual best choice, near L', or, if ``wide``, farther around L; return the number of pairs."""
     pairs = 0
     for turn in range(ROUNDS):
         if not choose_all(index, plane, edges, corners, slack_px, wide, settings, turn > 0):
@@ -233,9 +233,9 @@ def find(
     slack_px: float,
     settings: Settings,
 ) -> int:
-    """Edges and corners that are the same landmark: near L' first, then, for the rest, near L.
+    """Match edges and corners: first near L', then, for the rest, near L.
 
-    Fills ``edges.corner``; return how many were found. ``slack_px``: by which the camera's rotation is uncertain.
+    Sets ``edges.corner``; returns the number of pairs. ``slack_px``: uncertainty of the camera's rotation.
     """
     for i in range(edges.count):
         edges.corner[i] = -1

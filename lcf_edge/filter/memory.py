@@ -1,6 +1,6 @@
-"""What the loops read and write: typed memory when they are compiled, ``memoryview`` when not.
+"""Memory of the loops: typed when they are compiled, a ``memoryview`` when not.
 
-A ``memoryview`` gives Python's own numbers, which do not wrap and are not rounded: so both give the same bytes.
+A ``memoryview`` yields Python's own numbers, which neither wrap nor round, so that both give the same bytes.
 """
 
 from typing import Any, TypeAlias
@@ -21,7 +21,7 @@ Doubles: TypeAlias = Any
 
 
 def memory_of(array: Any) -> Any:
-    """The memory of an array; of a bool one as uint8."""
+    """The memory of an array; bool as uint8."""
     whole: Any = np.ascontiguousarray(array)
     return memoryview(whole.view(np.uint8) if whole.dtype == np.bool_ else whole)
 

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands, as the image tells: the ground, which must flow when it drives, does not."""
+"""Whether the vehicle is stationary, by the image: the ground, which must flow when it drives, does not."""
 
 import math
 
@@ -10,21 +10,21 @@ from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.situation import Situation
 
-MIN_BASELINE_S = 0.2  # motion over less than this is lost in noise
-MIN_STILL_S = 0.25  # an image that comes twice is no rest
+MIN_BASELINE_S = 0.2  # motion over less time is lost in noise
+MIN_STILL_S = 0.25  # a repeated image is no rest
 MIN_EDGES = 25
 MIN_GROUND_EDGES = 8
-MIN_FLOW_PX = 3.0  # that the ground must show at the speed that is measured
-STILL_PX = 0.5  # less than half of the edges go farther than this,
-STILL_GROUND_PX = 1.0  # and more than half of those on the ground no farther than this,
-STILL_SHARE = 0.3  # nor than this share of what they must
+MIN_FLOW_PX = 3.0  # least flow of the ground, expected at the measured speed, to judge by
+STILL_PX = 0.5  # more than half of the edges move less than this,
+STILL_GROUND_PX = 1.0  # and of those on the ground more than half less than this,
+STILL_SHARE = 0.3  # and than this share of what is expected
 
 
 class RestTest:
-    """What one frame shows: ``edges`` with a history, ``still`` of them; ``ground``, on it, ``still_ground`` of them.
+    """Counts of one frame: ``edges`` with a history, ``still`` of them; on the ground ``ground``, ``still_ground``.
 
-    ``stands``: the verdict, ``still_s``: for how long all has looked like it. ``measured_mps``: the speed by IMU,
-    odometry or configuration; NaN: unknown.
+    ``stands``: the verdict, ``still_s``: for how long the evidence has lasted. ``measured_mps``: speed by IMU, odometry
+    or configuration; NaN: unknown.
     """
 
     def __init__(self) -> None:
@@ -45,7 +45,7 @@ def latest_key(keys: KeyFrames) -> int:
 
 
 def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, around: Situation) -> None:
-    """Note one edge: how far it went since a key frame, and how far the ground there must have gone."""
+    """Count one edge: its motion since a key frame, against the expected flow of the ground there."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
     x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
     way = lengths.of(edges.x[i] - x, edges.y[i] - y)
@@ -64,7 +64,7 @@ def look(test: RestTest, edges: EdgeColumns, i: int, slot: int, baselines: Basel
 
 
 def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation) -> None:
-    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight it stands on until something moves."""
+    """Set ``stands`` and ``Situation.ground_is_still``. Without ground in sight rest lasts until the image moves."""
     stood, looked_s = test.stands, test.still_s
     test.stands = around.ground_is_still = False
     test.still_s = 0.0
@@ -74,7 +74,7 @@ def measure(test: RestTest, edges: EdgeColumns, keys: KeyFrames, baselines: Base
     if number < 0 or not known:
         return
     for i in range(edges.count):
-        # while it stands, all that is seen stays where it is, and is no part of the vehicle for that
+        # at rest everything stays in place, and is no own part for that
         seen = edges.matched[i] != 0 and (stood or not edges.is_own_part(i))
         if seen and key_frames.oldest_key(edges, i, keys) <= number:
             look(test, edges, i, number % KEYS, baselines, around)

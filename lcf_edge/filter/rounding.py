@@ -1,6 +1,6 @@
-"""Whole numbers from others, as C converts them; the .pxd beside it is a header that serves the compiled modules."""
+"""Conversion to integers, as in C; the .pxd beside it is a header for the compiled modules."""
 
 
 def whole(x: float) -> int:
-    """Towards zero."""
+    """Truncate towards zero."""
     return int(x)

@@ -1,16 +1,16 @@
-"""The keys of ``filter`` as the loops take them; meanings and units as in the configuration."""
+"""The keys of ``filter`` for the loops; meanings and units as in the configuration."""
 
 import math
 
 from lcf_edge.config import Filter
 from lcf_edge.filter.flow import Pinhole
 
-REFERENCE_FOCAL_PX = 320 / math.tan(0.525)  # of 640 px over 1.05 rad, the camera that px of the configuration mean
-NEIGHBOUR_PX = 28.0  # edges nearer than this, at a like depth, tell it together
-MEMBER_MARGIN_PX = 8.0  # around a rebel circle, within which edges may be its own
-MIN_COAST_PX = 40.0  # what is so near that it grows too fast to be followed is not small
+REFERENCE_FOCAL_PX = 320 / math.tan(0.525)  # of the camera to which px in the configuration refer: 640 px over 1.05 rad
+NEIGHBOUR_PX = 28.0  # edges nearer than this, at the same depth, are judged together
+MEMBER_MARGIN_PX = 8.0  # around a rebel circle, within which edges may belong to it
+MIN_COAST_PX = 40.0  # a circle so near that it grows too fast to be tracked is at least this large
 PSI_MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
-# However few px a radian has, corners lie some px apart.
+# Lower bounds: however few px a radian has, corners lie some px apart.
 MIN_LINK_PX = 8.0
 MIN_CIRCLE_PX = 9.6
 MIN_NEIGHBOUR_PX = 6.4
@@ -23,9 +23,9 @@ MIN_FOCUS_SIGMA_PX = 1.0
 class Settings:
     """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s).
 
-    Extents of things and angles are px of ``pinhole``: what the configuration has in px is meant at a focal length of
-    ``REFERENCE_FOCAL_PX``, so that it holds for every size of image and every lens. Gates and noise of corners are px
-    of whatever image.
+    Sizes and angles of the world are px of ``pinhole``: the configuration gives them at a focal length of
+    ``REFERENCE_FOCAL_PX``, so that they hold for every image size and lens. Gates and noise of corners are px of the
+    image, whatever its size.
     """
 
     def __init__(self, settings: Filter, pinhole: Pinhole) -> None:

@@ -1,4 +1,4 @@
-"""The vehicle at this instant: where it heads in the image, what it is, how it moves."""
+"""The vehicle in this frame: focus of expansion, dimensions, motion."""
 
 import math
 
@@ -10,17 +10,17 @@ NAN = float("nan")
 
 
 class Situation:
-    """What the experts need to know about this frame.
+    """State of this frame that the experts share.
 
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
-    unknown. ``scene_flow_pxps``: image speed that V_ν gives a point at the configured depth of the scene, one focal
-    length from O, so that the paper's bounds in V_ν have a unit in the image; inf where V_ν is unknown. ``dt_s``:
-    t_f. ``noise_px``: 1 sigma of an edge's place. ``delta_px``: δ over a chain of key frames. Both as configured, or
-    as the image shows it (``flow_fit``). ``turn_share``: 1 sigma of where a turn moves an edge, as a share of that
-    way. ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: as the flow tells it, where
-    that is less. ``lever_m``: how far the camera sits before the axle. ``ground_is_still``: though by V_ν it must flow
-    (``rest``). ``flow_is_seen``: enough of what stands is in sight to tell its flow.
-    ``is_blind``: it is not, and hardly an edge of the image is found again: something covers it.
+    unknown. ``scene_flow_pxps``: image speed at V_ν of a point at the configured scene depth, one focal length from O,
+    which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown. ``dt_s``: t_f. ``noise_px``:
+    1 sigma of an edge's position. ``delta_px``: δ over a chain of key frames. Both as configured, or as measured by
+    ``flow_fit`` if more. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it. ``pitch_sigma_rad``:
+    1 sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance
+    of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``:
+    enough of the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is
+    found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -52,7 +52,7 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
 
 
 def ground_range_m(around: Situation, y: float) -> float:
-    """Range at which the ground is seen at image row ``y``, px; NaN at the horizon, above it, or unknown."""
+    """Range of the ground at image row ``y``, m; NaN at the horizon, above it, or where the height is unknown."""
     focal = around.pinhole.focal
     below = y - around.horizon_y
     if below > focal * around.pitch_sigma_rad and around.camera_height_m > 0:
