@@ -1,4 +1,4 @@
-"""Circle expert, C_r from coarse motion: pieces of the image in small that touch and move alike."""
+"""Circle expert, C_r from coarse motion: pieces of the downscaled image that touch and move alike."""
 
 import math
 
@@ -12,23 +12,23 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-LINKS = 3  # images, through which the motion of a piece has led;
-MIN_S = 0.19  # and for so long that of
+LINKS = 3  # images over which the motion of a piece must continue,
+MIN_S = 0.19  # and the time over which it must for at least
 MIN_PIECES = 2
-MANY_PIECES = 6  # so many need not have moved for as long
-TOUCHING = 2  # pieces apart: they overlap by half
+MANY_PIECES = 6  # a group of this many need not have moved for that long
+TOUCHING = 2  # pieces apart: they still adjoin, as neighbours overlap by half
 HALF_PIECE = 4  # small px
-SPREAD_PX2 = 2.7  # small px², of what a piece shows about its middle
+SPREAD_PX2 = 2.7  # small px², variance of what a piece shows about its centre
 CROSSING = int(Cause.CROSSING)
 INFINITY = float("inf")
 NAN = float("nan")
 
 
 class CoarseGroups:
-    """A row a piece: ``group``, the lowest number of those that go with it, -1: none; ``circle``, row of C_r, -1: none.
+    """One row per piece: ``group``, lowest piece of its group, -1: none; ``circle``, row of C_r, -1: none.
 
-    A row a group: ``members``; means of the velocity, ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest row, px;
-    ``lasting``: how many of it have moved for ``MIN_S``.
+    One row per group: ``members``; mean velocity ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest image row, px;
+    ``lasting``: pieces that have moved for ``MIN_S``.
     """
 
     def __init__(self, pieces: int) -> None:
@@ -38,7 +38,7 @@ class CoarseGroups:
 
 
 def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
-    """Each piece whose motion has led through images enough is a group; False: there is none."""
+    """Make each piece with at least ``LINKS`` links a group of its own; return whether there are any."""
     is_any = False
     for k in range(coarse.columns * coarse.rows):
         linked = coarse.links[k] >= LINKS
@@ -49,7 +49,7 @@ def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
 
 
 def join(groups: CoarseGroups, coarse: CoarseMotion) -> None:
-    """Pieces that touch and move alike are of one group."""
+    """Merge the groups of pieces that touch and move alike."""
     changed = True
     while changed:
         changed = False
@@ -68,7 +68,7 @@ def join(groups: CoarseGroups, coarse: CoarseMotion) -> None:
 
 
 def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion, dt_s: float) -> None:
-    """What a circle takes from the pieces of each group."""
+    """Compute the statistics of each group."""
     pieces = coarse.columns * coarse.rows
     for g in range(pieces):
         shared.clear(members, g)
@@ -102,7 +102,7 @@ def gather(groups: CoarseGroups, members: Members, coarse: CoarseMotion, dt_s: f
 def set_cause(
     groups: CoarseGroups, coarse: CoarseMotion, g: int, circles: CircleColumns, c: int, around: Situation
 ) -> None:
-    """The motion of a group's circle; what it moves on is no nearer than the ground that is seen under it."""
+    """Set cause, motion and range of a group's circle; its range is that of the ground seen under it."""
     circles.beta[c] = math.atan2(groups.mean_vy[g], groups.mean_vx[g])
     circles.speed[c] = lengths.of(groups.mean_vx[g], groups.mean_vy[g])
     circles.cause[c], circles.ttc[c], circles.lateral[c] = CROSSING, INFINITY, NAN
@@ -122,9 +122,9 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """Circles of groups that stand on the ground, as all does that moves by itself; return evictions.
+    """Update C_r from groups that reach below the horizon: what moves stands on the ground. Return evictions.
 
-    ``updated``: which circles others have updated, to which a group is left; those of groups are marked too.
+    ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
     """
     evicted = 0
     if not begin(groups, coarse):
@@ -144,7 +144,7 @@ def update(
                 continue
             shared.give_birth(circles, c, groups.members, g, settings, ids)
         elif updated[c] or circles.cause[c] != CROSSING:
-            continue  # of one that may be met, others know more
+            continue  # other sources know more about it
         else:
             shared.blend(circles, c, groups.members, g, settings)
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)

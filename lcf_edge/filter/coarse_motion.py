@@ -1,9 +1,9 @@
-"""Coarse motion: pieces of the image that move by themselves, found in the image in small.
+"""Coarse motion: independently moving pieces of the image, found by block matching in a downscaled image.
 
-What crosses fast is elsewhere in the next image, and what is dark or plain has few corners that are found again. In
-small, noise averages out and outlines remain. A piece that is not where it would have been if it stood still, however
-near or far off, is sought all around, in the frame before and in an older key frame, which shows slower motion. Its
-motion counts if it leads from image to image, as in α.
+What crosses fast leaves the gates of its corners, and what is dark or plain has few corners that can be tracked.
+Downscaled, noise averages out and outlines remain. A piece that matches nowhere along its flow line, at any depth, is
+searched for all around: in the last frame, and in an older key frame, which shows slower motion. Its motion counts if
+it continues from image to image, as in α.
 """
 
 import math
@@ -20,58 +20,57 @@ from lcf_edge.filter.memory import Bytes, Doubles, Words, doubles, integers, mem
 from lcf_edge.filter.situation import Situation
 from lcf_edge.lens import Lens
 
-WINDOW = 8  # small px along a side of a piece
+WINDOW = 8  # side of a piece, px of the downscaled image ("small px")
 PIXELS = 64
 STEP = 4  # small px from piece to piece
-REACH_SHARE = 0.16  # of the image's width, by which a piece may have moved across,
-DOWN_SHARE = 0.5  # and down, as a share of that
-NEAREST_M = 0.25  # depth below which nothing is expected to stand
-ANY_WAY_M = 1e3  # driven, where the speed is unknown: what stands may have come any way from O
-OFF_FLOW = 1.5  # small px beside the flow line, within which a piece may stand, and more
+REACH_SHARE = 0.16  # horizontal search range, as a share of the image's width,
+DOWN_SHARE = 0.5  # and vertical, as a share of that
+NEAREST_M = 0.25  # depth below which nothing stationary is expected
+ANY_WAY_M = 1e3  # distance assumed where the speed is unknown: the whole flow line from O is searched
+OFF_FLOW = 1.5  # small px off the flow line within which a piece may be stationary, and more
 ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
 TURN_SIGMAS = 2.0  # or the lens, in a turn
-MAX_OFF_FLOW = 3.0  # beyond, nothing is measured
-PLAIN_GREY = 2.0  # a pixel, by which neighbours differ at least, across and down together
-CALM_GREY = 3.0  # a pixel, by which a piece may differ from itself,
-BESIDE_PX = 0.6  # and by what lying so many small px beside whole ones changes
-LIKENESS = 0.5  # of the difference that is left if it stands, that is left at most if it moves
-RING = 3  # small px from its place, where a distinct piece fits worse by
+MAX_OFF_FLOW = 3.0  # with more tolerance nothing is measured
+PLAIN_GREY = 2.0  # least texture of a piece: mean grey difference of neighbouring px, both directions together
+CALM_GREY = 3.0  # tolerated matching error: noise for each pixel,
+BESIDE_PX = 0.6  # and the effect of a sub-pixel offset of this many small px
+LIKENESS = 0.5  # largest error where it moves, as a share of the least where it is stationary
+RING = 3  # small px around the match, where a distinct piece fits worse by
 RING_LIKENESS = 1.25  # this factor,
-RING_GREY = 0.5  # and so much a pixel
-MAX_SEEN = 40  # pieces in a frame that are sought where they would stand,
+RING_GREY = 0.5  # and this much for each pixel
+MAX_SEEN = 40  # pieces per frame searched along their flow line,
 MAX_SEARCHES = 20  # and all around
-SLOW_S = 0.3  # the older image is no older than this,
-MIN_SLOW_S = 0.1  # nor younger
+SLOW_S = 0.3  # greatest age of the older image,
+MIN_SLOW_S = 0.1  # and least
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
-SAME_SHARE = 0.25  # and by this share
+SAME_SHARE = 0.25  # plus this share
 LAST, OLDER = 0, 1
 UNKNOWN, STANDS, CHANGED = 0, 1, 2
 WORST = 256 * 64
 
 
 class CoarseMotion:
-    """The image in small, ``width`` by ``height``, each px of which is ``side`` px of the input frame.
+    """The downscaled image, ``width`` by ``height``; each of its px is ``side`` px of the input frame.
 
-    Pixels, row after row: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far.
-    ``turned``: (1, 3, 3), the rotation since the last one.
+    Pixels, row-major: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far. ``turned``:
+    (1, 3, 3), the rotation since the last image.
 
-    Pixels laid out so that those of a piece lie together: of each column the ``WINDOW`` px to the right of it, row
-    after row. ``pieces``, ``pieces_last``, of this image and the last one.
+    Pixels repacked so that those of a piece are contiguous: for each column the ``WINDOW`` px to the right of it, row
+    by row. ``pieces``, ``pieces_last``, of this image and the last one; ``words``, ``words_last``, ``words_then``: the
+    same memory, one row of a piece in each word.
 
-    The image in which pieces are sought: ``then``, laid out, ``then_s`` ago; ``back``, from where what is far off is
-    seen now to where it was seen then; ``ahead_m``, ``focus_x``, ``focus_y``: how far and where the vehicle drove
-    since; ``off_flow``, small px. ``words``, ``words_last``, ``words_then``: the memory of what is laid out, a row of a
-    piece each. Of the piece that is sought: ``here``, its first pixel in ``pieces``; ``base_x``, ``base_y``, where it
-    was if it is far off, small px of its upper left; ``across``, ``down``, from there, where it was if it moves;
-    ``least_still``, ``least_moving``, the difference that is left; ``share``: of the way to where the nearest would
-    have been, if it stands.
+    The image that is searched: ``then``, repacked, ``then_s`` ago; ``back``, homography of distant points from now to
+    then; ``ahead_m``, ``focus_x``, ``focus_y``: displacement since, and its focus; ``off_flow``, small px. Of the piece
+    that is searched for: ``here``, its first pixel in ``pieces``; ``base_x``, ``base_y``, small px, where its upper
+    left corner was if it is at infinity; ``across``, ``down``, offset from there if it moves; ``least_still``,
+    ``least_moving``, matching errors; ``share``: of the way to where the nearest depth would have been, if stationary.
 
-    A row a piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its middle, px of the ideal pinhole; ``rough``: how
-    much its pixels differ; ``came_x``, ``came_y``: ``base`` in the last image, -1: it was not all in it; ``shares``
-    (2, pieces), where it lately stood, in the last image and in the older one; ``links``: images through which its
-    motion led here, 0: it stands, or nothing is known; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which it
-    was seen; ``stance``: whether it ``STANDS`` since the last image, or has ``CHANGED`` otherwise; ``links_before``,
-    ``vx_before``, ``vy_before`` of the last image. ``block``: roughness of each ``STEP`` by ``STEP`` px.
+    One row per piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its centre, px of the ideal pinhole; ``rough``,
+    its texture; ``came_x``, ``came_y``: ``base`` in the last image, -1: not fully inside it; ``shares`` (2, pieces),
+    latest ``share`` in the last image and in the older one; ``links``: images over which its motion has continued, 0:
+    stationary or unknown; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which that was measured;
+    ``stance``: whether since the last image it ``STANDS`` or has ``CHANGED`` otherwise; ``links_before``,
+    ``vx_before``, ``vy_before`` of the last image. ``block``: texture of each ``STEP`` by ``STEP`` px.
     """
 
     def __init__(self, lens: Lens, side: int) -> None:
@@ -107,7 +106,7 @@ class CoarseMotion:
 
 
 def take(coarse: CoarseMotion, small: Bytes) -> None:
-    """Take the next image in small, row after row."""
+    """Take the next downscaled image, row-major."""
     now, pixels = coarse.now, coarse.width * coarse.height
     for k in range(pixels):
         now[k] = small[k]
@@ -121,7 +120,7 @@ def take(coarse: CoarseMotion, small: Bytes) -> None:
 
 
 def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> None:
-    """Lay out an image from its first pixel on."""
+    """Repack an image that begins at ``first``."""
     for y in range(coarse.height):
         word = 0
         for x in range(coarse.width):
@@ -132,7 +131,7 @@ def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> N
 
 
 def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
-    """A rotation (1, 3, 3) comes on top of that since the last image."""
+    """Add a rotation (1, 3, 3) to that since the last image."""
     for j in range(3):
         x, y, z = coarse.turned[0, 0, j], coarse.turned[0, 1, j], coarse.turned[0, 2, j]
         for i in range(3):
@@ -140,7 +139,7 @@ def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
 
 
 def keep(coarse: CoarseMotion, slot: int) -> None:
-    """This image is that of the key frame in ``slot``."""
+    """Store this image as that of the key frame in ``slot``."""
     coarse.keys = min(coarse.keys + 1, KEYS)
     now, kept, pixels = coarse.now, coarse.kept, coarse.width * coarse.height
     first = slot * pixels
@@ -149,7 +148,7 @@ def keep(coarse: CoarseMotion, slot: int) -> None:
 
 
 def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int, keys: KeyFrames) -> None:
-    """``back``, from the ``k``-th of rotations (n, 3, 3) since then. ``keys`` have room for one."""
+    """Set ``back`` from the ``k``-th of rotations (n, 3, 3) since then. ``keys.step`` is scratch."""
     for i in range(3):
         for j in range(3):
             keys.step[0, i, j] = rotation[k, j, i]
@@ -157,7 +156,7 @@ def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int,
 
 
 def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
-    """Pieces are sought in the last image."""
+    """Search in the last image."""
     for k in range(coarse.words.shape[0]):
         coarse.words_then[k] = coarse.words_last[k]
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
@@ -171,7 +170,7 @@ def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
 def look_farther_back(
     coarse: CoarseMotion, slot: int, keys: KeyFrames, baselines: Baselines, around: Situation
 ) -> None:
-    """Pieces are sought in the image of the key frame in ``slot``."""
+    """Search in the image of the key frame in ``slot``."""
     lay_out(coarse, coarse.kept, slot * coarse.width * coarse.height, coarse.words_then)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
     coarse.then_s = baselines.elapsed_s[slot]
@@ -181,7 +180,7 @@ def look_farther_back(
 
 
 def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
-    """Slot of the key frame whose image shows slow motion, -1: there is none."""
+    """Slot of the oldest key frame of an age that shows slow motion, -1: there is none."""
     oldest, most = -1, MIN_SLOW_S
     for k in range(KEYS):
         if k < coarse.keys and most <= baselines.elapsed_s[k] <= SLOW_S:
@@ -193,7 +192,7 @@ def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
 
 
 def roughen(coarse: CoarseMotion) -> None:
-    """How much neighbouring pixels of each piece differ, in sum."""
+    """Measure the texture of each piece: the sum of absolute differences of neighbouring pixels."""
     across = coarse.columns + 1
     for b in range(across * (coarse.rows + 1)):
         total = 0
@@ -212,17 +211,17 @@ def roughen(coarse: CoarseMotion) -> None:
 
 
 def calm(coarse: CoarseMotion, k: int) -> int:
-    """The difference that a piece may have from itself: noise, and it does not lie on whole px."""
+    """Largest matching error of a piece with itself: noise, and the sub-pixel offset."""
     return rounding.whole(CALM_GREY * PIXELS + BESIDE_PX * coarse.rough[k])
 
 
 def nearest_px(x: float) -> int:
-    """The nearest whole number."""
+    """The nearest integer."""
     return rounding.whole(math.floor(x + 0.5))
 
 
 def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
-    """Sum of absolute grey differences of the piece sought from that then at (x, y); outside it is above ``most``."""
+    """Sum of absolute differences between the piece and that at (x, y) then; above ``most`` outside the image."""
     if x < 0 or x > coarse.width - WINDOW or y < 0 or y > coarse.height - WINDOW:
         return most + 1
     total, here, there = 0, coarse.here, WINDOW * (x * coarse.height + y)
@@ -232,7 +231,7 @@ def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
 
 
 def stands_as_lately(coarse: CoarseMotion, k: int, end_x: float, end_y: float) -> bool:
-    """Whether a piece is where it would have been if it stood as far off as what was lately seen there, or beside."""
+    """Whether a piece matches, within 1 px, where it was if stationary at the depth last seen there."""
     x = nearest_px(coarse.base_x + coarse.share * end_x)
     y = nearest_px(coarse.base_y + coarse.share * end_y)
     most = calm(coarse, k)
@@ -246,7 +245,7 @@ def stands_as_lately(coarse: CoarseMotion, k: int, end_x: float, end_y: float) -
 
 
 def seek_standing(coarse: CoarseMotion, k: int, end_x: float, end_y: float, off_flow: float) -> None:
-    """The best place of a piece that stands: along its flow line, from ``base`` by no more than (end_x, end_y)."""
+    """Find the best match of a stationary piece: along its flow line, from ``base`` at most to (end_x, end_y)."""
     x, y = nearest_px(coarse.base_x), nearest_px(coarse.base_y)
     beside = rounding.whole(off_flow + 0.5)
     level = math.fabs(end_x) > math.fabs(end_y)
@@ -264,13 +263,13 @@ def seek_standing(coarse: CoarseMotion, k: int, end_x: float, end_y: float, off_
 
 
 def off_segment(x: float, y: float, end_x: float, end_y: float) -> float:
-    """Distance of a point from the segment between the origin and its end."""
+    """Distance of a point from the segment between the origin and (end_x, end_y)."""
     along = min(max((x * end_x + y * end_y) / max(end_x * end_x + end_y * end_y, 1.0), 0.0), 1.0)
     return lengths.of(x - along * end_x, y - along * end_y)
 
 
 def try_moving(coarse: CoarseMotion, across: int, down: int, end_x: float, end_y: float, off_flow: float) -> None:
-    """A place for a piece that moves: where none that stands could have been."""
+    """Try a match of a moving piece, off the segment on which a stationary one could have been."""
     if off_segment(across, down, end_x, end_y) > off_flow:
         x, y = nearest_px(coarse.base_x) + across, nearest_px(coarse.base_y) + down
         total = difference(coarse, x, y, coarse.least_moving)
@@ -279,7 +278,7 @@ def try_moving(coarse: CoarseMotion, across: int, down: int, end_x: float, end_y
 
 
 def seek_moving(coarse: CoarseMotion, end_x: float, end_y: float, off_flow: float) -> None:
-    """The best place of a piece that moves: among every other one all around, then among those beside it."""
+    """Find the best match of a moving piece: over every other px all around, then over those next to it."""
     reach = rounding.whole(0.5 * REACH_SHARE * coarse.width)
     reach_down = rounding.whole(DOWN_SHARE * reach)
     coarse.searches += 1
@@ -295,7 +294,7 @@ def seek_moving(coarse: CoarseMotion, end_x: float, end_y: float, off_flow: floa
 
 
 def is_distinct(coarse: CoarseMotion) -> bool:
-    """Whether a piece that moves fits nowhere around as well: one with a straight edge fits all along it."""
+    """Whether the match of a moving piece is unique nearby: a straight edge matches anywhere along itself."""
     x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
     most = rounding.whole(RING_LIKENESS * coarse.least_moving + RING_GREY * PIXELS)
     for down in range(-1, 2):
@@ -307,13 +306,13 @@ def is_distinct(coarse: CoarseMotion) -> bool:
 
 
 def finer(before: int, middle: int, after: int) -> float:
-    """By how much the least lies beside the middle of three differences, in steps; they fall and rise straight."""
+    """Sub-pixel offset of the minimum of three errors from the middle one, px; they fall and rise linearly."""
     highest = max(before, after) - middle
     return 0.5 * (before - after) / highest if highest > 0 else 0.0
 
 
 def set_motion(coarse: CoarseMotion, k: int) -> None:
-    """Velocity of a piece that moves."""
+    """Set the velocity of a moving piece."""
     x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
     middle = coarse.least_moving
     across = x + finer(difference(coarse, x - 1, y, WORST), middle, difference(coarse, x + 1, y, WORST))
@@ -324,13 +323,13 @@ def set_motion(coarse: CoarseMotion, k: int) -> None:
 
 
 def are_alike(coarse: CoarseMotion, vx: float, vy: float, other_vx: float, other_vy: float) -> bool:
-    """Whether two motions may be one."""
+    """Whether two motions agree within tolerance."""
     speed = max(lengths.of(vx, vy), lengths.of(other_vx, other_vy))
     return lengths.of(vx - other_vx, vy - other_vy) <= SAME_SMALL_PX * coarse.side / coarse.then_s + SAME_SHARE * speed
 
 
 def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
-    """The links of a piece that moves: one more than of those that it comes from and that moved alike."""
+    """Set the links of a moving piece: one more than those of the piece that it comes from, if that moved alike."""
     from_x = coarse.came_x[k] - coarse.vx[k] * dt_s / coarse.side
     from_y = coarse.came_y[k] - coarse.vy[k] * dt_s / coarse.side
     column, row = rounding.whole(max(from_x, 0.0) / STEP), rounding.whole(max(from_y, 0.0) / STEP)
@@ -345,7 +344,7 @@ def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
 
 
 def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
-    """Set ``here`` and ``base`` of a piece; False: if it is far off, it was not all in the image."""
+    """Set ``here`` and ``base`` of a piece; return whether at infinity it was fully inside the image."""
     left, top = STEP * (k % coarse.columns), STEP * (k // coarse.columns)
     coarse.here = WINDOW * (left * coarse.height + top)
     if not image_plane.project(plane, coarse.x[k], coarse.y[k]):
@@ -359,7 +358,7 @@ def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
 
 
 def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
-    """Whether the piece that was put moves by itself; ``age``: LAST or OLDER, of the image then."""
+    """Whether the piece set by ``put`` moves independently; ``age`` of the searched image: LAST or OLDER."""
     nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
     end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
     coarse.share = coarse.shares[age, k]
@@ -372,7 +371,7 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     coarse.seen += 1
     turned = lengths.of(
         coarse.base_x - STEP * (k % coarse.columns), coarse.base_y - STEP * (k // coarse.columns)
-    )  # where the lens is guessed, so is by how much a turn moved the piece
+    )  # known only as well as the lens
     off_flow = coarse.off_flow + TURN_SIGMAS * around.turn_share * turned
     seek_standing(coarse, k, end_x, end_y, off_flow)
     coarse.shares[age, k] = coarse.share
@@ -386,7 +385,7 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
 
 
 def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
-    """Which pieces that are not known to move do so, since the image then."""
+    """Find moving pieces against the searched image, among textured ones not yet found to move."""
     pieces = coarse.columns * coarse.rows
     for back in range(pieces):
         k = pieces - 1 - back
@@ -402,7 +401,7 @@ def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation
 
 
 def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: ImagePlane, around: Situation) -> None:
-    """Which pieces move by themselves: fast, since the last image, or more slowly, since an older one."""
+    """Find the pieces that move independently: fast against the last image, slower against an older one."""
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0

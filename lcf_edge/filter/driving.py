@@ -1,4 +1,4 @@
-"""Whether the vehicle drives, as the image shows: most of what is seen flows outward, left and right of O."""
+"""Whether the vehicle drives, by the image: most of the scene flows outward, left and right of O."""
 
 import math
 
@@ -8,20 +8,20 @@ from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.situation import Situation
 
-MIN_BASELINE_S = 0.15  # motion over less than this is lost in noise
+MIN_BASELINE_S = 0.15  # motion over less time is lost in noise
 MOVES_SIGMAS = 3.0
 MIN_R_SHARE = 0.1  # of the focal length; nearer to O an edge hardly flows
 MIN_A_SIDE = 8  # edges that flow outward left of O, and right of it
 FLOW_SHARE = 0.6  # of all edges
 MAX_ASTRAY = 0.2  # edges that move otherwise, as a share of those that flow
-MAX_DRIFT_SHARE = 0.5  # of the way outward; more is astray
+MAX_DRIFT_SHARE = 0.5  # of the outward motion; with more an edge is astray
 
 
 class DrivingTest:
     """What one frame shows. ``drives``: the verdict.
 
-    ``edges``: those with a history, away from O, and what may be parts of the vehicle; of these ``left`` and ``right``
-    of O flow outward, ``astray`` move otherwise.
+    ``edges``: those with a history, away from O, and own parts; of these ``left`` and ``right`` of O flow outward,
+    ``astray`` move otherwise.
     """
 
     def __init__(self) -> None:
@@ -32,7 +32,7 @@ class DrivingTest:
 def look(
     test: DrivingTest, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
 ) -> None:
-    """Note one edge."""
+    """Count one edge."""
     too_near = verdicts.r[j] < MIN_R_SHARE * around.pinhole.focal
     if too_near or baselines.elapsed_s[verdicts.slot[j]] < MIN_BASELINE_S:
         return
@@ -49,9 +49,9 @@ def look(
 
 
 def measure(test: DrivingTest, verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
-    """Set ``drives``. What comes towards a vehicle that stands flows outward as well, but all around it stands.
+    """Set ``drives``. What approaches a stationary vehicle flows outward as well, but its surroundings are stationary.
 
-    What has stood for long counts as part of the vehicle and is not judged, but it is seen to stand.
+    Edges that have not moved for long count as own parts and are not judged, but they are evidence of rest.
     """
     test.edges = test.left = test.right = test.astray = 0
     for i in range(edges.count):

@@ -1,4 +1,4 @@
-"""Circle expert, C_n: normal edges that go together by direction, speed and place become circles."""
+"""Circle expert, C_n: normal edges that agree in direction, speed and position become circles."""
 
 import math
 
@@ -12,13 +12,13 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 SPEED_NOISE_PX = 0.6  # 1 sigma of an edge's V, times t_f
-PASSING_WIDTHS = 2.0  # half widths of the vehicle, beside its path
-DEPTH_SPREAD = 0.5  # edges of one circle differ in expansion by no more than this share
-INSIDE_RADII = 1.5  # an edge is inside a circle up to this,
-INSIDE_MARGIN_PX = 4.0  # and this
+PASSING_WIDTHS = 2.0  # half widths of the vehicle from its path, beyond which a circle may be ignored
+DEPTH_SPREAD = 0.5  # share by which the expansion of an edge may differ from its circle's
+INSIDE_RADII = 1.5  # radii of a circle within which an edge lies inside,
+INSIDE_MARGIN_PX = 4.0  # plus this
 SUDDEN_CHANGE = 10.0  # times ε_V, by which the mean expansion of an aligned circle's edges may exceed its own
 ALIGNED_SHARE = 0.2  # of ε_β, by which their mean direction may differ from its own
-SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s are all as good as none
+SLOWEST_OCTAVE = -6  # expansions below 2**-6 1/s share one octave
 SLOWEST = 0.015625  # 2**-6
 OCTAVES = 16
 CELLS = 32  # a side, of BS_λ each
@@ -27,15 +27,15 @@ MIN_R_PX = 1.0
 
 
 class Flowing:
-    """Trusted normal edges that may be grouped, a row each; and what they tell about their circles.
+    """Trusted normal edges that may be grouped, one row each, and the statistics of their circles.
 
     ``row``: of the table of edges. ``r``: px from O. ``cos``, ``sin``: of the direction of flow. ``expansion``: V/r,
-    1/s. ``cell``: of the image and octave of expansion in which it looks for others, -1: it has a circle;
-    ``cell_size``: edges in each.
+    1/s. ``cell``: its cell of image position and octave of expansion, -1: it has a circle; ``cell_size``: edges in
+    each.
 
-    A row a circle: ``members``; ``before``, edges that belonged to it; ``included``, those that still lie in it;
+    One row per circle: ``members``; ``before``, edges that belonged to it; ``included``, those that still lie in it;
     ``mean_cos``, ``mean_sin``, ``mean_expansion`` of its edges; ``beta_cos``, ``beta_sin`` of its own direction.
-    ``open``: circles that an edge may join, ``open_count``.
+    ``open``: the ``open_count`` circles that an edge may join.
     """
 
     def __init__(self, edges: int, circles: int) -> None:
@@ -50,7 +50,7 @@ class Flowing:
 
 
 def predict(circles: CircleColumns, plane: ImagePlane, around: Situation) -> None:
-    """C'_n: what stands still goes out from the focus and grows, both at the rate of its expansion.
+    """C'_n: a stationary circle moves outward from O and grows, both at the rate of its expansion.
 
     Circles whose centre left the frame end.
     """
@@ -73,12 +73,12 @@ def passes_by(circles: CircleColumns, c: int, around: Situation) -> bool:
     right_m = (circles.x[c] - around.focus_x) / around.pinhole.fx * range_m
     off_path_m = math.fabs(path.miss(right_m, range_m, around))
     radius_m = circles.radius[c] / around.pinhole.fx * range_m
-    beside_m = min(math.fabs(right_m), off_path_m) - radius_m  # a turn may end
+    beside_m = min(math.fabs(right_m), off_path_m) - radius_m  # the turn may end
     return beside_m > PASSING_WIDTHS * around.half_width_m
 
 
 def gather(flowing: Flowing, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """The edges that may be grouped; eq. EdgeEncompare's |V_e| ≤ ε_V·V_ν is held to the depth of the scene."""
+    """Gather the edges that may be grouped; |V_e| ≤ ε_V·V_ν of eq. EdgeEncompare, with V_ν as image speed."""
     fastest = settings.eps_v * around.scene_flow_pxps / around.pinhole.focal
     flowing.count = 0
     for i in range(edges.count):
@@ -110,7 +110,7 @@ def fits(
     around: Situation,
     settings: Settings,
 ) -> bool:
-    """Whether an edge agrees with a circle in direction, speed and place (EdgeEncompare)."""
+    """Whether an edge agrees with a circle in direction, speed and position (EdgeEncompare)."""
     i = flowing.row[j]
     dx, dy = edges.x[i] - circles.x[c], edges.y[i] - circles.y[c]
     if not circles.active[c] or dx * dx + dy * dy >= settings.bs_px * settings.bs_px:
@@ -124,7 +124,7 @@ def fits(
 
 
 def nearest_open(flowing: Flowing, edges: EdgeColumns, i: int, circles: CircleColumns) -> int:
-    """The open circle whose centre is nearest to an edge, -1: there is none."""
+    """The open circle nearest to an edge, -1: none."""
     nearest = -1
     least = 0.0
     for k in range(flowing.open_count):
@@ -137,7 +137,7 @@ def nearest_open(flowing: Flowing, edges: EdgeColumns, i: int, circles: CircleCo
 
 
 def open_circles(flowing: Flowing, circles: CircleColumns, ignored: Bytes) -> None:
-    """Those that an edge may join: in use, and not under ψ."""
+    """List the circles that an edge may join: in use, and not under ψ."""
     flowing.open_count = 0
     for c in range(circles.capacity):
         flowing.before[c] = flowing.included[c] = 0
@@ -151,7 +151,7 @@ def open_circles(flowing: Flowing, circles: CircleColumns, ignored: Bytes) -> No
 def involve(
     flowing: Flowing, edges: EdgeColumns, circles: CircleColumns, around: Situation, settings: Settings
 ) -> None:
-    """Circle of each edge, -1: none; and how many edges of each circle still lie in it (percentinvolve)."""
+    """Assign each edge to a circle, -1: none, and count the edges that still lie in theirs (percentinvolve)."""
     for j in range(flowing.count):
         i = flowing.row[j]
         c = edges.circle[i]
@@ -168,7 +168,7 @@ def involve(
 
 
 def average(flowing: Flowing, members: Members, edges: EdgeColumns) -> None:
-    """What the edges of each circle show: how many, their middle and spread, mean direction and expansion."""
+    """Statistics of the edges of each circle: number, mean position and variance, mean direction and expansion."""
     for c in range(members.capacity):
         shared.clear(members, c)
         flowing.mean_cos[c] = flowing.mean_sin[c] = flowing.mean_expansion[c] = 0.0
@@ -205,7 +205,7 @@ def is_involved(flowing: Flowing, c: int, settings: Settings) -> bool:
 
 
 def is_aligned(flowing: Flowing, circles: CircleColumns, c: int, settings: Settings) -> bool:
-    """Whether the edges of a circle go on, in the mean, as it does (EdgeCirclenormalcompare)."""
+    """Whether the edges of a circle move, in the mean, as it does (EdgeCirclenormalcompare)."""
     beta = math.atan2(flowing.mean_sin[c], flowing.mean_cos[c])
     turn = math.fabs(flow.wrap(beta - circles.beta[c]))
     most = SUDDEN_CHANGE * settings.eps_v * math.fabs(circles.expansion[c])
@@ -213,7 +213,7 @@ def is_aligned(flowing: Flowing, circles: CircleColumns, c: int, settings: Setti
 
 
 def compare(flowing: Flowing, circles: CircleColumns, ignored: Bytes, settings: Settings) -> None:
-    """Groups against circles: aligned Tr +1; deviated but well included, updated and Tr -1; unmatched Tr -1."""
+    """Update circles from their edges: aligned Tr +1; deviating but involved, updated and Tr -1; else Tr -1."""
     for c in range(circles.capacity):
         if not circles.active[c] or ignored[c]:
             continue
@@ -230,7 +230,7 @@ def compare(flowing: Flowing, circles: CircleColumns, ignored: Bytes, settings: 
 
 
 def direct(circles: CircleColumns, around: Situation) -> None:
-    """β and V of normal circles follow from their place and expansion."""
+    """Set β and V of normal circles from their position and expansion."""
     for c in range(circles.capacity):
         if circles.active[c]:
             dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
@@ -239,7 +239,7 @@ def direct(circles: CircleColumns, around: Situation) -> None:
 
 
 def cell_of(x: float, y: float, expansion: float, around: Situation, size_px: float) -> int:
-    """Number of the cell of the image, and of the octave of expansion, in which an edge looks for others."""
+    """Number of the cell, of image position and octave of expansion, of an edge."""
     u = rounding.whole(math.floor((x - around.focus_x) / size_px)) + CELLS // 2
     v = rounding.whole(math.floor((y - around.focus_y) / size_px)) + CELLS // 2
     octave = rounding.whole(math.floor(math.log2(max(math.fabs(expansion), SLOWEST)) + 0.5)) - SLOWEST_OCTAVE
@@ -247,7 +247,7 @@ def cell_of(x: float, y: float, expansion: float, around: Situation, size_px: fl
 
 
 def sort_left(flowing: Flowing, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """Count the edges without a circle by cell."""
+    """Sort the edges without a circle into cells."""
     for j in range(flowing.count):
         i = flowing.row[j]
         flowing.cell[j] = -1
@@ -257,7 +257,7 @@ def sort_left(flowing: Flowing, edges: EdgeColumns, around: Situation, settings:
 
 
 def largest_cell(flowing: Flowing, support: int) -> int:
-    """The cell with the most edges, the first of equals; -1: none has so many as ``support``."""
+    """The cell with the most edges, of equals the first; -1: none has ``support`` edges."""
     largest = -1
     for j in range(flowing.count):
         cell = flowing.cell[j]
@@ -270,7 +270,7 @@ def largest_cell(flowing: Flowing, support: int) -> int:
 
 
 def average_cell(flowing: Flowing, cell: int, members: Members, edges: EdgeColumns, c: int) -> None:
-    """Gather the edges of a cell as members of circle ``c``."""
+    """Make the edges of a cell members of circle ``c``, and compute their statistics."""
     shared.clear(members, c)
     flowing.mean_expansion[c] = 0.0
     for j in range(flowing.count):
@@ -295,9 +295,9 @@ def average_cell(flowing: Flowing, cell: int, members: Members, edges: EdgeColum
 def found(
     flowing: Flowing, edges: EdgeColumns, circles: CircleColumns, around: Situation, settings: Settings, ids: Ids
 ) -> int:
-    """New circles from the edges that are left, those of one cell and octave, the largest groups first.
+    """Found circles from the remaining edges, those of one cell together, the largest groups first.
 
-    Return how many circles, old or new, found no place.
+    Return how many circles, old or new, did not fit.
     """
     evicted = 0
     sort_left(flowing, edges, around, settings)
@@ -328,7 +328,7 @@ def update(
 ) -> int:
     """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); return evictions.
 
-    ``ignored``: (capacity,), circles under an active ψ, which are only predicted.
+    ``ignored``: (capacity,), circles under an active ψ, which are predicted only.
     """
     gather(flowing, edges, around, settings)
     open_circles(flowing, circles, ignored)

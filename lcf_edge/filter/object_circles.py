@@ -1,4 +1,4 @@
-"""What an object tells its circles, for it knows more than each of them, and that it keeps one."""
+"""Objects correct their circles, since they know more than each of them, and keep one."""
 
 import math
 
@@ -11,7 +11,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
-LEFT_SHARE = 0.25  # of an object's width: with no more of it in the image it has left
+LEFT_SHARE = 0.25  # of an object's width: with no more in the image it has left
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 CROSSES, COMES, LEADS = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
@@ -25,17 +25,17 @@ def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
 
 
 def cause_of(objects: ObjectColumns, o: int) -> int:
-    """The cause of the circles of an object that moves."""
+    """Cause of the circles of an object that moves."""
     if objects.probability[o] > square_expert.EVEN:
         return COMES
     return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
 
 
 def correct(objects: ObjectColumns, circles: CircleColumns, settings: Settings) -> None:
-    """Circles of what moves take cause, range and miss from their object.
+    """Circles of moving objects take cause, range and lateral miss from their object.
 
-    The time to contact stays their own, for their prediction rests on it. What stands they measure better themselves;
-    one that takes itself for something to be met is contradicted only where the object goes to the side.
+    They keep their own time to contact, on which their prediction rests. Circles of stationary objects measure better
+    by themselves; an incoming circle is corrected only where the object crosses.
     """
     for c in range(circles.capacity):
         o = circles.square[c]
@@ -49,7 +49,7 @@ def correct(objects: ObjectColumns, circles: CircleColumns, settings: Settings) 
 
 
 def is_inside(circles: CircleColumns, c: int, objects: ObjectColumns, o: int) -> bool:
-    """Whether the middle of a circle is in the box of an object."""
+    """Whether the centre of a circle is in the box of an object."""
     if 2 * math.fabs(circles.x[c] - objects.x[o]) > objects.width[o]:
         return False
     return 2 * math.fabs(circles.y[c] - objects.y[o]) <= objects.height[o]
@@ -65,7 +65,7 @@ def is_shown(objects: ObjectColumns, o: int, circles: CircleColumns, settings: S
 
 
 def own_circle(circles: CircleColumns, o: int) -> int:
-    """The circle of an object that is trusted most, -1: it has none."""
+    """The most trusted circle of an object, -1: it has none."""
     own = -1
     for c in range(circles.capacity):
         if circles.active[c] and circles.square[c] == o and (own < 0 or circles.trust[c] > circles.trust[own]):
@@ -74,7 +74,7 @@ def own_circle(circles: CircleColumns, o: int) -> int:
 
 
 def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
-    """A circle is what its object is, just trusted."""
+    """Set a circle from its object, with trust Tr_s."""
     x, y = objects.x[o], objects.y[o]
     looming = square_expert.looming_at(objects, o, around.speed_mps)
     vx = square_expert.velocity_x(objects, o, x, looming, around)
@@ -89,7 +89,7 @@ def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around:
 
 
 def has_left(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
-    """Whether hardly a part of an object that is not seen is in the image."""
+    """Whether an unseen object has all but left the image."""
     inward = (0.5 - LEFT_SHARE) * objects.width[o]
     inmost_x = objects.x[o] + inward if objects.x[o] < 0.5 * plane.width else objects.x[o] - inward
     return objects.state[o] != SEEN and not image_plane.project(plane, inmost_x, objects.y[o])
@@ -98,9 +98,9 @@ def has_left(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
 def end_outside(
     objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, plane: ImagePlane, around: Situation
 ) -> None:
-    """Circles of what has left the image end: there only the object goes on.
+    """End the circles of objects that left the image; only the object continues.
 
-    Not where nothing is seen to flow: that is what fills the image.
+    Not while no flow is seen: then it fills the image.
     """
     if not around.flow_is_seen:
         return
@@ -123,7 +123,8 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """C_r from S: what is seen, and met sooner than not, keeps a circle, though its edges hardly break the flow.
+    """C_r from S: an object that is seen, and more likely met than not, keeps a circle even if its edges hardly break
+    the flow.
 
     Return evictions.
     """

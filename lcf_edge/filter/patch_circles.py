@@ -1,7 +1,7 @@
-"""C_r from patches: what stands in the way and grows, though no corner of it tells so.
+"""C_r from patches: stationary obstacles whose corners do not show that they approach.
 
-Two patches at least must agree to found a circle; one is enough to confirm it. It is *incoming*; one that rebels show
-already is left to them.
+At least two patches must agree to found a circle; one confirms it. Its cause is *incoming*. A circle that rebels
+updated is left to them.
 """
 
 import math
@@ -16,36 +16,36 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-MIN_ELAPSED_S = 0.5  # before that, a patch has not grown enough to be believed
-MIN_SIGMAS = 4.0  # by which the inverse range of what will be met is above zero,
-ALIKE_SIGMAS = 3.0  # and that of a patch that agrees
-UNEVEN = 3.0  # sigmas of a group's growth that half its difference between across and down counts as
-SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
-KNOWN_WIDTHS = 1.1  # half widths from the path within which what is known to be in the way still is
-HALF_SHARE = 0.6  # of half a side, by which what a patch shows reaches to the side at least
+MIN_ELAPSED_S = 0.5  # a younger patch has not grown enough to be reliable
+MIN_SIGMAS = 4.0  # by which 1/Z of an obstacle exceeds zero,
+ALIKE_SIGMAS = 3.0  # and that of a patch that agrees with it
+UNEVEN = 3.0  # sigmas that half the difference between a group's growth across and down counts as
+SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, in horizons at most
+KNOWN_WIDTHS = 1.1  # half widths from the path within which a known obstacle still is in the way
+HALF_SHARE = 0.6  # least half width of a thing, in half-sides of its patch
 GROUND_MARGIN = 0.3  # share by which the ground may be misjudged
-UPRIGHT_SHARE = 0.25  # of 1/Z, by which the ground's differs at least between two patches that are told from it,
-UPRIGHT_SIGMAS = 4.0  # and by these more than theirs do
-LOWEST_SHARE = 0.8  # of the camera's height; what is lower is the ground
-DRIFT_RAD = 0.004  # by which a patch may leave its flow line to the side, and still stand,
-PITCH_RAD = 0.02  # and up or down: pitch is known less well;
-DRIFT_PX = 0.7  # more than either by this
-AGREE_SIGMAS = 2.0  # by which inverse ranges of one thing differ,
-AGREE_SHARE = 0.1  # besides this share,
-AGREE_AT_MOST = 0.25  # and no more than this one
+UPRIGHT_SHARE = 0.25  # of 1/Z, least difference that the ground would have between two patches of something upright,
+UPRIGHT_SIGMAS = 4.0  # and by which theirs falls short of it
+LOWEST_SHARE = 0.8  # depth under the camera, as a share of its height, below which it is the ground
+DRIFT_RAD = 0.004  # sideways drift off its flow line that a stationary patch may have,
+PITCH_RAD = 0.02  # and vertical drift: pitch is known less well;
+DRIFT_PX = 0.7  # added to both
+AGREE_SIGMAS = 2.0  # by which inverse ranges of one thing may differ,
+AGREE_SHARE = 0.1  # plus this share,
+AGREE_AT_MOST = 0.25  # but by no more than this share
 MIN_RANGE_M = 0.01
-SIDE_SIDES = 3.0  # half sides within which patches beside each other may be of one thing,
+SIDE_SIDES = 3.0  # half-sides within which patches side by side may belong to one thing,
 STACK_SIDES = 4.0  # and one above the other
 INCOMING = int(Cause.INCOMING)
 INFINITY = float("inf")
 
 
 class PatchGroups:
-    """Patches that show one thing; a row a patch, by which the group was found.
+    """Groups of patches that show one thing; one row per patch from which a group starts.
 
-    ``obstacle``: whether a patch shows one; ``taken``: whether it is of a group already. ``members``: as those of
-    circles, of the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m;
-    ``uneven``: the same of half the difference between its growth across and down.
+    ``obstacle``: whether a patch shows one; ``taken``: whether it is in a group already. ``members``: as those of
+    circles, from the extent of the patches. Of the last group, ``weight``: Σ 1/σ², ``inverse``: its 1/Z, 1/m;
+    ``uneven``: half the difference between its growth across and down, in the same unit.
     """
 
     def __init__(self, patches: int) -> None:
@@ -63,7 +63,7 @@ def stands(patches: Patches, p: int, around: Situation) -> bool:
 
 
 def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
-    """Whether what a patch shows stands above the ground, and is as near as the vehicle gets within the horizon."""
+    """Whether a patch shows something stationary above the ground that the vehicle reaches within the horizon."""
     inverse, doubt = patches.inverse[p], patches.doubt[p]
     reach_m = around.speed_mps * around.horizon_s
     if not inverse > MIN_SIGMAS * doubt or not (inverse - doubt) * SLOWER_HORIZONS * reach_m > 1:
@@ -91,9 +91,9 @@ def ground_inverse(y: float, around: Situation) -> float:
 
 
 def is_upright(patches: Patches, p: int, around: Situation) -> bool:
-    """Whether a patch and one above or below that agrees are as far off; of the ground, the lower one would be nearer.
+    """Whether a patch is at the same range as one above or below it; on the ground, the lower one would be nearer.
 
-    Unlike the ground's range, this does not depend on the pitch.
+    Unlike the range of the ground, this does not depend on the pitch.
     """
     for q in range(patches.capacity):
         if not agree(patches, p, q):
@@ -110,7 +110,7 @@ def is_upright(patches: Patches, p: int, around: Situation) -> bool:
 
 
 def is_in_way(groups: PatchGroups, g: int, patches: Patches, is_known: bool, around: Situation) -> bool:
-    """Whether the path meets what a group shows. What is known already must leave the way by more than the doubt."""
+    """Whether a group lies in the vehicle's path; for a known obstacle with a margin."""
     range_m = 1 / groups.inverse
     right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
     beside_m = HALF_SHARE * patches.half_px[g] * patches.scale[g] / around.pinhole.fx * range_m
@@ -119,7 +119,7 @@ def is_in_way(groups: PatchGroups, g: int, patches: Patches, is_known: bool, aro
 
 
 def agree(patches: Patches, p: int, q: int) -> bool:
-    """Whether two patches show one thing: near each other, and as far off."""
+    """Whether two patches show one thing: near each other, and at the same range."""
     if p == q or not patches.active[q] or patches.misses[q] or patches.elapsed_s[q] < MIN_ELAPSED_S:
         return False
     half = patches.half_px[p] * patches.scale[p]
@@ -138,7 +138,7 @@ def agree(patches: Patches, p: int, q: int) -> bool:
 
 
 def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
-    """Take a patch into a group."""
+    """Add a patch to a group."""
     half = patches.half_px[p] * patches.scale[p]
     weight = 1 / (patches.doubt[p] * patches.doubt[p])
     groups.members.size[g] += 1
@@ -150,7 +150,7 @@ def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
 
 
 def gather(groups: PatchGroups, p: int, patches: Patches) -> None:
-    """The group of a patch and those that agree with it."""
+    """Gather the group of a patch and those that agree with it."""
     shared.clear(groups.members, p)
     groups.left = groups.top = INFINITY
     groups.right = groups.bottom = -INFINITY
@@ -170,14 +170,14 @@ def gather(groups: PatchGroups, p: int, patches: Patches) -> None:
 def grows_evenly(groups: PatchGroups) -> bool:
     """Whether a group grows as much down as across.
 
-    Things in a row beside the way flow apart, the nearer the farther from the focus, and seem to be a nearer one that
-    grows; but only along their row. The ground grows more down than across.
+    Things in a row beside the path flow apart, faster the farther from the focus, and so resemble one nearer thing that
+    grows, but only along their row. The ground grows more down than across.
     """
     return groups.inverse > MIN_SIGMAS * lengths.of(1 / math.sqrt(groups.weight), UNEVEN * groups.uneven)
 
 
 def claim(groups: PatchGroups, p: int, patches: Patches, circle: int) -> None:
-    """The patches of a group found no other one. ``circle``: row of C_r that they support, -1: none."""
+    """Mark the patches of a group as taken. ``circle``: row of C_r that they support, -1: none."""
     for q in range(patches.capacity):
         if q == p or agree(patches, p, q):
             groups.taken[q] = 1
@@ -186,7 +186,7 @@ def claim(groups: PatchGroups, p: int, patches: Patches, circle: int) -> None:
 
 
 def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Settings) -> int:
-    """The circle that shows the same, the nearest; -1: none."""
+    """The nearest circle that shows the same thing, -1: none."""
     nearest, least = -1, INFINITY
     half = 0.5 * max(groups.right - groups.left, groups.bottom - groups.top)
     for c in range(circles.capacity):
@@ -199,7 +199,7 @@ def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Set
 
 
 def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
-    """Whether a group is as far off as a circle that is known to be in the way."""
+    """Whether a group is at the range of a circle."""
     if not circles.range[c] > 0:
         return False
     apart = math.fabs(groups.inverse - 1 / circles.range[c])
@@ -209,7 +209,7 @@ def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
 def set_cause(
     groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
 ) -> None:
-    """Cause, motion, time to contact, range and lateral miss of a circle, from the range of its patches."""
+    """Set cause, motion, time to contact, range and lateral miss of a circle, from the range of its patches."""
     range_m = 1 / groups.inverse
     right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
     rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
@@ -231,9 +231,9 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """Circles of what patches show to be in the way; return evictions.
+    """Update C_r from the obstacles that patches show; return evictions.
 
-    ``updated``: which circles rebels have updated; those that patches update are marked too.
+    ``updated``: circles that rebels have updated; those updated here are marked too.
     """
     evicted = 0
     if not around.speed_mps > 0:
@@ -252,7 +252,7 @@ def update(
             continue
         if not is_in_way(groups, p, patches, is_known, around) or (c < 0 and not grows_evenly(groups)):
             continue
-        is_shown = c >= 0 and updated[c] != 0  # by rebels, to which it is left
+        is_shown = c >= 0 and updated[c] != 0  # updated by rebels, and left to them
         if c < 0:
             evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)

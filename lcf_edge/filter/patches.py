@@ -1,9 +1,9 @@
-"""Patches: pieces of the image near the path, followed for seconds; how much they grew tells how far off they are.
+"""Patches: pieces of the image near the path, tracked for seconds, whose growth gives their range.
 
-Near the focus, where what is ahead appears, a corner hardly moves within the window of key frames, and it seldom lives
-longer. A piece of the image around it does: it is found again by shift and scale, to a small part of a pixel, against
-the image in which it was first seen (inverse compositional Lucas-Kanade: Baker and Matthews 2004). What stands still
-at Z was seen ΔZ farther off, so it has grown by s = (Z + ΔZ)/Z.
+Near the focus, where obstacles first appear, a corner hardly moves within the window of key frames and seldom lives
+longer. An image patch around it does: it is tracked in shift and scale, with sub-pixel accuracy, against the template
+in which it was first seen (inverse compositional Lucas-Kanade: Baker and Matthews 2004). Something stationary at Z was
+ΔZ farther off then, so it has grown by s = (Z + ΔZ)/Z.
 """
 
 import math
@@ -17,53 +17,53 @@ from lcf_edge.filter.situation import Situation
 
 SIDE = 16  # samples along a side of a patch
 SAMPLES = 256
-SHARPNESS = 1.5  # weight exp(-SHARPNESS·r²), r in half sides: the rim is seldom of the same thing
-EFFECTIVE_SHARE = 0.4  # of the samples, which that weighing leaves
-MIN_HALF_PX = 7.0  # half a side, at birth, at least
+SHARPNESS = 1.5  # weight exp(-SHARPNESS·r²), r in half-sides: the rim often shows something else
+EFFECTIVE_SHARE = 0.4  # effective number of samples after that weighting, as a share
+MIN_HALF_PX = 7.0  # half-side of a new patch, at least
 MAX_HALF_PX = 16.0  # and at most
-HALF_WIDTH_SHARE = 0.4  # of the vehicle's half width, as far off as it is in half a horizon, that half a side is
-BESIDE = 1.2  # half widths from the path there, within which patches are born,
-BESIDE_HALVES = 1.5  # or so many half sides
-NEAREST_S = 1.0  # ground that is reached sooner is too low in the image
-ROW_SHARE = 1.0  # of a distance in height that counts when the place nearest to the path is chosen
-APART = 1.1  # half sides that lie between patches
-BIRTHS = 3  # in one frame, at most
+HALF_WIDTH_SHARE = 0.4  # half-side, as a share of the vehicle's half width at the range of half a horizon
+BESIDE = 1.2  # half widths from the path at that range, within which patches start,
+BESIDE_HALVES = 1.5  # or half-sides, if more
+NEAREST_S = 1.0  # ground reached sooner is too low in the image
+ROW_SHARE = 1.0  # weight of vertical distance from the horizon in choosing the place nearest to the path
+APART = 1.1  # half-sides between the centres of patches
+BIRTHS = 3  # per frame, at most
 MIN_CONTRAST_GREY = 6.0
 NOISE_GREY = 2.0  # 1 sigma of a sample, at least
-MAX_SCALE_SIGMA = 0.0125  # of a newborn; what does not show its scale is of no use
-MIN_ALONE = 1e-6  # share that shift and scale leave of what stretching changes, at least
-MIN_SCALE_SIGMA = 0.01  # what a patch shows is not flat
+MAX_SCALE_SIGMA = 0.0125  # of a new patch; a template that does not show its scale is useless
+MIN_ALONE = 1e-6  # least share of the stretch that shift and scale do not explain
+MIN_SCALE_SIGMA = 0.01  # model error: a patch is not flat
 FAR_PX = 1e9
 ROUNDS = 4
-SMALL_PX = 0.03  # a change by less ends the search,
-SMALL_SHARE = 0.003  # and by less of the scale
-STEP_SHARE = 0.33  # of half a side, and
-STEP_SCALE = 0.1  # by which one round changes place and scale at most
-LIKENESS = 0.95  # normalised correlation; below, it is not the same thing any more
+SMALL_PX = 0.03  # convergence: smaller change of position,
+SMALL_SHARE = 0.003  # and of scale
+STEP_SHARE = 0.33  # largest step of a round: of position, in half-sides,
+STEP_SCALE = 0.1  # and of scale
+LIKENESS = 0.95  # least normalised cross-correlation
 MAX_MISSES = 4
 MIN_SCALE = 0.8
 MAX_SCALE = 2.2
-LIFE_S = 2.5  # then what is around a thing has changed too much
+LIFE_S = 2.5  # later the surroundings have changed too much
 MIN_SPEED_MPS = 0.05
 
 
 class Patches:
-    """A row a patch.
+    """One row per patch.
 
-    ``x``, ``y``: its middle, px; ``first_x``, ``first_y``: where that was first seen, derotated to now, px;
-    ``half_px``: half a side when it was first seen; ``scale``: s since then, and ``sigma`` of it; ``elapsed_s``;
-    ``depth_m``: ΔZ; ``stretch``: half of what it grew more across than down, as a share of its size;
-    ``misses``: frames in a row that did not show it; ``inverse``, ``doubt``: 1/Z as if it stood still, and its sigma,
-    1/m; ``circle``: row of C_r that it supports in this frame, -1: none.
+    ``x``, ``y``: centre, px; ``first_x``, ``first_y``: where that was first seen, derotated to now, px; ``half_px``:
+    half-side then; ``scale``: s since then, and ``sigma`` of it; ``elapsed_s``; ``depth_m``: ΔZ; ``stretch``: half the
+    excess of its growth across over that down, as a share of its size; ``misses``: consecutive frames in which it was
+    not found; ``inverse``, ``doubt``: 1/Z if it is stationary, and its sigma, 1/m; ``circle``: row of C_r that it
+    supports in this frame, -1: none.
 
-    The template, over its samples: ``grey``, less its mean; ``across``, ``down``, ``growing``, ``stretching``: what
-    shift, scale and stretch change of it, weighed; ``sums`` of these and their products with ``grey`` (8);
-    ``inverted``, of the normal equations of the first three (9); ``coupled``: their products with ``stretching`` (3);
-    ``alone``: what of the square of that they leave; ``contrast``: 1 sigma of ``grey``; ``unit``: sigma of the scale
-    for a noise of one grey level.
+    The template, over its samples: ``grey``, minus its mean; ``across``, ``down``, ``growing``, ``stretching``: its
+    weighted derivatives by shift, scale and stretch; ``sums`` of these and of their products with ``grey`` (8);
+    ``inverted``: inverse of the normal matrix of the first three (9); ``coupled``: their products with ``stretching``
+    (3); ``alone``: squared ``stretching`` that they do not explain; ``contrast``: 1 sigma of ``grey``; ``unit``: sigma
+    of the scale for noise of one grey level.
 
-    ``weight`` of the samples; ``offset``: of a row or column of them from the middle, half sides. ``tried``: how far
-    from the path a place was tried, px. The rest is what one comparison gives.
+    ``weight`` of the samples; ``offset``: of a row or column of them from the centre, half-sides. ``tried``: distance
+    from the path of the last place tried, px. The rest is the result of one comparison.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -88,7 +88,7 @@ class Patches:
 
 
 def weigh(patches: Patches) -> None:
-    """A bell over the samples, their sum 1."""
+    """Set offsets and Gaussian weights of the samples, normalised to a sum of 1."""
     for k in range(SIDE):
         patches.offset[k] = (2.0 * k - (SIDE - 1)) / (SIDE - 1)
     total = 0.0
@@ -104,7 +104,7 @@ def weigh(patches: Patches) -> None:
 
 
 def derotate(patches: Patches, h: Homography) -> None:
-    """H = K·R·K⁻¹ on where patches are and were."""
+    """Apply H = K·R·K⁻¹ to the present and first positions of patches."""
     for p in range(patches.capacity):
         if patches.active[p]:
             flow.warp(h, patches.x[p], patches.y[p])
@@ -114,7 +114,7 @@ def derotate(patches: Patches, h: Homography) -> None:
 
 
 def predict(patches: Patches, around: Situation) -> None:
-    """Each patch grows from O as what stands still does; without a speed nothing follows from that, and they end."""
+    """Move each patch outward from O, as stationary; without a speed that predicts nothing, and patches end."""
     for p in range(patches.capacity):
         if not math.isfinite(around.speed_mps):
             patches.active[p] = 0
@@ -133,7 +133,7 @@ def predict(patches: Patches, around: Situation) -> None:
 
 
 def locate(patches: Patches, plane: ImagePlane, x: float, y: float, half: float) -> bool:
-    """Where the lens shows a patch: its middle and half its sides, px of the frame; False: not all of it is seen."""
+    """Project a patch through the lens: centre and half-sides, px of the frame; return whether all of it is seen."""
     if not image_plane.project(plane, x, y):
         return False
     patches.u, patches.v = plane.u, plane.v
@@ -154,7 +154,7 @@ def locate(patches: Patches, plane: ImagePlane, x: float, y: float, half: float)
 
 
 def look(patches: Patches, image: Bytes, width: int) -> None:
-    """The samples where the patch was placed, between four pixels each."""
+    """Sample the image where the patch was located, by bilinear interpolation."""
     middle_u, right_u, down_u = patches.u, patches.right_u, patches.down_u
     middle_v, right_v, down_v = patches.v, patches.right_v, patches.down_v
     for row in range(SIDE):
@@ -171,7 +171,7 @@ def look(patches: Patches, image: Bytes, width: int) -> None:
 
 
 def compare(patches: Patches, p: int) -> None:
-    """Sums over the samples that matching takes."""
+    """Compute the sums over the samples."""
     mean = square = shared = on_across = on_down = on_growing = on_stretching = 0.0
     for k in range(SAMPLES):
         grey = patches.sampled[k]
@@ -189,15 +189,14 @@ def compare(patches: Patches, p: int) -> None:
 
 
 def bounded(value: float, most: float) -> float:
-    """The value, no more than so much either way."""
+    """Clamp a value to ±``most``."""
     return min(max(value, -most), most)
 
 
 def step(patches: Patches, p: int, gain: float) -> float:
-    """One round of the search: shift and scale that make the samples, times ``gain``, like the template.
+    """One Gauss-Newton step of shift and scale, to align the samples, times ``gain``, with the template.
 
-    What it is stretched besides is told and not undone. Return by how much the patch was changed, in shares of what
-    ends the search.
+    The stretch is measured, not applied. Return the size of the step, relative to convergence.
     """
     across = gain * (patches.on_across - patches.mean * patches.sums[p, 0]) - patches.sums[p, 3]
     down = gain * (patches.on_down - patches.mean * patches.sums[p, 1]) - patches.sums[p, 4]
@@ -217,7 +216,7 @@ def step(patches: Patches, p: int, gain: float) -> float:
 
 
 def find(patches: Patches, p: int, image: Bytes, plane: ImagePlane) -> bool:
-    """Whether a patch is seen near where it was predicted; its place, its scale and their doubt."""
+    """Find a patch near its prediction: set position, scale and sigma; return whether it was found."""
     change, likeness, rest = 2.0, 0.0, 0.0
     for _ in range(ROUNDS):
         if change < 1:
@@ -239,7 +238,7 @@ def find(patches: Patches, p: int, image: Bytes, plane: ImagePlane) -> bool:
 
 
 def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
-    """Each patch in this image, or as predicted where that does not show it; too often, and it ends."""
+    """Track each patch into this image; one not found keeps its prediction, and ends after too many misses."""
     for p in range(patches.capacity):
         if not patches.active[p]:
             continue
@@ -262,14 +261,14 @@ def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
 
 
 def half_side(around: Situation) -> float:
-    """Half a side of a newborn, px: a part of the vehicle's width as far off as it is in half a horizon."""
+    """Half-side of a new patch, px: a share of the vehicle's half width at the range of half a horizon."""
     halfway_m = max(0.5 * around.speed_mps * around.horizon_s, MIN_SPEED_MPS)
     half = HALF_WIDTH_SHARE * around.half_width_m * around.pinhole.fx / halfway_m
     return min(max(half, MIN_HALF_PX), MAX_HALF_PX)
 
 
 def free_row(patches: Patches) -> int:
-    """The first row that is not in use, -1: none."""
+    """The first row not in use, -1: none."""
     for p in range(patches.capacity):
         if not patches.active[p]:
             return p
@@ -277,7 +276,7 @@ def free_row(patches: Patches) -> int:
 
 
 def is_covered(patches: Patches, x: float, y: float, half: float) -> bool:
-    """Whether a patch is there already."""
+    """Whether a patch already covers a position."""
     for p in range(patches.capacity):
         if not patches.active[p]:
             continue
@@ -287,10 +286,10 @@ def is_covered(patches: Patches, x: float, y: float, half: float) -> bool:
 
 
 def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situation) -> int:
-    """The edge nearest to the path, but for those tried, that may show what is met within the horizon; -1: none.
+    """The edge nearest to the path, among those not tried yet, where an obstacle may appear; -1: none.
 
-    In the image that is the neighbourhood of the path as far off as the vehicle is in half a horizon, from the
-    vehicle's height there down to the ground that is reached in ``NEAREST_S``.
+    In the image that is around the path at the range of half a horizon, from the vehicle's height there down to the
+    ground reached in ``NEAREST_S``.
     """
     fx, fy = around.pinhole.fx, around.pinhole.fy
     halfway_m = 0.5 * around.speed_mps * around.horizon_s
@@ -316,7 +315,7 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
 
 
 def give_birth(patches: Patches, p: int, x: float, y: float, half: float, image: Bytes, plane: ImagePlane) -> bool:
-    """A new patch around a place; False: it has too little contrast, or would not show its scale."""
+    """Start a patch around a position; False: too little contrast, or its scale would not show."""
     if not locate(patches, plane, x, y, half):
         return False
     look(patches, image, plane.width)
@@ -337,7 +336,7 @@ def give_birth(patches: Patches, p: int, x: float, y: float, half: float, image:
 
 
 def slope(patches: Patches, p: int, k: int, place: int, stride: int) -> float:
-    """Of the template at sample ``k``, grey levels for each sample; ``place`` along that direction."""
+    """Gradient of the template at sample ``k``, grey levels per sample; ``place``: its row or column."""
     if place == 0:
         return patches.grey[p, k + stride] - patches.grey[p, k]
     if place == SIDE - 1:
@@ -346,7 +345,7 @@ def slope(patches: Patches, p: int, k: int, place: int, stride: int) -> float:
 
 
 def set_template(patches: Patches, p: int) -> bool:
-    """What shift and scale change of the template, and the inverse of its normal equations; False: it is of no use."""
+    """Compute the template's derivatives and inverse normal matrix; False: it cannot be tracked."""
     half, spacing = patches.half_px[p], 2 * patches.half_px[p] / (SIDE - 1)
     square = xx = xy = xs = yy = ys = ss = xt = yt = st = tt = 0.0
     for k in range(8):
@@ -399,7 +398,7 @@ def set_template(patches: Patches, p: int) -> bool:
 
 
 def renew(patches: Patches, edges: EdgeColumns, image: Bytes, plane: ImagePlane, around: Situation) -> None:
-    """Newborn patches where there is room, around edges near the path."""
+    """Start new patches in free rows, around edges near the path."""
     if not around.speed_mps > MIN_SPEED_MPS:
         return
     half = half_side(around)

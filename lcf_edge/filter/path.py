@@ -1,6 +1,6 @@
 """The vehicle's path over the ground: an arc by speed and yaw rate, or a straight line.
 
-Points are given as the camera sees them, right and ahead of it; the arc is that of the axle behind it.
+Points are given relative to the camera, right and ahead; the arc is that of the axle behind it.
 """
 
 import math
@@ -8,13 +8,13 @@ import math
 from lcf_edge.filter.situation import Situation
 
 INFINITY = float("inf")
-MIN_CURVATURE = 1e-3  # 1/m, an arc with less is as good as straight
-MIN_SPEED_MPS = 0.05  # below it a yaw rate says nothing about a path
-SMALL_TURN_RAD = 0.4  # may as well not come: it may be noise, or soon be over
+MIN_CURVATURE = 1e-3  # 1/m; below, the path is straight
+MIN_SPEED_MPS = 0.05  # below, the yaw rate does not define a path
+SMALL_TURN_RAD = 0.4  # turns up to this may be noise, or soon be over
 
 
 def arc_radius_m(around: Situation) -> float:
-    """Radius of the path, m, its centre to the left when positive; infinite: straight, or the speed is unknown."""
+    """Radius of the path, m, positive to the left; infinite: straight, or speed unknown."""
     speed = around.speed_mps
     least = MIN_CURVATURE * max(math.fabs(speed), MIN_SPEED_MPS)
     if not math.isfinite(speed) or math.fabs(around.yaw_rate_radps) < least:
@@ -23,7 +23,7 @@ def arc_radius_m(around: Situation) -> float:
 
 
 def miss(right_m: float, ahead_m: float, around: Situation) -> float:
-    """Distance of a point from the vehicle's path, m, right positive."""
+    """Lateral miss: distance of a point from the vehicle's path, m, right positive."""
     radius = arc_radius_m(around)
     if not math.isfinite(radius):
         return right_m
@@ -33,8 +33,8 @@ def miss(right_m: float, ahead_m: float, around: Situation) -> float:
 
 
 def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
-    """Distance of a point from the path, m, right positive; the least of those between arc and straight line, where
-    the turn on the way there is small.
+    """Lateral miss of a point, m, right positive; where the turn until there is small, the least between arc and
+    straight line.
     """
     arc_m = miss(right_m, ahead_m, around)
     turn_rad = math.fabs(around.yaw_rate_radps) * ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
@@ -46,7 +46,7 @@ def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
 
 
 def way_to(right_m: float, ahead_m: float, around: Situation) -> float:
-    """How far the vehicle goes along its arc until a point is beside it, m."""
+    """Distance along the path until a point is abeam, m."""
     radius = arc_radius_m(around)
     if not math.isfinite(radius):
         return ahead_m

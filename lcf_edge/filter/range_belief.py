@@ -1,12 +1,12 @@
-"""What an object's motion in the image says about its range and its motion over ground, and how sure that is.
+"""Estimates an object's range and motion over ground, with their uncertainty, from its motion in the image.
 
-Three numbers are measured: the looming m = (V - w_z)/Z, 1/s; the sideways rate q = w_x/Z, 1/s, what is left of the
-motion to the side when the looming is taken out; and the inverse range 1/Z of the ground under its lowest edge. Here V
-is the vehicle's speed and (w_x, w_z) the object's velocity over ground, to the right and forward. One camera cannot
-tell a slow thing that is near from a fast one that is far; so the belief is kept over a grid of ranges, for two cases:
-it *stands* (w = 0: m = V/Z and q = 0), or it *moves* (w is normal with ``σ_w``). Each pair of case and range is
-weighed by how well it explains what was measured; all that is reported of an object is a mean over the pairs, with its
-standard deviation. Somebody who walks away to the side does not loom: nothing that stands near explains him.
+Three quantities are measured: the looming m = (V - w_z)/Z, 1/s; the sideways rate q = w_x/Z, 1/s, the sideways motion
+that remains without looming; and the inverse range 1/Z of the ground under its lowest edge. V is the vehicle's speed,
+(w_x, w_z) the object's velocity over ground, right and forward. One camera cannot distinguish slow and near from fast
+and far, so the belief is a grid of ranges for two cases: the object *stands* (w = 0: m = V/Z and q = 0), or it *moves*
+(w is normal with ``σ_w``). Each pair of case and range is weighted by its likelihood; everything reported is a mean
+over the pairs, with its standard deviation. Somebody who walks off sideways does not loom, as nothing stationary and
+near would explain.
 """
 
 import math
@@ -15,35 +15,35 @@ from lcf_edge.filter import lengths, path
 from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.situation import Situation
 
-RANGES = 48  # of the grid, in equal ratios
+RANGES = 48  # of the grid, spaced logarithmically
 NEAREST_M = 0.3
-FARTHEST_REACHES = 6.0  # in ways of the vehicle within the horizon
-FARTHEST_M = 25.0  # at least
-WALKS_MPS = 1.2  # σ_w at rest: who walks or cycles beside a slow vehicle,
-TRAFFIC_SHARE = 0.5  # and what drives beside a fast one
-CHANGES_MPS = 0.08  # 1 sigma of how much a mover's velocity changes while it is measured
-FOOT_SHARE = 0.08  # of the inverse range, 1 sigma by which an object's lowest edge lies beside its foot,
-HIDDEN_FOOT = 0.25  # if that is seen at all; else, which is so likely,
-LIFTED_M = 0.5  # so far, 1 sigma
-SMALL_M = 0.2  # what is smaller than this is hardly met,
-SMALL_RATIO = 0.5  # by the logarithm, 1 sigma
-SUNK_FOOT = 1e-9  # likelihood of what lies deep under the ground
-MEMORY_SHARE = 0.3  # share of a range, 1 sigma of what is kept of it from frame to frame, at least:
-# successive frames tell much the same, and it must not be counted as often
-JUMPS_HZ = 0.1  # how often it was wrong
-ODDS = 1.4  # logarithmic odds that a thing stands, before anything is measured
-ALONG_MPS = 0.2  # σ of the motion to the side of what goes along the path,
-ALONG = 0.5  # which is this share of what moves
-SPEED_SHARE = 0.05  # 1 sigma of the vehicle's speed
-MIN_SIGMA_HZ = 0.003  # of a looming or a sideways rate: what no model of noise has
-MAX_HORIZONS = 3.0  # later contacts do not count in a mean
-FRONT_SHARE = 0.3  # of half an object's width, by which its front is nearer than the mean of its edges,
-MAX_HALF_WIDTH = 1.0  # of an object, as a share of its range, that counts there: a wider box holds more than one thing
-DEPTH_SHARE = 0.4  # and 1 sigma of that,
-MIN_DEPTH = 0.03  # more by this share of its range
-MIN_WEIGHT = 0.2  # of all pairs of case and range, that a mean needs
-WIDER = 1.15  # than the spread of the pairs is what may be: both cases are simpler than the world
-MIN_SHARE = 1e-5  # pairs with less are left out
+FARTHEST_REACHES = 6.0  # in distances that the vehicle drives within the horizon,
+FARTHEST_M = 25.0  # or this, if more
+WALKS_MPS = 1.2  # σ_w for a vehicle at rest: pedestrians and cyclists,
+TRAFFIC_SHARE = 0.5  # plus this share of its speed: traffic
+CHANGES_MPS = 0.08  # 1 sigma of the change of a mover's velocity while it is measured
+FOOT_SHARE = 0.08  # 1 sigma of the lowest edge about the foot, as a share of 1/Z, where the foot shows;
+HIDDEN_FOOT = 0.25  # probability that it shows no edge; then the lowest edge is higher
+LIFTED_M = 0.5  # by this, 1 sigma
+SMALL_M = 0.2  # smaller things are unlikely,
+SMALL_RATIO = 0.5  # 1 sigma of ln(size) below that
+SUNK_FOOT = 1e-9  # likelihood of a foot deep under the ground
+MEMORY_SHARE = 0.3  # least 1 sigma of ln(range) that is kept from frame to frame:
+# successive frames are not independent
+JUMPS_HZ = 0.1  # rate at which the belief turns out wrong
+ODDS = 1.4  # prior log odds that an object stands
+ALONG_MPS = 0.2  # σ of the sideways motion of movers along the path,
+ALONG = 0.5  # which are this share of movers
+SPEED_SHARE = 0.05  # 1 sigma of the vehicle's speed, as a share
+MIN_SIGMA_HZ = 0.003  # noise floor of looming and sideways rate
+MAX_HORIZONS = 3.0  # later contacts do not enter the means
+FRONT_SHARE = 0.3  # distance of the front before the mean of the edges, as a share of half the width,
+MAX_HALF_WIDTH = 1.0  # which counts up to this share of the range: a wider box contains more than one thing
+DEPTH_SHARE = 0.4  # 1 sigma of that distance, as a share of half the width,
+MIN_DEPTH = 0.03  # plus this share of the range
+MIN_WEIGHT = 0.2  # total weight of the pairs that a mean needs
+WIDER = 1.15  # inflates all sigmas: both cases are simpler than the world
+MIN_SHARE = 1e-5  # pairs with less weight are left out
 RANGE, FORWARD, RIGHT, RATE, LATERAL, CLOSEST, QUANTITIES = 0, 1, 2, 3, 4, 5, 6
 TINY = 1e-300
 ROOT_2 = math.sqrt(2.0)
@@ -52,15 +52,14 @@ NAN = float("nan")
 
 
 class Evidence:
-    """What was measured of one object, and what is believed before.
+    """Measurements of one object, and the belief of the last frame.
 
     ``looming`` m, ``sideways`` q, 1/s, their variances and covariance ``mm``, ``qq``, ``mq``; ``reference``, m/s, the
-    vehicle's speed at which they were measured, which may be another one now; ``across``, tan of the bearing from O;
+    vehicle's speed at which they were measured, which may differ now; ``across``, tan of the bearing from O;
     ``across_sigma``; ``half_width``, tan of half its width; ``half_extent``, of half its width or height, whichever is
-    more; ``foot`` 1/Z of the ground under it, 1/m, with
-    ``foot_sigma``; ``hidden``: the probability that it shows no edge; ``is_cut``: it is below the image; ``log_odds``
-    of standing and ``range_before``, m, NaN: none, with ``range_doubt``, 1 sigma of its logarithm, as they were
-    believed in the frame before, brought to now.
+    more; ``foot``, 1/Z of the ground under it, 1/m, with ``foot_sigma``; ``hidden``: probability that the foot shows no
+    edge; ``is_cut``: it is below the image. Of the last frame, propagated to now: ``log_odds`` of standing;
+    ``range_before``, m, NaN: none, with ``range_doubt``, 1 sigma of its logarithm.
     """
 
     def __init__(self) -> None:
@@ -72,16 +71,15 @@ class Evidence:
 
 
 class Belief:
-    """What is believed after.
+    """The posterior belief.
 
-    ``stands``: the probability that it stands, and ``log_odds``, its logarithmic odds; ``met``: the probability that it
-    is met within the horizon; ``middle``, m, the range of the middle of its edges, with ``middle_sigma``, 1 sigma of
-    its logarithm; ``mean`` and ``sigma`` (QUANTITIES,), NaN where nothing is known: ``RANGE`` m, of its front,
-    ``FORWARD`` and ``RIGHT`` m/s over ground, ``RATE`` 1/s, the inverse time to contact, ``LATERAL`` m, how far beside
-    the path it is when it is passed, ``CLOSEST`` s until it is passed.
+    ``stands``: probability that it stands, and ``log_odds`` of that; ``met``: probability of contact within the
+    horizon; ``middle``, m, range of the centre of its edges, with ``middle_sigma``, 1 sigma of its logarithm; ``mean``
+    and ``sigma`` (QUANTITIES,), NaN: unknown, of ``RANGE`` m, of its front, ``FORWARD`` and ``RIGHT`` m/s over ground,
+    ``RATE`` 1/s, inverse time to contact, ``LATERAL`` m, lateral miss, ``CLOSEST`` s until it is passed.
 
-    ``inverse``: (RANGES,) the grid, 1/m; ``standing``, ``moving``: weights of its ranges, 1 in all; ``inner_…``: the
-    motion supposed for one of them.
+    ``inverse``: (RANGES,) the grid, 1/m; ``standing``, ``moving``: weights of its ranges, which sum to 1 over both;
+    ``inner_…``: motion for one pair.
     """
 
     def __init__(self) -> None:
@@ -94,17 +92,17 @@ class Belief:
 
 
 def log_normal2(dm: float, dq: float, mm: float, qq: float, mq: float) -> float:
-    """Logarithm of a normal density of two variables, without its constant."""
+    """Log density of a bivariate normal distribution, without its constant."""
     determinant = max(mm * qq - mq * mq, 1e-18)
     distance = (dm * dm * qq - 2 * dm * dq * mq + dq * dq * mm) / determinant
     return -0.5 * (distance + math.log(determinant))
 
 
 def foot_likelihood(evidence: Evidence, inverse: float, around: Situation) -> float:
-    """How well an inverse range agrees with where the lowest edge is seen, as a density of the latter.
+    """Likelihood of the lowest edge's image row at an inverse range.
 
-    Nothing is below the ground: what is seen there is no farther than the ground. It may be nearer, as its lowest edge
-    may lie above its foot: a little, or, where the foot shows no edge, by ``LIFTED_M``.
+    Nothing lies below the ground, so an object is no farther than the ground in that row. It may be nearer, as its
+    lowest edge may lie above its foot: slightly, or, where the foot shows no edge, by ``LIFTED_M``.
     """
     apart = inverse - evidence.foot
     sigma = evidence.foot_sigma + FOOT_SHARE * inverse
@@ -122,7 +120,7 @@ def foot_likelihood(evidence: Evidence, inverse: float, around: Situation) -> fl
 
 
 def memory_likelihood(evidence: Evidence, inverse: float, around: Situation) -> float:
-    """How well an inverse range agrees with the range before: a thing does not jump, but the belief was unsure."""
+    """Likelihood of an inverse range by the last frame's range: objects do not jump, but the belief may be wrong."""
     if not evidence.range_before > 0:
         return 1.0
     sigma = max(evidence.range_doubt, MEMORY_SHARE)
@@ -131,18 +129,18 @@ def memory_likelihood(evidence: Evidence, inverse: float, around: Situation) -> 
 
 
 def small_log(evidence: Evidence, inverse: float) -> float:
-    """Logarithm of how likely a thing is that would be as small as this one is at an inverse range."""
+    """Log likelihood of the size that the object would have at an inverse range."""
     small = math.log(max(2 * evidence.half_extent / (SMALL_M * inverse), TINY)) / SMALL_RATIO
     return -0.5 * small * small if small < 0 else 0.0
 
 
 def walking_mps(around: Situation) -> float:
-    """σ_w, m/s: how fast movers are."""
+    """σ_w of movers, m/s."""
     return WALKS_MPS + TRAFFIC_SHARE * math.fabs(around.speed_mps)
 
 
 def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
-    """The weight of each pair of case and range."""
+    """Compute the weight of each pair of case and range."""
     farthest_m = max(FARTHEST_REACHES * math.fabs(around.speed_mps) * around.horizon_s, FARTHEST_M)
     ratio = math.pow(NEAREST_M / farthest_m, 1.0 / (RANGES - 1))
     inverse = 1 / NEAREST_M
@@ -179,7 +177,7 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
 
 
 def suppose_standing(belief: Belief, inverse: float, around: Situation) -> None:
-    """Its motion, if it stands at a range."""
+    """Set the motion of an object that stands at a range."""
     belief.inner_forward = belief.inner_right = belief.inner_forward_var = belief.inner_right_var = 0.0
     belief.inner_rate = inverse * around.speed_mps
     wrong = SPEED_SHARE * belief.inner_rate
@@ -187,7 +185,7 @@ def suppose_standing(belief: Belief, inverse: float, around: Situation) -> None:
 
 
 def suppose_moving(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> None:
-    """Its motion, if it moves at a range: what was measured, drawn towards rest as far as it is unsure."""
+    """Set the motion of an object that moves at a range: as measured, shrunk towards rest by its uncertainty."""
     walks = walking_mps(around)
     range2 = 1 / (inverse * inverse)
     forward_var, right_var = evidence.mm * range2, evidence.qq * range2
@@ -203,7 +201,7 @@ def suppose_moving(belief: Belief, evidence: Evidence, inverse: float, around: S
 
 
 def lateral_at(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> float:
-    """m beside the vehicle's path when a supposed object is passed, right positive."""
+    """Lateral miss with the set motion, m, right positive."""
     time_s = 1 / belief.inner_rate
     right_m = evidence.across / inverse + belief.inner_right * time_s
     ahead_m = 1 / inverse + belief.inner_forward * time_s
@@ -211,7 +209,7 @@ def lateral_at(belief: Belief, evidence: Evidence, inverse: float, around: Situa
 
 
 def lateral_var(belief: Belief, evidence: Evidence, inverse: float) -> float:
-    """Its variance, m²: by the motion to the side, and by the time over which it lasts."""
+    """Variance of the lateral miss, m²: by the sideways motion, and by the time until it is passed."""
     time_s = 1 / belief.inner_rate
     late_s2 = belief.inner_rate_var * time_s * time_s * time_s * time_s
     aside = evidence.across_sigma / inverse
@@ -219,12 +217,12 @@ def lateral_var(belief: Belief, evidence: Evidence, inverse: float) -> float:
 
 
 def below(value: float, mean: float, variance: float) -> float:
-    """Probability that a normal variable is below a value."""
+    """Cumulative normal probability of a value."""
     return 0.5 * (1 + math.erf((value - mean) / (ROOT_2 * math.sqrt(max(variance, 1e-12)))))
 
 
 def met_probability(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> float:
-    """Probability that a supposed object is met: inside the half widths, within the horizon."""
+    """Probability of contact with the set motion: within the half widths, within the horizon."""
     half_m = around.half_width_m + evidence.half_width / inverse
     lateral, variance = lateral_at(belief, evidence, inverse, around), lateral_var(belief, evidence, inverse)
     beside = below(half_m, lateral, variance) - below(-half_m, lateral, variance)
@@ -233,14 +231,14 @@ def met_probability(belief: Belief, evidence: Evidence, inverse: float, around: 
 
 
 def take(belief: Belief, quantity: int, weight: float, value: float, variance: float) -> None:
-    """Take a value into the mean of a quantity, with its variance."""
+    """Add a value, with its variance, to the mean of a quantity."""
     belief.weight[quantity] += weight
     belief.mean[quantity] += weight * value
     belief.sigma[quantity] += weight * (value * value + variance)
 
 
 def suppose(belief: Belief, weight: float, evidence: Evidence, inverse: float, around: Situation) -> None:
-    """Take one pair of case and range into all means, by its weight."""
+    """Add one pair of case and range to all means, by its weight."""
     take(belief, RANGE, weight, -math.log(inverse), 0.0)
     take(belief, FORWARD, weight, belief.inner_forward, belief.inner_forward_var)
     take(belief, RIGHT, weight, belief.inner_right, belief.inner_right_var)
@@ -253,7 +251,7 @@ def suppose(belief: Belief, weight: float, evidence: Evidence, inverse: float, a
 
 
 def conclude(belief: Belief) -> None:
-    """The means and standard deviations of what was taken; NaN where hardly anything was."""
+    """Turn sums into means and standard deviations; NaN where the weight is too small."""
     for quantity in range(QUANTITIES):
         weight = belief.weight[quantity]
         if weight < MIN_WEIGHT:
@@ -265,9 +263,9 @@ def conclude(belief: Belief) -> None:
 
 
 def set_front(belief: Belief, evidence: Evidence) -> None:
-    """Contact is with the front of an object, its edges lie on its sides too: by a share of its width behind it.
+    """Refer range and times to the object's front, which is nearer than its edges by a share of its width.
 
-    Of the range the mean of the logarithm was taken.
+    The mean of ``RANGE`` is that of the logarithm until then.
     """
     half_width = min(evidence.half_width, MAX_HALF_WIDTH)
     nearer = 1 - FRONT_SHARE * half_width
@@ -283,7 +281,7 @@ def set_front(belief: Belief, evidence: Evidence) -> None:
 
 
 def consider(belief: Belief, evidence: Evidence, around: Situation) -> None:
-    """All that is believed of an object, by what was measured; the vehicle's speed must be known."""
+    """Compute the belief from the evidence; the vehicle's speed must be known."""
     weigh(belief, evidence, around)
     belief.met = 0.0
     for quantity in range(QUANTITIES):

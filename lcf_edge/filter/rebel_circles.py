@@ -1,4 +1,4 @@
-"""Circle expert, C_r: rebel edges that go together become circles with a cause and a time to contact."""
+"""Circle expert, C_r: rebel edges that move together become circles with a cause and a time to contact."""
 
 import math
 
@@ -29,65 +29,64 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.turmoil import Turmoil
 from lcf_edge.messages import Cause
 
-VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times the time over which it was seen
+VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times its elapsed time
 STILL_PX = 6.0  # circles that moved less over that time have no direction
-LIKE_SPEED = 0.5  # rebels that go together differ in velocity by no more than this share
-SIDEWAYS = 0.2  # what leads moves to the side with no more than this share of the vehicle's speed
+LIKE_SPEED = 0.5  # share by which the velocities of linked rebels may differ
+SIDEWAYS = 0.2  # sideways speed of a leader, at most, as a share of the vehicle's speed
 MIN_RANGE_M = 0.01
-MIN_RATE = 1e-6  # 1/s, slower expansions are none
-RATE_SIGMAS = 2.0  # by which an expansion is above its noise
-MAX_GROWTH = 1.5  # of a circle, in one frame
-MAX_EXCESS = 2.0  # a circle is no larger than what shows it, times this,
-MIN_SHOWN_PX = 12.0  # which is taken for no smaller than this
-LEADER_HEIGHT_SHARE = 0.3  # of the camera's height that a leader has at least; paint and reflections have less
-MIRROR_NOISE_PX = 0.6  # 1 sigma of how far an edge went
-MIRROR_SIGMAS = 3.0  # of it, by which a plane under the ground explains a group better than something upright
-SURE_REBELS = 5.0  # fewer say less, and must be seen once more before their circle is reported
-MOVER_SHARE = 0.25  # of the edges in a circle that moves must be rebels: where things repeat, edges swap places
-LIKELY_OWN_S = 0.9  # what has not moved in the image for so long may be of an own part;
-SEEN_TO_MOVE_PX = 3.0  # by which the ground there would have moved, else it may be far off;
-OWN_SHARE = 0.1  # so many of these, as a share of the rebels that they lie among, make them own parts too
-SPREAD_NOISE_PX = 0.85  # 1 sigma of how far an edge went, of two places
+MIN_RATE = 1e-6  # 1/s; slower expansions are none
+RATE_SIGMAS = 2.0  # by which an expansion must exceed its noise
+MAX_GROWTH = 1.5  # of a circle in one frame
+MAX_EXCESS = 2.0  # size of a circle, at most, in extents of the edges that show it,
+MIN_SHOWN_PX = 12.0  # which count as at least this
+LEADER_HEIGHT_SHARE = 0.3  # least height of a leader, as a share of the camera's; paint and reflections have less
+MIRROR_NOISE_PX = 0.6  # 1 sigma of an edge's motion
+MIRROR_SIGMAS = 3.0  # of it, by which a level plane must fit a group better than something upright
+SURE_REBELS = 5.0  # smaller groups must be seen once more before their circle is published
+MOVER_SHARE = 0.25  # of the edges in a moving circle that must be rebels: in repetitive texture, edges swap places
+LIKELY_OWN_S = 0.9  # an edge that has not moved in the image for this long may be an own part,
+SEEN_TO_MOVE_PX = 3.0  # if the ground there would have moved by this; otherwise it may just be far off
+OWN_SHARE = 0.1  # of a group's rebels: with more likely own parts among them, the group is one too
+SPREAD_NOISE_PX = 0.85  # 1 sigma of an edge's motion, with the noise of two positions
 STRAY_ROUNDS = 2
-STRAY_SIGMAS = 2.0  # of its place, and
-STRAY_SHARE = 0.25  # this share of the expansion, beyond which an edge is a stray
-SPREAD_SIGMAS = 2.0  # of it, by which what stands may spread less
-SPREAD_SHARE = 0.5  # than this share of what its way outward from O tells
-MAX_RANGE_M = 1000.0  # farther off nothing is known
-MAX_TTC_HORIZONS = 10.0  # and later than so many horizons
-MIN_EXTENT2_PX = 1.0  # px², of the height over which an expansion is fitted
-# Times in shares of the horizon, so that what holds for a rover holds for a snail.
-FASTEST_EXPANSION = 4.0  # of one object, over one horizon
-LINK_SHARE = 0.03  # rebels are linked over what the faster moves in this share of the horizon: what is near is large
-FAR_LINK_SHARE = 0.08  # or in this one, where they move alike
+STRAY_SIGMAS = 2.0  # of its noise, and of
+STRAY_SHARE = 0.25  # this share of the expansion: width beyond which an edge is an outlier
+SPREAD_SIGMAS = 2.0  # of the measured spreading rate, by which
+SPREAD_SHARE = 0.5  # a stationary group may spread less than this share of its expansion about O
+MAX_RANGE_M = 1000.0  # longer ranges are unknown,
+MAX_TTC_HORIZONS = 10.0  # and later contacts, in horizons
+MIN_EXTENT2_PX = 1.0  # px², least squared extent in a fit of an expansion
+# Times are shares of the horizon, so that they hold for any speed.
+FASTEST_EXPANSION = 4.0  # of one object, per horizon
+LINK_SHARE = 0.03  # rebels link over what the faster moves in this share of the horizon: near things are large;
+FAR_LINK_SHARE = 0.08  # or in this share, where they move almost the same,
 FAR_LINK_RAD = 0.35  # but no farther
-NEAR_LINK_M = 0.3  # on the ground, over which groups are linked
+NEAR_LINK_M = 0.3  # distance on the ground over which groups are merged
 NEAR_LIKE_HZ = 0.3  # that move alike but for an expansion of this
-FAR_LIKE_SPEED = 0.3  # share of the faster one's speed, by which they then differ at most, and which noise stays below
-COAST_SHARE = 0.25  # nearer contacts grow too fast to be followed corner by corner, and must not be forgotten
-COAST_TIME_SHARE = 0.1  # for so long a circle goes on unseen
+FAR_LIKE_SPEED = 0.3  # difference of those, and their noise, at most, as a share of the faster one's speed
+COAST_SHARE = 0.25  # nearer contacts, in horizons, grow too fast for their corners to be tracked, and coast
+COAST_TIME_SHARE = 0.1  # for this long
 MIN_TTC_SHARE = 0.0125
-BLIND_S = 1.0  # for so long circles stay where they are when the whole image is covered
-MAX_TURN_RAD = 0.25  # of the path until contact: beyond, a circle is not seen for other reasons than that it is near
+BLIND_S = 1.0  # time that circles stay in place while the whole image is covered
+MAX_TURN_RAD = 0.25  # of the path until contact: in a sharper turn, a circle may be lost for other reasons
 CROSSING, INCOMING, LEADING = int(Cause.CROSSING), int(Cause.INCOMING), int(Cause.LEADING)
 INFINITY = float("inf")
 NAN = float("nan")
 
 
 class RebelGroups:
-    """The rebel edges of a frame, gathered into groups.
+    """The rebel edges of a frame, clustered into groups.
 
-    A row a rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s; ``elapsed_s``, over which it was seen;
-    ``label``, the lowest of its group; ``group``, its number, -1: too few go with it.
+    One row per rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s, measured over ``elapsed_s``;
+    ``label``, parent in its cluster; ``group``, its group, -1: too small.
 
-    A row a group: ``members``; means of ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, ``inwards``, how many
-    stand still and are incoming, and how many fall short of the flow; ``closing_mps``, ΔZ/t; ``focus_rate`` and
-    ``focus_r2``, means of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h
-    and r²·h², h px under the horizon; ``below2`` and ``below_vy``, of the height under the horizon squared, and
-    times V; ``then_x``, ``then_y``, means of where they were; ``spread``, ``spreading``, sums of how far they were
-    from there, squared, and times how fast they go away from there; ``expansion``, V_e/r about O, and the sums that it
-    comes from, ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, too few of those inside are
-    rebels; ``circle``, row of C_r, -1: none; ``votes`` for each circle.
+    One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, number of incoming edges;
+    ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``, ``focus_r2``, means
+    of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h and r²·h², h px below the horizon; ``below2``,
+    ``below_vy``, means of h² and h·v_y; ``then_x``, ``then_y``, mean of the earlier positions; ``spread``,
+    ``spreading``, sums about that of squared distance, and of distance times velocity; ``expansion``, V_e/r about O,
+    from the sums ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, makes no circle;
+    ``circle``, row of C_r, -1: none; ``votes`` for each circle.
     """
 
     def __init__(self, rebels: int, circles: int) -> None:
@@ -116,9 +115,9 @@ class RebelGroups:
 
 
 def predict(circles: CircleColumns, around: Situation) -> None:
-    """C'_r: with constant velocities in space the centre runs as a + b/τ, τ the time to contact, R as 1/τ.
+    """C'_r: at constant velocity in space the centre moves as a + b/τ, τ the time to contact, and R as 1/τ.
 
-    Without a time to contact, the centre goes on as it went. What covers the image stays there.
+    Without a time to contact the centre moves on at constant speed. While the image is covered nothing moves.
     """
     if around.is_blind:
         return
@@ -140,9 +139,9 @@ def predict(circles: CircleColumns, around: Situation) -> None:
 
 
 def coasts(circles: CircleColumns, c: int, around: Situation, settings: Settings) -> bool:
-    """Whether a circle that was seen three times or more is so near that it grows too fast to be followed.
+    """Whether a trusted circle is so near that it grows too fast to be tracked.
 
-    In a turn it may as well be lost for another reason, and passed by.
+    In a sharp turn it may be lost for another reason, and be passed.
     """
     return (
         circles.active[c] != 0
@@ -154,10 +153,10 @@ def coasts(circles: CircleColumns, c: int, around: Situation, settings: Settings
 
 
 def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
-    """Circles that left the frame end.
+    """End the circles that left the frame.
 
-    What is about to be met fills the image, and is not gone because its middle has left: there the innermost point of
-    its extent must leave, and what stands must be seen to flow again.
+    A near one fills the image, and is not gone when its centre leaves: there the innermost point of its extent must
+    leave, and the flow must be seen again.
     """
     for c in range(circles.capacity):
         near = coasts(circles, c, around, settings)
@@ -175,10 +174,8 @@ def end_outside(circles: CircleColumns, plane: ImagePlane, around: Situation, se
 
 
 def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) -> int:
-    """Circle that holds a point, the nearest; -1: none.
+    """The nearest circle that contains a point, -1: none; only those from Tr_s up, and none in turmoil."""
 
-    Only circles from Tr_s up speak for what is inside them, and none does for turmoil.
-    """
     nearest = -1
     least = 0.0
     for c in range(circles.capacity):
@@ -190,7 +187,7 @@ def circle_at(circles: CircleColumns, x: float, y: float, settings: Settings) ->
 
 
 def looming_rate(circles: CircleColumns, c: int, horizon_s: float) -> float:
-    """1/TTC, 1/s; 0 where nothing is met, or as good as now."""
+    """1/TTC, 1/s; 0 without contact, or when it is now."""
     return 1 / circles.ttc[c] if circles.ttc[c] > MIN_TTC_SHARE * horizon_s else 0.0
 
 
@@ -229,23 +226,23 @@ def take_rebels(
 
 
 def noise_between(groups: RebelGroups, a: int, b: int) -> float:
-    """1 sigma of each rebel's velocity, px/s, together."""
+    """Sum of the sigmas of two rebels' velocities, px/s."""
     return VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
 
 
 def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings) -> bool:
-    """Whether two rebels, ``distance`` px apart, go together (eq. EdgeErcompareER, and by place).
+    """Whether two rebels, ``distance`` px apart, move together (eq. EdgeErcompareER, and by position).
 
-    They are near, and move in the same direction with a like speed, or differ in velocity by no more than the parts of
-    an object that grows in the image do. The few corners on something large and plain that passes fast lie farther
-    apart: these must move alike, and be known to.
+    Near each other they must have a similar direction and speed, or differ no more than parts of an object that expands
+    in the image. The few corners on something large and plain that passes fast lie farther apart: these must move
+    almost the same, beyond noise.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
     one, other = lengths.of(ax, ay), lengths.of(bx, by)
     slower, faster = min(one, other), max(one, other)
     near = max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster)
     far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
-    if distance >= max(near, far):  # most are
+    if distance >= max(near, far):  # most pairs
         return False
     difference = lengths.of(ax - bx, ay - by)
     noise = noise_between(groups, a, b)
@@ -261,7 +258,7 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
 
 
 def lowest_label(groups: RebelGroups, k: int) -> int:
-    """The lowest of the group that a rebel belongs to; the way there gets shorter."""
+    """The lowest rebel of a rebel's cluster (union-find, with path halving)."""
     while groups.label[k] != k:
         groups.label[k] = groups.label[groups.label[k]]
         k = groups.label[k]
@@ -269,13 +266,13 @@ def lowest_label(groups: RebelGroups, k: int) -> int:
 
 
 def join(groups: RebelGroups, a: int, b: int) -> None:
-    """Two rebels are of one group."""
+    """Merge the clusters of two rebels."""
     one, other = lowest_label(groups, a), lowest_label(groups, b)
     groups.label[max(one, other)] = min(one, other)
 
 
 def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """Rebels that are linked are of one group, and so are those that others link."""
+    """Cluster linked rebels."""
     for a in range(groups.count):
         i = verdicts.row[groups.verdict[a]]
         for b in range(a):
@@ -286,16 +283,16 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
 
 
 def near_link_px(y: float, around: Situation) -> float:
-    """``NEAR_LINK_M`` at the range of the ground that is seen at row ``y``: what is seen there is no farther off."""
+    """``NEAR_LINK_M`` at the range of the ground at image row ``y``, px: nothing seen there is farther off."""
     if not around.camera_height_m > 0:
         return 0.0
     return NEAR_LINK_M * max(y - around.horizon_y, 0.0) / around.camera_height_m
 
 
 def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, support: int) -> None:
-    """Groups of one near thing, whose corners lie far apart in the image, are one, if they move alike.
+    """Merge groups of one near thing, whose corners lie far apart in the image, if they move alike.
 
-    Not what stands: that spreads over the ground, too.
+    Not stationary ones: these spread over the ground.
     """
     measure_sizes(groups)
     for a in range(groups.count):
@@ -318,7 +315,7 @@ def join_near(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, aroun
 
 
 def measure_sizes(groups: RebelGroups) -> None:
-    """``group`` of the lowest rebel of each group: how many go with it."""
+    """Set ``group`` of the lowest rebel of each cluster to the size of the cluster."""
     for k in range(groups.count):
         groups.group[k] = 0
     for k in range(groups.count):
@@ -332,7 +329,7 @@ def number_groups(groups: RebelGroups, support: int) -> None:
     for k in range(groups.count):
         lowest = lowest_label(groups, k)
         if lowest < k:
-            groups.group[k] = groups.group[lowest]  # it came first
+            groups.group[k] = groups.group[lowest]  # already numbered
         elif groups.group[k] >= support:
             groups.group[k] = groups.groups
             groups.groups += 1
@@ -341,7 +338,7 @@ def number_groups(groups: RebelGroups, support: int) -> None:
 
 
 def clear_group(groups: RebelGroups, g: int) -> None:
-    """A group without rebels."""
+    """Reset a group."""
     shared.clear(groups.members, g)
     groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
@@ -360,7 +357,7 @@ def average(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """Means over the members of each group of all that its circle takes from them."""
+    """Compute the statistics of each group."""
     for g in range(groups.groups):
         clear_group(groups, g)
     for k in range(groups.count):
@@ -409,9 +406,9 @@ def average(
 
 
 def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
-    """V_e/r about O of each group, by least squares, so that far edges count more, and strays hardly.
+    """V_e/r about O of each group, by least squares; far edges count more, outliers hardly.
 
-    A stray is an edge that took the place of another one; w = 1/(1 + (off/width)²)² (Geman and McClure).
+    An outlier is an edge that took the place of another one; w = 1/(1 + (off/width)²)² (Geman and McClure).
     """
     for g in range(groups.groups):
         groups.expansion[g] = groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
@@ -433,10 +430,10 @@ def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
 
 
 def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
-    """Whether a group that is to stand near does not spread as what is near does.
+    """Whether a group that seems stationary and near does not spread accordingly.
 
-    Its parts go outward from O by μ/t, and so away from each other. An error of rotation, of the lens or of O shifts
-    them all alike.
+    Its parts move outward from O at μ/t, and so apart from each other. An error of rotation, lens or O shifts them all
+    alike.
     """
     if 2 * groups.standing[g] < members.size[g]:
         return False
@@ -446,10 +443,10 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
 
 
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
-    """Whether a group lies on a level plane: paint on the ground, or lamps under it, as a glossy floor shows them.
+    """Whether a group lies on a level plane: paint on the ground, or lamps reflected in a glossy floor.
 
-    There μ/t grows with the height h under the horizon, on what stands upright it is the same everywhere: which of
-    μ/t = k·h and μ/t = c leaves less, by least squares in px/s.
+    There μ/t grows with the distance h below the horizon, whereas on something upright it is the same everywhere: which
+    of μ/t = k·h and μ/t = c has the smaller residual, by least squares in px/s.
     """
     level = groups.focus_rate[g] * groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
     slope = groups.rate_below[g] * groups.rate_below[g] / max(groups.r2_below2[g], MIN_EXTENT2_PX)
@@ -459,11 +456,10 @@ def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
 
 
 def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
-    """Whether a group that falls short of the flow lies on the ground or under it, as paint and reflections do.
+    """Whether a group that falls short of the flow lies on the ground or below it, as paint and reflections do.
 
-    What drives ahead stands on the ground: from its foot it reaches up to a share of the camera's height. Where the
-    ground itself does not flow, the vehicle is slower than measured, or its own parts are in view, and nothing leads
-    down there.
+    A leader stands on the ground: from its foot it reaches up to a share of the camera's height. Where the ground
+    itself does not flow, the vehicle is slower than measured, or its own parts are in view, and nothing there leads.
     """
     if groups.inwards[g] <= 0.5:
         return False
@@ -476,14 +472,14 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
 
 
 def is_paint(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:
-    """Whether a group that is said to stand in the way lies below the horizon, and as one plane."""
+    """Whether a group that seems to stand in the way lies below the horizon on a level plane."""
     return groups.top[g] > around.horizon_y and is_mirrored(groups, g, members)
 
 
 def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
-    """Whether the ground, seen where an edge is, would have been seen to move in ``LIKELY_OWN_S``.
+    """Whether the ground at an edge would have visibly moved in ``LIKELY_OWN_S``.
 
-    What is far off does not, near the focus, though it is no own part. Without a camera height: as if it would.
+    Near the focus distant ground does not, though it is no own part. True if the camera's height is unknown.
     """
     if not around.camera_height_m > 0:
         return True
@@ -493,7 +489,7 @@ def ground_would_flow(edges: EdgeColumns, i: int, around: Situation) -> bool:
 
 
 def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """A few odd ones among edges that follow the flow are no object; nor is what is flat, shifted, or an own part."""
+    """Mark groups that make no circle: few among edges that follow the flow, flat, shifted, or own parts."""
     for g in range(groups.groups):
         margin = settings.member_margin_px
         left, right = groups.left[g] - margin, groups.right[g] + margin
@@ -520,7 +516,7 @@ def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: 
 def vote(
     groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, circles: CircleColumns, settings: Settings
 ) -> None:
-    """Rebels vote for the circles that hold them, or held them; too small a share of a group does not count."""
+    """Rebels vote for the circles that contain them or did; too small a share of a group does not count."""
     for g in range(groups.groups):
         for c in range(circles.capacity):
             groups.votes[g, c] = 0
@@ -540,7 +536,7 @@ def vote(
 
 
 def choose(groups: RebelGroups, circles: CircleColumns) -> None:
-    """The circle with the most votes of each group that has none, and the group of each circle that has none."""
+    """Find the circle with the most votes for each unmatched group, and the group for each unmatched circle."""
     for c in range(circles.capacity):
         groups.best_group[c] = -1
     for g in range(groups.groups):
@@ -560,7 +556,7 @@ def choose(groups: RebelGroups, circles: CircleColumns) -> None:
 def involve(
     groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, circles: CircleColumns, settings: Settings
 ) -> None:
-    """Rebel circle of each group by share of involvement (eq. percentinvolve), one to one, by mutual best choice."""
+    """Match groups and circles one to one by involvement (eq. percentinvolve), by mutual best choice."""
     vote(groups, verdicts, edges, circles, settings)
     for g in range(groups.groups):
         groups.circle[g] = -1
@@ -580,9 +576,9 @@ def involve(
 def is_aligned(
     groups: RebelGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
 ) -> bool:
-    """Whether a group goes on as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction.
+    """Whether a group moves as its circle does (eq. EdgeCirclerebelcompareER); a slow one has less direction.
 
-    Of turmoil it is not known how it goes on.
+    The motion of turmoil is unknown, and always agrees.
     """
     if turmoil.is_shown_by(circles, c):
         return True
@@ -594,14 +590,14 @@ def is_aligned(
 
 
 def bounded(size_px: float, shown_px: float) -> float:
-    """An extent, no larger than what shows it lets one believe, px."""
+    """Limit an extent by that of the edges that show it, px."""
     return min(size_px, MAX_EXCESS * max(shown_px, MIN_SHOWN_PX))
 
 
 def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """A group updates the circle that it is involved in: aligned Tr +1, else -1.
+    """Update a group's circle: aligned Tr +1, less for few rebels, else -1.
 
-    An object shows ever other parts of itself: its extent grows at once and shrinks slowly.
+    An object keeps showing other parts of itself, so its extent grows at once and shrinks slowly.
     """
     c = groups.circle[g]
     trust, width, height = circles.trust[c], circles.width[c], circles.height[c]
@@ -618,7 +614,7 @@ def meet(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation,
 
 
 def largest_new(groups: RebelGroups) -> int:
-    """The largest group without a circle, -1: there is none."""
+    """The largest group without a circle, -1: none."""
     largest = -1
     for g in range(groups.groups):
         if groups.circle[g] >= 0 or groups.odd[g]:
@@ -629,7 +625,7 @@ def largest_new(groups: RebelGroups) -> int:
 
 
 def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, settings: Settings, ids: Ids) -> int:
-    """New circles from the groups that have none, the largest first; return how many, old or new, found no place."""
+    """Found circles for the groups without one, largest first; return how many, old or new, did not fit."""
     evicted = 0
     g = largest_new(groups)
     while g >= 0:
@@ -651,9 +647,9 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
 
 
 def own_expansion(groups: RebelGroups, g: int) -> float:
-    """V_e/r of what moves on the ground, 1/s; 0 where it is not above its noise.
+    """V_e/r of something that moves on the ground, 1/s; 0 where it does not exceed its noise.
 
-    Fitted to the vertical motion about the horizon, which motion to the side does not touch.
+    Fitted to the vertical motion about the horizon, which sideways motion does not affect.
     """
     extent2 = max(groups.below2[g], MIN_EXTENT2_PX)
     rate = groups.below_vy[g] / extent2
@@ -662,7 +658,7 @@ def own_expansion(groups: RebelGroups, g: int) -> float:
 
 
 def expansion_of(groups: RebelGroups, g: int, stands: bool, range_m: float, around: Situation) -> float:
-    """1/TTC that a group shows, 1/s: what stands still closes with V_ν, what moves expands about the horizon."""
+    """1/TTC of a group, 1/s: stationary things close at V_ν, moving ones expand about the horizon."""
     if not stands:
         return own_expansion(groups, g)
     if not math.isfinite(around.speed_mps):
@@ -671,9 +667,9 @@ def expansion_of(groups: RebelGroups, g: int, stands: bool, range_m: float, arou
 
 
 def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """Cause, time to contact, range and lateral miss of a group's circle.
+    """Set cause, time to contact, range and lateral miss of a group's circle.
 
-    What stands still expands about the focus, what moves about the horizon: 1/TTC = V_e/r, fitted over the members.
+    Stationary things expand about the focus, moving ones about the horizon: 1/TTC = V_e/r, fitted over the members.
     """
     c = groups.circle[g]
     stands = 2 * groups.standing[g] >= groups.members.size[g]
@@ -698,19 +694,19 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
 
 
 def finite(value: float) -> float:
-    """The value, NaN where it is infinite."""
+    """Return the value, NaN for infinity."""
     return value if math.isfinite(value) else NAN
 
 
 def cause_of(
     groups: RebelGroups, g: int, circles: CircleColumns, stands: bool, aside_mps: float, around: Situation
 ) -> int:
-    """Why a group's circle is a rebel. ``aside_mps``: speed to the side, of what moves on the ground; NaN: unknown."""
+    """Cause of a group's circle. ``aside_mps``: sideways speed, if it moves on the ground; NaN: unknown."""
     c = groups.circle[g]
     beside = math.fabs(circles.lateral[c]) > around.half_width_m
     if stands or (circles.ttc[c] < around.horizon_s and not beside):
         return INCOMING
-    crosses = math.fabs(aside_mps) > SIDEWAYS * math.fabs(around.speed_mps)  # who walks in from the side crosses
+    crosses = math.fabs(aside_mps) > SIDEWAYS * math.fabs(around.speed_mps)
     return LEADING if 2 * groups.inwards[g] > groups.members.size[g] and not crosses else CROSSING
 
 
@@ -718,7 +714,7 @@ def cause_of(
 
 
 def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
-    """Whether a circle lies behind another one that will be met earlier."""
+    """Whether a circle is occluded by one with an earlier contact."""
     if circles.trust[c] < settings.tr_s or not math.isfinite(circles.ttc[c]):
         return False
     for o in range(circles.capacity):
@@ -731,10 +727,10 @@ def is_hidden(circles: CircleColumns, c: int, settings: Settings) -> bool:
 
 
 def lose_trust(groups: RebelGroups, circles: CircleColumns, around: Situation, settings: Settings) -> None:
-    """Unmatched circles lose trust, but those that coast or are hidden only after a while; they end without it.
+    """Unmatched circles lose trust, coasting or hidden ones only after a while, and end below Tr_cr.
 
-    What is about to be met may hide all that flows: then it goes on until contact. Nothing is known of any of them
-    while something covers the image: they stay, and must be seen as soon as the image is.
+    A near one may hide all flow: then it continues until contact. While something covers the image nothing is known:
+    all circles stay, but must be seen as soon as the image is.
     """
     for c in range(circles.capacity):
         circles.unseen_s[c] = 0.0 if groups.updated[c] else circles.unseen_s[c] + around.dt_s
@@ -770,11 +766,9 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), and from what is no edge.
+    """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), patches, coarse motion, turmoil.
 
-    That is patches, coarse motion and turmoil. Return evictions.
-
-    The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
+    Return evictions. The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
     """
     for c in range(circles.capacity):
         groups.updated[c] = 0

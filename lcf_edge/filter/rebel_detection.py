@@ -1,9 +1,9 @@
-"""α: over three key frames, which edges break the flow, and how.
+"""α: which edges break the flow over three key frames, and how.
 
-What stands still moves, between a key frame and now, along the line through the focus of expansion by a share
-μ = ΔZ/Z of its distance r from it; Z lies between the nearest depth that is looked at and, below the horizon, the
-ground. Whatever leaves that segment of a line moves by itself (a *mover*); what stays on it but will be met within
-the horizon inside the vehicle's width, and stands above the ground, is *incoming*.
+Between a key frame and now, a stationary point moves along the line through the focus of expansion by a share μ = ΔZ/Z
+of its distance r from it; Z lies between the nearest depth expected and, below the horizon, the ground. An edge off
+that segment moves independently (a *mover*); one on it that will be met within the horizon and the vehicle's width, and
+lies above the ground, is *incoming*.
 """
 
 import math
@@ -17,39 +17,39 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 ROOT_2 = math.sqrt(2.0)
-NEAREST_M = 0.25  # depth below which nothing is expected to stand
-MAX_FOCUS_SHARE = 0.5  # of an error of the focus that shows in the drift of an edge; near the focus μ has no bound
-PARALLAX_DRIFT = 0.25  # share of its way outwards that a corner between two things at different depths drifts
-LINK_RATIO = 1.8  # two links of a chain agree when their rates differ by no more than this factor
-GROUND_DIPS = 0.8  # the ground may lie deeper than the camera's height by this share before it is a leader's
-COMMON_NOISE_PX = 0.3  # noise above this is no longer of each edge alone, and neighbours do not average it out
-ALIKE_SIGMAS = 2.0  # of both, by which neighbours at a like depth differ in inverse range
-NEAR_PATH = 1.5  # half widths from the path, within which edges are looked at
-NEAR_SIGMAS = 2.0  # by which such an edge may move slower than it should
-MAX_CANDIDATES = 200  # edges in the way; all pairs are compared
-NEW_THREAT = 0.97  # share of the horizon within which a threat begins, so that it does not flicker at its end
-RANGE_SIGMAS = 3.0  # by which the inverse range of what is incoming is above zero
-GROUND_SIGMAS = 1.0  # and above that of the ground
-SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, may exceed the horizon by this factor
+NEAREST_M = 0.25  # depth below which nothing stationary is expected
+MAX_FOCUS_SHARE = 0.5  # of an error of the focus, that shows in the drift of an edge; near the focus μ is unbounded
+PARALLAX_DRIFT = 0.25  # drift, as a share of the outward motion, of a corner between two things at different depths
+LINK_RATIO = 1.8  # factor by which the rates of two links of a chain may differ
+GROUND_DIPS = 0.8  # share of the camera's height by which the ground may lie deeper, before it is a leader
+COMMON_NOISE_PX = 0.3  # noise above this is common to neighbours, and does not average out
+ALIKE_SIGMAS = 2.0  # of both, by which neighbours at the same depth may differ in 1/Z
+NEAR_PATH = 1.5  # half widths from the path within which edges are candidates
+NEAR_SIGMAS = 2.0  # by which a candidate may move slower than it should
+MAX_CANDIDATES = 200  # all pairs are compared
+NEW_THREAT = 0.97  # share of the horizon within which a threat begins; hysteresis against flicker
+RANGE_SIGMAS = 3.0  # by which 1/Z of an incoming edge exceeds zero,
+GROUND_SIGMAS = 1.0  # and that of the ground
+SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, in horizons at most
 MIN_INVERSE_RANGE = 1e-6  # 1/m
 MIN_OUTWARD_PX = 1e-3
 MIN_R_PX = 1.0
-LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover's recent link
-CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the recent link
+LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover over the younger link
+CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the younger link
 MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
 
 
 class Verdicts:
-    """Edges held against the flow of what stands still, over their history since a key frame; a row an edge.
+    """Edges compared with the flow of the static scene, over their history since a key frame; one row per edge.
 
-    ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: where the edge was then, derotated to now,
-    px. ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge stays inside of where
-    it should be. ``over``: px beyond. ``outward``: px along the flow line, as what stands still goes. ``expansion``: μ
-    per second, 1/s. ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
+    ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: position then, derotated to now, px.
+    ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge falls short of the flow.
+    ``over``: px by which it exceeds it. ``outward``: px along the flow line. ``expansion``: μ per second, 1/s.
+    ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
 
-    ``near``: rows that may stand near the path, with the place of each (``near_x``, ``near_y``, px), its inverse range
-    (``inverse``, 1/m) and the sigma of that (``doubt``; ``weight``: 1/σ²). ``shared``, ``ground``,
-    ``total``: what the neighbours of one of them tell together, see ``ask_neighbours``.
+    ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
+    (``inverse``, 1/m) and the sigma of these (``doubt``; ``weight``: 1/σ²). ``shared``, ``ground``, ``total``: result
+    of ``ask_neighbours``.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -67,7 +67,7 @@ class Verdicts:
 def link(
     verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, around: Situation
 ) -> None:
-    """Where edge ``i`` was at the key frame in ``slot``, derotated to now."""
+    """Link edge ``i`` to its position at the key frame in ``slot``, derotated to now."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
     x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
     verdicts.row[j], verdicts.slot[j] = i, slot
@@ -79,7 +79,7 @@ def link(
 def judge(
     verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
 ) -> None:
-    """Hold a linked edge against the flow of what stands still.
+    """Compare a linked edge with the flow of the static scene.
 
     From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r.
     """
@@ -96,7 +96,7 @@ def judge(
         outward = -outward
     verdicts.outward[j] = outward
     verdicts.short[j] = verdicts.over[j] = 0.0
-    if math.isfinite(around.speed_mps):  # else ΔZ has a direction and no size: only what leaves its line moves
+    if math.isfinite(around.speed_mps):  # else ΔZ has only a direction: only drift shows movers
         verdicts.over[j] = outward - r * math.fabs(depth_m) / NEAREST_M
         verdicts.short[j] = ground_outward(edges.y[i], r * math.fabs(depth_m), around) - outward
     astray = settings.focus_sigma_px * min(math.fabs(outward) / r, MAX_FOCUS_SHARE)
@@ -107,26 +107,26 @@ def judge(
 
 
 def ground_outward(y: float, lever: float, around: Situation) -> float:
-    """How far outward the deepest ground at image row ``y`` goes, px; 0 above the horizon. ``lever``: r·ΔZ, px m."""
+    """Outward motion of the deepest ground at image row ``y``, px; 0 above the horizon. ``lever``: r·ΔZ, px m."""
     if not around.camera_height_m > 0:
         return 0.0
-    # px below the horizon if the camera looks as far down as it may
+    # px below the lowest horizon that the pitch allows
     below = y - (around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad)
     return lever * max(below, 0.0) / (around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
 
 
 def sigma_px(verdicts: Verdicts, j: int, around: Situation) -> float:
-    """1 sigma of how far an edge went, px: of its two places, and of the rotation between."""
+    """1 sigma of an edge's motion, px: of its two positions, and of the rotation between."""
     return verdicts.sigma[j] + ROOT_2 * around.noise_px
 
 
 def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
-    """r·ΔZ, px m: outward/lever is 1/Z. Negative: backwards."""
+    """r·ΔZ, px m, so that outward/lever is 1/Z; negative in reverse."""
     return verdicts.r[j] * baselines.depth_m[verdicts.slot[j]]
 
 
 def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
-    """Edges that may stand near the vehicle's path within the horizon, by themselves; at most ``MAX_CANDIDATES``."""
+    """Gather candidates: edges that, taken alone, may stand near the path within the horizon."""
     near = 0
     reach_m = around.speed_mps * around.horizon_s
     for j in range(verdicts.count):
@@ -153,7 +153,7 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
 
 
 def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Settings) -> None:
-    """1/Z of a candidate, and of the ground below, by least squares over its neighbours at a like depth.
+    """1/Z of a candidate, and of the ground there, by least squares over its neighbours at the same depth.
 
     ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
     """
@@ -176,7 +176,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Sett
 def will_be_met(
     verdicts: Verdicts, a: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
 ) -> bool:
-    """Whether a candidate, with what its neighbours tell, stands in the way, above the ground, within the horizon."""
+    """Whether a candidate, by its neighbours, stands in the way, above the ground, within the horizon."""
     j = verdicts.near[a]
     i, shared = verdicts.row[j], verdicts.shared
     focal = around.pinhole.focal
@@ -202,10 +202,10 @@ def will_be_met(
 def find_incoming(
     verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
 ) -> None:
-    """Mark the edges of what stands in the way.
+    """Mark the edges that stand in the way.
 
-    Near the focus a single edge hardly moves; its neighbours at a like depth lend it their evidence. 1/Z = V_e/(r V),
-    by least squares over the neighbours, with its standard deviation.
+    Near the focus a single edge hardly moves; it is judged together with its neighbours at the same depth. 1/Z =
+    V_e/(r V), by least squares over the neighbours, with its standard deviation.
     """
     if not around.speed_mps > 0:
         return
@@ -216,9 +216,9 @@ def find_incoming(
 
 
 def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines, settings: Settings) -> bool:
-    """Whether the younger link of a chain says the same as the whole chain (bounded, consistent deviation).
+    """Whether the younger link of a chain agrees with the whole chain (bounded, consistent deviation).
 
-    The rate of the deviation over the recent link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
+    The rate of the deviation over the younger link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
     """
     whole_s, recent_s = baselines.elapsed_s[whole.slot[j]], baselines.elapsed_s[recent.slot[k]]
     if not whole.mover[j]:
@@ -242,7 +242,7 @@ def rates_agree(old: float, new: float, slack: float) -> bool:
 def give_birth(
     edges: EdgeColumns, first: Verdicts, j: int, second: Verdicts, k: int, elapsed_s: float, settings: Settings
 ) -> None:
-    """A chain becomes a rebel edge (eq. Intialrebelpara): DL, V, β, O from the key positions L1, L2, L3 = L.
+    """Make a chain a rebel edge (eq. Intialrebelpara): DL, V, β, O from the key positions L1, L2, L3 = L.
 
     DL = ∠(L3-L1) - ∠(L2-L1), V = |L3-L2|/t, β = ∠(L3-L1), O = L1. ``elapsed_s``: t, since the second.
     """

@@ -1,9 +1,9 @@
-"""Turmoil: places where edges come and go and hardly one is found again, though what stands there would hardly move.
+"""Turmoil: regions where edges come and go and hardly any is found again, though a static scene would hardly move.
 
-What tumbles, spins or bursts keeps no corner for two frames, and so shows no rebel: the flow breaks there as a whole.
-The image is divided into cells, and edges that were found and lost are counted in each. Near O, or when the vehicle
-rests, even what will be met in a second is found again from frame to frame. Where nearly all is lost, for several
-frames, while the rest of the image is found, is a circle of C_r. When it is met is not known.
+Something that tumbles, spins or bursts keeps no corner for two frames, and so shows no rebel: the flow breaks as a
+whole. The image is divided into cells, and found and lost edges are counted in each. Near O, or at rest, even something
+one second from contact is found again from frame to frame. A region where nearly all edges are lost, for several
+frames, while the rest of the image is found, becomes a circle of C_r, with unknown time to contact.
 """
 
 import math
@@ -18,38 +18,39 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause
 
-ACROSS = 20  # cells in a row; a place is judged with those around it
-HALF_LIFE_S = 0.15  # of what was counted
-MIN_EDGES = 25.0  # counted in a place lately,
-MIN_LOST = 6.0  # and of these lost in this frame: one bad image is no turmoil
-FOUND_SHARE = 0.1  # of them, that are found at most lately,
-FOUND_NOW_SHARE = 0.2  # and in this frame; more than that elsewhere,
+ACROSS = 20  # cells in a row; each is judged with the eight around it
+HALF_LIFE_S = 0.15  # of the counts
+MIN_EDGES = 25.0  # counted lately,
+MIN_LOST = 6.0  # and lost in this frame, so that one bad image is no turmoil
+FOUND_SHARE = 0.1  # found lately, at most,
+FOUND_NOW_SHARE = 0.2  # and in this frame; elsewhere more than that,
 FOUND_ELSEWHERE = 0.35  # and lately this share, where edges are found at all
-LOST_STILL_SHARE = 0.3  # of them, that are found at most where a circle goes on
-BLIND_SHARE = 0.15  # of all edges, that are found at most where something covers the image
-MIN_HIDDEN = 6.0  # trusted edges of a place, that are lost in this frame
-HIDDEN_FOUND_SHARE = 0.05  # of these, that are found all the same, where something is in front of them
-MIN_HIDDEN_CELLS = 6  # of a place, that are hidden: smaller ones show what passes far off
-MIN_HIDDEN_S = 0.09  # that it lasts before it is believed; what is lost is soon trusted no more
-MIN_CELLS = 3  # of a place, that are in turmoil
-CHANGED_SHARE = 0.02  # of the pieces there of the image in small: fine texture keeps no corner either, but they stand
-MIN_S = 0.15  # that it lasts before it is believed
-MET_S = 1.0  # what is met later than this is found again
-SLOW_MPS = 0.5  # and by a slower vehicle, all that is farther off than it drives in that time
+LOST_STILL_SHARE = 0.3  # found, at most, where a circle continues
+BLIND_SHARE = 0.15  # found of all edges, at most, where something covers the image
+MIN_HIDDEN = 6.0  # trusted edges lost in this frame, where something occludes them,
+HIDDEN_FOUND_SHARE = 0.05  # and found, at most, as a share of these
+MIN_HIDDEN_CELLS = 6  # occluded cells of a region: smaller ones show what passes far off
+MIN_HIDDEN_S = 0.09  # duration of occlusion before it counts; lost edges soon lose their trust
+MIN_CELLS = 3  # cells of a region that are in turmoil
+CHANGED_SHARE = 0.02  # least share of its pieces that changed; fine texture keeps no corner either, but it stands
+MIN_S = 0.15  # duration of turmoil before it counts
+MET_S = 1.0  # what is met later than this is found again;
+SLOW_MPS = 0.5  # for a slower vehicle, all that is farther off than this speed covers in that time
 NONE = int(Cause.NONE)
 INFINITY = float("inf")
 
 
 class Turmoil:
-    """A row a cell, the cells of the image row by row.
+    """One row per cell of the image, row-major.
 
-    ``across``, ``down``: how many; ``side_px``, ``per_px``. ``found``, ``lost``: edges, the less the longer ago;
-    ``found_now``, ``lost_now``: in this frame; ``standing``, ``changed``: pieces of the image in small that stand, and
-    that do not, the less the longer ago. ``unruly``: whether it and those around it are in turmoil; ``lasts_s``:
-    for how long it or one beside it has been; ``place``: number of the place that it belongs to, -1: none.
+    ``across``, ``down``: number of cells; ``side_px``, ``per_px``: their side and its inverse. ``found``, ``lost``:
+    edges, decaying with ``HALF_LIFE_S``; ``found_now``, ``lost_now``: in this frame, ``trusted_now``, ``hidden_now``:
+    trusted ones of these. ``standing``, ``changed``: pieces of the downscaled image that are stationary or have
+    changed, decaying as well. ``unruly``: whether it and the cells around it are in turmoil, ``hidden``: occluded;
+    ``lasts_s``: for how long it or a neighbour has been; ``place``: the region that it belongs to, -1: none.
 
-    A row a place: ``members``, its edges; ``weight``, how many they were lately; ``size``, its cells in turmoil;
-    ``longest_s``, for how long it lasts; ``all_standing``, ``all_changed``, its pieces.
+    One row per region ("place"): ``members``, its edges; ``weight``, their recent number; ``size``, ``hidden_size``,
+    its cells in turmoil and occluded; ``longest_s``, its duration; ``all_standing``, ``all_changed``, its pieces.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -70,7 +71,7 @@ class Turmoil:
 
 
 def cell_at(turmoil: Turmoil, x: float, y: float) -> int:
-    """The cell that holds a point, -1: none."""
+    """The cell that contains a point, -1: none."""
     column, row = x * turmoil.per_px, y * turmoil.per_px
     if x < 0 or y < 0 or column >= turmoil.across or row >= turmoil.down:
         return -1
@@ -88,9 +89,9 @@ def middle_y(turmoil: Turmoil, k: int) -> float:
 
 
 def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
-    """Which edges of the frame before are found in this one; before the lost ones are forgotten.
+    """Count which edges of the last frame are found in this one, before the lost ones are deleted.
 
-    What a quick turn blurs is lost for another reason.
+    Not in a quick turn, whose motion blur loses edges.
     """
     kept = math.exp(-math.log(2.0) * around.dt_s / HALF_LIFE_S)
     for k in range(turmoil.across * turmoil.down):
@@ -118,7 +119,7 @@ def count(turmoil: Turmoil, edges: EdgeColumns, around: Situation, settings: Set
 
 
 def count_pieces(turmoil: Turmoil, coarse: CoarseMotion) -> None:
-    """Which pieces of the image in small stand, and which have changed otherwise than what stands."""
+    """Count which pieces of the downscaled image are stationary, and which have changed."""
     for p in range(coarse.columns * coarse.rows):
         k = cell_at(turmoil, coarse.x[p], coarse.y[p])
         if k >= 0 and coarse.stance[p] == coarse_motion.STANDS:
@@ -128,7 +129,7 @@ def count_pieces(turmoil: Turmoil, coarse: CoarseMotion) -> None:
 
 
 def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
-    """Whether hardly an edge of the whole image is found in this frame; of few, only if it was so ``before``."""
+    """Whether hardly an edge of the whole image is found in this frame; with few, only if it was so ``before``."""
     found = lost = 0.0
     for k in range(turmoil.across * turmoil.down):
         found += turmoil.found_now[k]
@@ -137,13 +138,13 @@ def is_all_lost(turmoil: Turmoil, before: bool) -> bool:
 
 
 def is_inner(turmoil: Turmoil, k: int) -> bool:
-    """Whether a cell has others on all sides; what leaves the image is lost at its border."""
+    """Whether a cell has neighbours on all sides; at the border edges are lost because they leave the image."""
     column, row = k % turmoil.across, k // turmoil.across
     return 0 < column < turmoil.across - 1 and 0 < row < turmoil.down - 1
 
 
 def with_those_around(values: Doubles, turmoil: Turmoil, k: int) -> float:
-    """Sum over an inner cell and the eight around it."""
+    """Sum over an inner cell and its eight neighbours."""
     total = 0.0
     for row in range(-1, 2):
         middle = k + row * turmoil.across
@@ -152,7 +153,7 @@ def with_those_around(values: Doubles, turmoil: Turmoil, k: int) -> float:
 
 
 def stays_px(turmoil: Turmoil, k: int, around: Situation) -> float:
-    """How far what stands still, and is met in a second or later, or is the ground, moves there in a frame, px."""
+    """Largest motion per frame, at a cell, of a static scene that is met in ``MET_S`` or later, or is ground, px."""
     x, y = middle_x(turmoil, k), middle_y(turmoil, k)
     rate = 1 / MET_S
     if math.fabs(around.speed_mps) < SLOW_MPS:
@@ -164,7 +165,7 @@ def stays_px(turmoil: Turmoil, k: int, around: Situation) -> float:
 
 
 def is_unruly(turmoil: Turmoil, k: int, around: Situation, settings: Settings) -> bool:
-    """Whether edges that ought to be found again are lost, in a cell and those around it."""
+    """Whether edges that should be found again are lost, in a cell and its neighbours."""
     if not turmoil.lost_now[k] > 0 or not is_inner(turmoil, k):
         return False
     lost_now = with_those_around(turmoil.lost_now, turmoil, k)
@@ -177,7 +178,7 @@ def is_unruly(turmoil: Turmoil, k: int, around: Situation, settings: Settings) -
 
 
 def is_hidden(turmoil: Turmoil, k: int) -> bool:
-    """Whether something came in front of a cell and those around it: no edge there is found that was trusted."""
+    """Whether something occludes a cell and its neighbours: hardly a trusted edge there is found."""
     if not turmoil.hidden_now[k] > 0 or not is_inner(turmoil, k):
         return False
     hidden = with_those_around(turmoil.hidden_now, turmoil, k)
@@ -185,16 +186,16 @@ def is_hidden(turmoil: Turmoil, k: int) -> bool:
 
 
 def mark(turmoil: Turmoil, k: int) -> None:
-    """An unruly cell and those around it are of its place."""
+    """Add a cell and its neighbours to a region."""
     for row in range(-1, 2):
         for column in range(-1, 2):
             turmoil.place[k + row * turmoil.across + column] = k
 
 
 def is_found_elsewhere(turmoil: Turmoil) -> bool:
-    """Whether the image outside of turmoil is found, in this frame and lately; of the latter, the best of it counts.
+    """Whether edges outside of turmoil are found, in this frame and lately; for the latter the best cells count most.
 
-    What tumbles near may fill much of the image, and all around it may be lost now and then.
+    Something near that tumbles may fill much of the image, and its surroundings may be lost now and then.
     """
     found = share = found_now = lost_now = 0.0
     for k in range(turmoil.across * turmoil.down):
@@ -207,7 +208,7 @@ def is_found_elsewhere(turmoil: Turmoil) -> bool:
 
 
 def see(turmoil: Turmoil, around: Situation, settings: Settings) -> bool:
-    """Where turmoil is, and for how long; nowhere if all the image is lost. False: there is none."""
+    """Find the cells in turmoil, and for how long they have been; none if all the image is lost. Return whether any."""
     is_any = False
     for k in range(turmoil.across * turmoil.down):
         turmoil.place[k] = -1
@@ -224,7 +225,7 @@ def see(turmoil: Turmoil, around: Situation, settings: Settings) -> bool:
 
 
 def join_cells(turmoil: Turmoil) -> None:
-    """Cells that touch are of one place, which has the lowest of their numbers."""
+    """Merge adjoining cells into regions, labelled by their lowest cell."""
     for k in range(turmoil.across * turmoil.down):
         if turmoil.place[k] >= 0:
             turmoil.place[k] = k
@@ -244,7 +245,7 @@ def join_cells(turmoil: Turmoil) -> None:
 
 
 def gather(turmoil: Turmoil) -> None:
-    """What a circle takes from the cells of each place; edges lie anywhere in their cell."""
+    """Compute the statistics of each region; edges are taken as uniform within their cell."""
     spread = turmoil.side_px * turmoil.side_px / 12
     cells = turmoil.across * turmoil.down
     for g in range(cells):
@@ -279,25 +280,25 @@ def gather(turmoil: Turmoil) -> None:
 
 
 def is_believed(turmoil: Turmoil, g: int) -> bool:
-    """Whether a place is large enough and lasts."""
+    """Whether a region is large and old enough."""
     if turmoil.hidden_size[g] >= MIN_HIDDEN_CELLS and turmoil.longest_s[g] >= MIN_HIDDEN_S:
         return True
     return turmoil.size[g] >= MIN_CELLS and turmoil.longest_s[g] >= MIN_S
 
 
 def looks_changed(turmoil: Turmoil, g: int) -> bool:
-    """Whether the image in small shows a place changed as well, or does not say."""
+    """Whether the downscaled image shows that a region changed as well, or shows nothing."""
     return turmoil.all_changed[g] >= CHANGED_SHARE * (turmoil.all_standing[g] + turmoil.all_changed[g])
 
 
 def is_shown_by(circles: CircleColumns, c: int) -> bool:
-    """Whether a circle shows where turmoil is, and not how it moves."""
+    """Whether a circle is in turmoil, with unknown motion."""
     return circles.active[c] != 0 and circles.cause[c] == NONE
 
 
 def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settings) -> int:
-    """The circle that shows a place, -1: none. One in turmoil shows it if their boxes meet: what hides others comes in
-    so fast that the middle of what it hides leaps.
+    """The circle of a region, -1: none. One in turmoil matches if their boxes overlap, since the centre of what a fast
+    occluder hides leaps.
     """
     width = shared.EXTENT_SIGMAS * math.sqrt(turmoil.members.variance_x[g])
     height = shared.EXTENT_SIGMAS * math.sqrt(turmoil.members.variance_y[g])
@@ -312,14 +313,14 @@ def circle_of(turmoil: Turmoil, g: int, circles: CircleColumns, settings: Settin
 
 
 def set_cause(circles: CircleColumns, c: int, around: Situation) -> None:
-    """Nothing is known of how a circle in turmoil moves; it is no farther than the ground that is seen under it."""
+    """Set a circle in turmoil: its motion is unknown, its range that of the ground seen under it."""
     circles.cause[c] = NONE
     circles.beta[c] = circles.speed[c] = 0.0
     circles.range[c] = situation.ground_range_m(around, circles.y[c] + 0.5 * circles.height[c])
 
 
 def rages_on(turmoil: Turmoil, circles: CircleColumns, c: int) -> bool:
-    """Whether most edges are still lost in the middle of a circle in turmoil, if not as many as make one."""
+    """Whether most edges are still lost at the centre of a circle in turmoil, though fewer than would found one."""
     k = cell_at(turmoil, circles.x[c], circles.y[c])
     if k < 0 or not is_inner(turmoil, k):
         return False
@@ -337,9 +338,9 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """Circles of places in turmoil; return evictions.
+    """Update C_r from regions in turmoil; return evictions.
 
-    ``updated``: which circles others have updated, to which a place is left; those of turmoil are marked too.
+    ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
     """
     evicted = 0
     seen = see(turmoil, around, settings)
