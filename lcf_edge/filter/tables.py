@@ -1,10 +1,10 @@
-"""The tables that the filter keeps: preallocated, structure of arrays, a fixed capacity each.
+"""The filter's tables: preallocated, structure of arrays, with a fixed capacity each.
 
-Each table is a list of columns: what it means, its unit, and which modules write it. Edges stand packed in the first
-``count`` rows. Circles and ψ keep their row for life (``active`` tells which are in use), because edges refer to a
-circle by its row.
+Each table is a list of columns, with meaning, unit, and the modules that write it. Edges are packed in the first
+``count`` rows. Circles and ψ keep their row for life (``active`` marks rows in use), because edges refer to a circle by
+its row.
 
-A column is a NumPy array here, for whoever reads a table, and a typed memory in ``columns``, for the loops.
+A column is a NumPy array here, for readers of a table, and typed memory in ``columns``, for the loops.
 """
 
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Column:
     writers: tuple[str, ...]
     dtype: type[np.generic] = np.float64
     shape: tuple[int, ...] = ()
-    empty: int = 0  # value of a row that nobody has written yet
+    empty: int = 0  # initial value
 
 
 EDGE_COLUMNS = (
@@ -52,7 +52,7 @@ EDGE_COLUMNS = (
     Column("speed", "V along β", "px/s", ("edge_expert", "alpha", "rebel_detection")),
     Column("bl", "BL, radius of the gate around the prediction", "px", ("edge_expert", "rebel_detection")),
     Column("trust", "Tr", "1", ("edge_expert", "line_expert", "alpha", "rebel_detection")),
-    Column("deviation", "DL: turn of β a frame, of rebels and chains", "rad", ("edge_expert", "rebel_detection")),
+    Column("deviation", "DL: turn of β per frame, of rebels and chains", "rad", ("edge_expert", "rebel_detection")),
     Column(
         "origin_x",
         "O of a rebel or chain: where it was first seen within the window of key frames",
@@ -93,7 +93,7 @@ EDGE_COLUMNS = (
         np.int32,
     ),
     Column("rebel", "E_r, else E_n", "", ("alpha", "rebel_detection"), np.bool_),
-    Column("held", "inside ψ: predicted without being looked for", "", ("line_expert",), np.bool_),
+    Column("held", "inside ψ: predicted without being matched", "", ("line_expert",), np.bool_),
     Column("matched", "its corner was found in this frame, or it is new", "", ("edge_expert",), np.bool_),
     Column("appearance", "grey samples around its corner", "grey", ("edge_expert",), np.uint8, (APPEARANCE_SAMPLES,)),
     Column(
@@ -113,7 +113,7 @@ EDGE_COLUMNS = (
     Column("corner", "row of its corner in this frame, -1: none", "row", ("matching", "leaps"), np.int32),
     Column("best", "row of the corner that it would choose, -1: none", "row", ("matching",), np.int32),
     Column("cost", "of that choice", "grey", ("matching",)),
-    Column("psi", "row of the ψ region that holds L', -1: none", "row", ("line_expert",), np.int32),
+    Column("psi", "row of the ψ region that contains L', -1: none", "row", ("line_expert",), np.int32),
 )
 """E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
@@ -129,7 +129,7 @@ CIRCLE_COLUMNS = (
     Column("radius", "R", "px", ("circles", "normal_circles", "rebel_circles", "object_circles")),
     Column("beta", "β of its motion in the image", "rad", ("derotation", *SPEED_WRITERS)),
     Column("speed", "V along β", "px/s", SPEED_WRITERS),
-    Column("expansion", "V/r of C_n: inverse time to contact of what stands still", "1/s", ("normal_circles",)),
+    Column("expansion", "V/r of C_n: inverse time to contact, if stationary", "1/s", ("normal_circles",)),
     Column("trust", "Tr", "1", ("circles", *SPEED_WRITERS, "feedback")),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles", "object_circles"), np.int32),
@@ -166,7 +166,7 @@ OBJECT_COLUMNS = (
     Column("looming", "m = (V - w_z)/Z, at the V of ``reference``", "1/s", ("square_expert",)),
     Column(
         "reference",
-        "V of the vehicle that m tells of: the mean of those at which it was measured",
+        "V of the vehicle at which m was measured, in the mean",
         "m/s",
         ("square_expert",),
     ),
@@ -236,24 +236,24 @@ GROUP_COLUMNS = (
 """λ, the circles above Tr_cr, the least trusted first; packed in the first ``count`` rows."""
 
 CORNER_COLUMNS = (
-    Column("x", "place in the ideal pinhole, to the right", "px", ("matching",)),
-    Column("y", "place in the ideal pinhole, down", "px", ("matching",)),
-    Column("pixel_x", "place in the input frame", "px", ("matching",), np.int32),
-    Column("pixel_y", "place in the input frame", "px", ("matching",), np.int32),
+    Column("x", "position in the ideal pinhole, to the right", "px", ("matching",)),
+    Column("y", "position in the ideal pinhole, down", "px", ("matching",)),
+    Column("pixel_x", "position in the input frame, to the right", "px", ("matching",), np.int32),
+    Column("pixel_y", "position in the input frame, down", "px", ("matching",), np.int32),
     Column("appearance", "grey samples around it", "grey", ("matching",), np.uint8, (APPEARANCE_SAMPLES,)),
     Column("omitted", "inside ψ", "", ("line_expert",), np.bool_),
     Column("free", "may still be found by an edge", "", ("line_expert", "matching", "leaps"), np.bool_),
-    Column("taken", "an edge has made it its own", "", ("matching", "edge_expert"), np.bool_),
+    Column("taken", "claimed by an edge", "", ("matching", "edge_expert"), np.bool_),
     Column("expected", "under ψ, and an edge is predicted there", "", ("line_expert",), np.bool_),
     Column("edge", "row of the edge that would choose it at the least cost, -1: none", "row", ("matching",), np.int32),
     Column("cost", "of that choice", "grey", ("matching",)),
-    Column("psi", "row of the ψ region that holds it, -1: none", "row", ("line_expert",), np.int32),
+    Column("psi", "row of the ψ region that contains it, -1: none", "row", ("line_expert",), np.int32),
 )
 """The corners of this frame."""
 
 
 class Table:
-    """Arrays of one length by the name of their column, which are attributes too."""
+    """Arrays of one length by the name of their column, also available as attributes."""
 
     def __init__(self, columns: tuple[Column, ...], capacity: int) -> None:
         self.capacity = capacity
@@ -269,7 +269,7 @@ class Table:
             raise AttributeError(f"{type(self).__name__} has no column {name}") from None
 
     def memory(self) -> dict[str, Any]:
-        """The columns as the loops take them: numbers of Python where they run uncompiled, which do not wrap."""
+        """The columns as memory for the loops."""
         memory = {name: memory_of(array) for name, array in self.arrays.items()}
         if "appearance" in self.arrays:  # the same samples, eight at a time
             memory["words"] = memory_of(self.arrays["appearance"].view(np.uint64))
@@ -277,7 +277,7 @@ class Table:
 
     @property
     def nbytes(self) -> int:
-        """Bytes that the table occupies from start to end."""
+        """Size of the table in bytes."""
         return sum(array.nbytes for array in self.arrays.values())
 
 
@@ -307,11 +307,11 @@ class EdgeTable(Table):
         return int(self.columns.chains())
 
     def own_way(self) -> Mask:
-        """Edges that follow no flow line: rebels and chains; bool (count,)."""
+        """Edges not bound to a flow line: rebels and chains; bool (count,)."""
         return np.asarray(self.rebel[: self.count] | (self.suspect_keys[: self.count] > 0))
 
     def append(self, number: int) -> slice:
-        """Claim ``number`` empty rows behind the last one; the caller sees to it that they fit."""
+        """Append ``number`` empty rows; the caller ensures that they fit."""
         rows = slice(self.count, self.count + number)
         for name, array in self.arrays.items():
             array[rows] = self._empty[name]
@@ -319,7 +319,7 @@ class EdgeTable(Table):
         return rows
 
     def remove(self, dead: Mask) -> None:
-        """Delete rows; ``dead``: bool (count,). The last rows move into the gaps."""
+        """Delete the rows in ``dead``, bool (count,); the last rows move into the gaps."""
         edge_rows.remove(self.columns, memory_of(dead))
 
     def normal_room(self) -> int:
@@ -327,7 +327,7 @@ class EdgeTable(Table):
         return self.normal_capacity - (self.count - self.rebels)
 
     def trim(self) -> int:
-        """Hold E_n and α to their capacities: the least trusted edges leave, and chains are freed; return how many."""
+        """Trim E_n and α to capacity: the least trusted edges leave, and chains are released; return how many."""
         n = self.count
         excess_chains = max(0, self.chains - self.chain_capacity)
         if excess_chains:
@@ -341,14 +341,14 @@ class EdgeTable(Table):
         return excess + excess_chains
 
     def least_trusted(self, candidates: Mask, number: int) -> Rows:
-        """The ``number`` rows of ``candidates`` (bool (count,)) with the least trust, the youngest of equals first."""
+        """The ``number`` least trusted rows of ``candidates`` (bool (count,)), of equals the youngest first."""
         rows = np.flatnonzero(candidates)
         order = np.lexsort((-self.born_key[rows], self.trust[rows]))
         return rows[order[:number]]
 
 
 class PlacedTable(Table):
-    """Rows keep their place; ``active`` says which are in use."""
+    """Rows keep their place; ``active`` marks those in use."""
 
     @property
     def count(self) -> int:
@@ -393,7 +393,7 @@ class GroupTable(Table):
         return int(self.columns.count)
 
     def assign(self, x: Floats, y: Floats) -> npt.NDArray[np.int32]:
-        """Group that holds each point (eq. 1), -1: none; for those who draw it. ``x``, ``y``: (n,) px."""
+        """Group that contains each point (eq. 1), -1: none; for drawing. ``x``, ``y``: (n,) px."""
         places = zip(x.tolist(), y.tolist(), strict=True)
         return np.array([group_at(self.columns, *place) for place in places], np.int32)
 
