@@ -33,7 +33,7 @@ from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, T
 from lcf_edge.scene_records import Records
 from lcf_edge.small_image import SmallImage
 
-if TYPE_CHECKING:  # a daemon reads none, and their formats take megabytes
+if TYPE_CHECKING:  # the daemon reads none, and importing their formats takes megabytes
     from lcf_edge.recording.read import Recording
 
 MIN_RANGE_M = 0.1
@@ -44,32 +44,32 @@ Rows = np.ndarray[Any, np.dtype[np.void]]
 
 @dataclass(frozen=True, slots=True)
 class Look:
-    """What images show without samples: the corners, what is wrong with the last image, whether they stand still.
+    """What a frame shows without inertial samples: corners, image quality, stillness.
 
-    ``repeats``: the scene before, if the frame repeats its image.
+    ``repeats``: the last scene, if the frame repeats its image.
     """
 
     frame: Frame
-    small: npt.NDArray[np.uint8]  # its image in small
+    small: npt.NDArray[np.uint8]  # the downscaled image
     corners: Corners
-    cut: int  # corners that were left out because the budget was full
+    cut: int  # corners dropped because the budget was full
     notes: tuple[str, ...]
-    still: bool | None  # whether the image has stood still for half a second; None: unknown
+    still: bool | None  # whether the image has been still for half a second; None: unknown
     detect_ns: int  # time for the corners
-    took_ns: int  # time for all of it
+    took_ns: int  # total time
     repeats: PipelineScene | None = None
 
 
 @dataclass(frozen=True, slots=True)
 class Outcome:
-    """The result of one frame, and a view of how it was made, which is valid until the next frame."""
+    """The result of one frame, and a view of its making, valid until the next frame."""
 
     scene: PipelineScene
     view: Callable[[], View]
 
 
 class Pipeline:
-    """Corners, ego-motion and ``filter`` for one camera. Positions that leave it are px of the input frame.
+    """Corners, ego-motion and ``filter`` for one camera. Its output positions are px of the input frame.
 
     Raises ``ConfigError`` when the tables alone need more than ``memory.budget_mib``.
     """
@@ -88,7 +88,7 @@ class Pipeline:
         self._small_image = SmallImage(lens.width, lens.height)
         self._image_rotation = ImageRotation(lens)
         self._stillness = Stillness(lens.width, lens.height)
-        self._lost = False  # the last step had too few edges for its rotation
+        self._lost = False  # the last step had too few edges to measure the rotation
         self.filter = LineCircleFilter(config, lens)
         memory, self._plane = config.memory, ImagePlane(lens)
         self._circle_records = Records(memory.circles_rebel + memory.circles_normal, CIRCLE)
@@ -108,7 +108,7 @@ class Pipeline:
             )
 
     def table_bytes(self) -> dict[str, int]:
-        """Bytes of each table that is allocated once and kept."""
+        """Bytes of each preallocated table."""
         lens = {"lens": 8 * self._lens.width * self._lens.height} if self._lens.is_distorted else {}
         return {**self.filter.table_bytes(), **lens}
 
@@ -119,12 +119,12 @@ class Pipeline:
 
     @property
     def gyro_bias(self) -> GyroBias:
-        """The gyro's bias, as far as it is known."""
+        """The gyro's bias as estimated so far."""
         return self._motion.bias
 
     @property
     def mounting(self) -> Mounting:
-        """How the camera is mounted, as far as it is learnt."""
+        """The camera's mounting as learnt so far."""
         return self.filter.mounting
 
     def add(self, sample: ImuSample | SpeedSample) -> None:
@@ -139,7 +139,7 @@ class Pipeline:
         return self.follow(self.look(frame))
 
     def look(self, frame: Frame) -> Look:
-        """The part of ``process`` that needs no samples; ``follow`` is the rest, and comes next."""
+        """Do the part of ``process`` that needs no samples; ``follow`` does the rest, and comes next."""
         started = time.perf_counter_ns()
         if self._repeats.is_repeat(frame.stamp_ns, frame.image):
             took_ns = time.perf_counter_ns() - started
@@ -152,7 +152,7 @@ class Pipeline:
         return Look(frame, small, corners, cut, notes, still, detect_ns, time.perf_counter_ns() - started)
 
     def follow(self, look: Look) -> PipelineScene:
-        """The scene of the frame that was looked at, with the samples that have been added."""
+        """Return the scene of the frame that ``look`` took, with the samples added since."""
         if look.repeats is not None:
             return _repeated(look.repeats, look)
         started = time.perf_counter_ns()
@@ -197,13 +197,13 @@ class Pipeline:
         return self._scene
 
     def _highest_row(self) -> float:
-        """Return the row, px, above which all that could be met within the horizon is too high to hit; NaN: unknown."""
+        """Return the row, px, above which nothing within the horizon is low enough to be hit; NaN: unknown."""
         vehicle, camera = self._config.vehicle, self._config.camera
         farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, MIN_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
     def _see_rotation(self, small: npt.NDArray[np.uint8], ego: EgoMotion) -> EgoMotion:
-        """Return the motion, with the image's rotation where the gyro does not know it well."""
+        """Return the motion, with the rotation from the image where the gyro's is uncertain."""
         if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego
@@ -234,7 +234,7 @@ class Pipeline:
         return records.written()
 
     def view(self) -> View:
-        """Return what the last scene was made of, for drawing."""
+        """Return what led to the last scene, for drawing."""
         corners, omitted = self._last_corners
         edges, n, groups = self.filter.edges, self.filter.edges.count, self.filter.groups
         rebel = edges.rebel[:n]
@@ -255,7 +255,7 @@ class Pipeline:
 
 
 def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
-    """Return the scene of a repeated image: as it was, with contacts nearer by the time that has passed."""
+    """Return the scene of a repeated image: the last one, with contacts nearer by the time passed."""
     passed_s = (look.frame.stamp_ns - scene.stamp_ns) / 1e9
     return replace(
         scene,
@@ -269,7 +269,7 @@ def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
 
 
 def _nearer(rows: Rows, passed_s: float) -> Rows:
-    """Return the same circles or objects, later by so many seconds."""
+    """Return the same circles or objects ``passed_s`` later."""
     rows = rows.copy()
     rows["ttc"] = np.maximum(rows["ttc"] - np.float32(passed_s), 0)
     return rows
@@ -281,7 +281,7 @@ def _points(*coordinates: Floats) -> npt.NDArray[np.float32]:
 
 
 def lens_of(recording: "Recording", config: Config, width: int, height: int) -> Lens | None:
-    """Return the calibrated lens for images of that size: configured, else the recording's own; None: it is unknown."""
+    """Return the calibrated lens for an image size: configured, else the recording's own; None: unknown."""
     if config.camera.intrinsics:
         return Lens.from_config(config.camera, width, height)
     return recording.lens and recording.lens.scaled(width, height)
@@ -292,8 +292,8 @@ def run(
 ) -> Iterator[tuple[Frame, Outcome]]:
     """Feed a recording through the pipeline. Yield each frame with its outcome; ``take`` gets each sample.
 
-    At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises
-    ``RecordingError``, ``ConfigError``.
+    At the end the samples that the pipeline refused are added to ``recording.skipped``. Raises ``RecordingError``,
+    ``ConfigError``.
     """
     pipeline: Pipeline | None = None
     waiting: deque[ImuSample | SpeedSample] = deque(maxlen=IMU_CAPACITY + SPEED_CAPACITY)

@@ -1,4 +1,4 @@
-"""The pipeline's thread: the newest frame, the inertial samples that belong to it, a scene on its way out."""
+"""The pipeline's thread: takes the newest frame and its inertial samples, and delivers the scene."""
 
 import threading
 import time
@@ -26,16 +26,16 @@ from lcf_edge.messages import PipelineScene
 from lcf_edge.meters import DurationHistogram
 from lcf_edge.pipeline import Pipeline
 
-FRAME_WAIT_S = 0.25  # then the loop turns without a frame
-IMU_WAIT_S = 4e-3  # for the sample after a frame; then the last one is held
-TRIALS = 4  # images for a new pipeline
+FRAME_WAIT_S = 0.25  # then the loop goes round without a frame
+IMU_WAIT_S = 4e-3  # for the first sample after a frame; without it the last one is held
+TRIALS = 4  # images to try out a new pipeline
 CLUTTER_PX = 16
-IMU_SILENT_NS = 50_000_000  # an IMU this late is not waited for
+IMU_SILENT_NS = 50_000_000  # an IMU silent for longer is not waited for
 
 
 @dataclass(frozen=True, slots=True)
 class Mail:
-    """From the devices' threads to the pipeline's."""
+    """Queues from the devices' threads to the pipeline's."""
 
     frames: Newest[Frame] = field(default_factory=Newest)
     imu: SampleRing[ImuSample] = field(default_factory=lambda: SampleRing(IMU_CAPACITY))
@@ -61,12 +61,12 @@ def _scattered(number: int) -> npt.NDArray[np.uint8]:
 
 
 class Loop(threading.Thread):
-    """Turns whenever a frame comes, and without one each ``FRAME_WAIT_S``, until ``clock`` is stopped.
+    """Goes round for each frame, or after ``FRAME_WAIT_S`` without one, until ``clock`` is stopped.
 
-    For others to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last), ``evicted``,
-    ``latency`` (from the frame's stamp until the first of ``outputs`` has its scene) and in it ``detect`` and
-    ``filter``, ``degradation``. ``first_scene`` is called once. Raises ``ConfigError`` for images that the
-    configured lens does not fit.
+    For other threads to read: ``turns`` (its progress), ``frames`` (that became scenes), ``scene`` (the last),
+    ``evicted``, ``latency`` (from the frame's stamp until the first of ``outputs`` has its scene), of which ``detect``
+    and ``filter`` are parts, and ``degradation``. ``first_scene`` is called once. Raises ``ConfigError`` for images
+    that the configured lens does not fit.
     """
 
     def __init__(
@@ -87,7 +87,7 @@ class Loop(threading.Thread):
         self.latency, self.detect, self.filter = DurationHistogram(), DurationHistogram(), DurationHistogram()
         self.degradation = Degradation(config)
         self._config = config
-        self._pipeline: Pipeline | None = None  # for the size of the first frame
+        self._pipeline: Pipeline | None = None  # made for the size of the first frame
         self._shape: tuple[int, int] | None = None
         self._next: tuple[Config, Pipeline] | None = None
         self._refused_before: Counter[str] = Counter()  # counted by earlier pipelines
@@ -106,18 +106,18 @@ class Loop(threading.Thread):
 
     @property
     def gyro_bias(self) -> GyroBias | None:
-        """The gyro's bias, as far as it is known; None before the first frame."""
+        """The gyro's bias as estimated so far; None before the first frame."""
         return self._pipeline.gyro_bias if self._pipeline else None
 
     @property
     def mounting(self) -> Mounting | None:
-        """How the camera is mounted, as far as it is learnt; None before the first frame."""
+        """The camera's mounting as learnt so far; None before the first frame."""
         return self._pipeline.mounting if self._pipeline else None
 
     def rebuild(self, config: Config) -> None:
-        """Use a new pipeline with empty tables from the next frame on, after a trial of another like it.
+        """Use a new pipeline with empty tables from the next frame on, after trying out another like it.
 
-        Whatever it raises, the old one goes on. Raises ``LcfError``.
+        If it raises, the old one stays in use. Raises ``LcfError``.
         """
         height, width = self._shape or (config.camera.height, config.camera.width)
         lens = lens_for(config, width, height)
@@ -125,13 +125,13 @@ class Loop(threading.Thread):
         self._next = config, Pipeline(config, lens)
 
     def run(self) -> None:
-        """Turn until stopped."""
+        """Process frames until stopped."""
         while not self._clock.stopped:
             self._turn(self._mail.frames.take(FRAME_WAIT_S))
             self.turns += 1
 
     def wake(self) -> None:
-        """Notice a stop at once."""
+        """Make ``run`` notice a stop at once."""
         self._mail.frames.close()
 
     def _turn(self, frame: Frame | None) -> None:
