@@ -1,6 +1,6 @@
 """Cameras: images with the time of their exposure.
 
-``v4l2`` is the driver. It rests on ``v4l2_ioctl`` (the kernel's interface), ``v4l2_errors`` (what its error numbers
-mean to a user), ``find`` (which node is meant), ``offers`` (sizes and rates), ``controls`` (exposure, gain, power line)
-``luminance`` (from the bytes of a buffer to grey) and ``jpeg`` (how large an image in one of its formats is).
+``v4l2`` is the driver for the kernel's interface, ``libcamera`` that for libcamera. They use ``v4l2_ioctl`` (system
+calls), ``v4l2_errors`` (error numbers as messages), ``find`` (device names), ``offers`` (sizes and rates), ``controls``
+(exposure, gain, power line), ``luminance`` (buffers to grey) and ``jpeg`` (sizes from JPEG headers).
 """

@@ -1,4 +1,4 @@
-"""Frames as they arrive, from any kind of camera: their numbers, whether their stamps can be true, when none come."""
+"""Arriving frames of any kind of camera: sequence numbers, plausible stamps, stalls."""
 
 from collections import Counter
 
@@ -7,15 +7,15 @@ from drivers.errors import DeviceStalledError
 LATE_INTERVALS = 2
 STALL_INTERVALS = 10
 MIN_STALL_S = 1.0
-_MAX_GAP = 1000  # images; at a larger step the device has begun to count anew
+_MAX_GAP = 1000  # images; a larger step means that the device's counter restarted
 
 
 class Arrivals:
-    """Of a camera's stream that has just begun, at ``fps``; the first image may take ``starting_s`` longer.
+    """Arrivals of a stream that has just started, at ``fps``; the first image may take ``starting_s`` longer.
 
-    ``seq``: the number of the last image. ``counts``: those of the driver; ``dropped`` (the camera counted them,
-    nobody got them), ``late`` (older than two intervals) and ``stamped at arrival`` (the stamp was of another clock or
-    impossible) are added to them.
+    ``seq``: number of the last image. ``counts``: those of the driver, to which are added ``dropped`` (counted by the
+    camera but never delivered), ``late`` (older than two intervals) and ``stamped at arrival`` (the stamp was
+    impossible, or of another clock).
     """
 
     def __init__(self, name: str, fps: float, counts: Counter[str], starting_s: float = 0.0) -> None:
@@ -26,22 +26,22 @@ class Arrivals:
         self._stall_ns = max(STALL_INTERVALS * self._interval_ns, round(MIN_STALL_S * 1e9))
         self._waited_ns = -round(starting_s * 1e9)  # since the last usable image
         self._stamp_ns = -1
-        self._sequence: int | None = None  # as the device counts, modulo 2^32
+        self._sequence: int | None = None  # the device's, modulo 2^32
 
     def number(self, sequence: int) -> None:
-        """Count the image that the device calls ``sequence``."""
+        """Count the image with the device's number ``sequence``."""
         step = 1 if self._sequence is None else (sequence - self._sequence) % 2**32
         if not 0 < step <= _MAX_GAP:
-            step = 1  # it does not count, or counts anew
+            step = 1  # no counter, or it restarted
         self._sequence = sequence
         self.seq += step
         self.counts["dropped"] += step - 1
 
     def stamp(self, claimed_ns: int | None, queued_ns: int, now_ns: int) -> int:
-        """Return the device's stamp if it can be true, else now. None: it is of another clock.
+        """Return the device's stamp if it is plausible, else now. ``claimed_ns`` None: it is of another clock.
 
         It must be after the last one, not long before the camera got the buffer at ``queued_ns``, and not in the
-        future, give or take an interval (some drivers reckon when the frame will have ended).
+        future, to within an interval (some drivers predict the end of the frame).
         """
         earliest_ns = max(queued_ns - LATE_INTERVALS * self._interval_ns, self._stamp_ns + 1)
         if claimed_ns is not None and earliest_ns <= claimed_ns <= now_ns + self._interval_ns:
@@ -54,13 +54,13 @@ class Arrivals:
         return now_ns - stamp_ns > LATE_INTERVALS * self._interval_ns
 
     def deliver(self, stamp_ns: int, now_ns: int) -> None:
-        """Note that a good image goes to the reader."""
+        """Record that an image goes to the reader."""
         self.counts["late"] += self.is_late(stamp_ns, now_ns)
         self._stamp_ns = stamp_ns
         self._waited_ns = 0
 
     def wait(self, waited_ns: int) -> None:
-        """Note that nothing usable came for so long. Raises ``DeviceStalledError`` when that is too long altogether."""
+        """Record a wait without a usable image. Raises ``DeviceStalledError`` when the total is too long."""
         self._waited_ns += waited_ns
         if self._waited_ns > self._stall_ns:
             raise DeviceStalledError(

@@ -1,4 +1,4 @@
-"""Running a camera from the command line: the arguments that all kinds of cameras share."""
+"""Run a camera from the command line: the arguments that all kinds of cameras share."""
 
 import argparse
 import shlex
@@ -13,7 +13,7 @@ from drivers.samples import Frame
 
 
 def list_command(prog: str) -> str:
-    """What lists cameras of another kind, by the Python that runs now; another may not have the program."""
+    """Return the command that lists cameras of another kind, with the running Python; another may lack the program."""
     return f"{shlex.quote(sys.executable)} -m {prog} --list"
 
 
@@ -28,10 +28,10 @@ def run(
     formats: Sequence[str] | None = None,
     gain: Callable[[str], Any] = float,
 ) -> int:
-    """Open the camera that the arguments name and report on it, or list those that are there.
+    """Open the camera that the arguments name and report on it, or list the cameras present.
 
-    ``device``, ``listed``: help for the device and for ``--list``. ``camera``: opens one. ``formats``: those that can
-    be asked for, None: any. Return the exit status.
+    ``device``, ``listed``: help for the device and for ``--list``. ``camera``: opens one. ``formats``: the choices,
+    None: any. Return the exit status.
     """
     parser = argparse.ArgumentParser(prog=f"python -m {prog}", description="Run a camera by hand.")
     parser.add_argument("device", nargs="?", default="/dev/video0", help=device)

@@ -1,4 +1,4 @@
-"""Exposure, gain and power-line frequency: set, read back, refused where the camera does not do it."""
+"""Exposure, gain and power-line frequency: set, read back, and refused where the camera does not apply them."""
 
 import errno
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from drivers.camera.v4l2_ioctl import (
 from drivers.errors import UnsupportedSettingError
 
 EXPOSURE_UNIT_S = 1e-4
-_AUTOMATIC, _MANUAL, _SHUTTER_FIRST, _APERTURE_FIRST = 0, 1, 2, 3  # of CID_EXPOSURE_AUTO; 0 and 3 expose by themselves
+_AUTOMATIC, _MANUAL, _SHUTTER_FIRST, _APERTURE_FIRST = 0, 1, 2, 3  # CID_EXPOSURE_AUTO; 0 and 3: automatic time
 _POWER_LINE = (0, 50, 60)  # Hz, by the control's value
 _REFUSALS = (*NOT_IMPLEMENTED, errno.ERANGE, errno.EACCES, errno.EBUSY)  # errors of a value, not of the device
 
@@ -66,13 +66,13 @@ def set_gain(node: Node, gain: int | None) -> None:
 
 
 def set_power_line(node: Node, power_line_hz: int | None) -> None:
-    """Against flicker: 50 or 60 Hz, 0: off; None: as the camera is. Raises ``UnsupportedSettingError``, ``OSError``."""
+    """Set the flicker filter: 50 or 60 Hz, 0: off; None: unchanged. Raises ``UnsupportedSettingError``, ``OSError``."""
     if power_line_hz is not None:
         _set(node, "camera.power_line_hz", CID_POWER_LINE_FREQUENCY, _POWER_LINE.index(power_line_hz), _power_line)
 
 
 def _query(node: Node, control: int) -> ControlQuery | None:
-    """The control's range; None: the camera does not have it."""
+    """Return the control's range; None: the camera lacks it."""
     try:
         query = node.ask(QUERYCTRL, ControlQuery(id=control))
     except OSError as error:

@@ -1,4 +1,4 @@
-"""Which node a name means: by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's name."""
+"""Find a camera's node by path, by a link that survives a replug (/dev/v4l/by-id/…), or by the camera's name."""
 
 import contextlib
 import errno
@@ -10,19 +10,19 @@ from drivers.errors import DeviceMissingError, WrongDeviceError
 
 
 def open_camera_node(device: str, kernel: Kernel = LINUX) -> Node:
-    """The capture node that is meant by ``device``: a path, or a name such as "HD Pro Webcam C920".
+    """Open the capture node of ``device``: a path, or a name such as "HD Pro Webcam C920".
 
-    A name may be a part of the camera's, in any case; whole names go first. Raises ``DriverError``, among them
-    ``DeviceMissingError`` that names the cameras there are, and ``WrongDeviceError`` for a node that gives no
-    images, or only through libcamera, and for a name that two cameras have.
+    A name may be part of the camera's, in any case; full names take precedence. Raises ``DriverError``, among them
+    ``DeviceMissingError``, which lists the cameras present, and ``WrongDeviceError`` for a node that delivers no
+    images, or only through libcamera, and for an ambiguous name.
     """
     return _by_path(device, kernel) if "/" in device else _by_name(device, kernel)
 
 
 def is_libcameras(device: str, kernel: Kernel = LINUX) -> bool:
-    """Whether ``device`` means a camera that only libcamera can run.
+    """Whether ``device`` is a camera that only libcamera can run.
 
-    So is a node of a pipeline, and, where a sensor has such a node, a name that no V4L2 camera has.
+    That is a node of a pipeline, or, if a sensor has such a node, a name that no V4L2 camera has.
     """
     is_path = device.startswith("/dev/")
     cards, through_libcamera = [], False
@@ -34,7 +34,7 @@ def is_libcameras(device: str, kernel: Kernel = LINUX) -> bool:
 
 
 def cameras(kernel: Kernel = LINUX) -> Iterator[Node]:
-    """All capture nodes that can be opened, each open until the next one is asked for."""
+    """Yield all capture nodes that can be opened, each open until the next is requested."""
     for path in kernel.nodes():
         with contextlib.suppress(OSError), contextlib.closing(Node(path, path, kernel)) as node:
             if node.is_camera:

@@ -1,7 +1,7 @@
-"""The header of a JPEG, read as the decoder reads it, so that its size is known before memory is taken for it.
+"""The header of a JPEG, parsed as the decoder does, so that its size is known before memory is allocated.
 
-A header that the decoder might read differently is refused: only fill bytes may stand between segments, and each
-segment is of a kind whose length both read alike.
+A header that the decoder might parse differently is refused: only fill bytes may lie between segments, and only
+segments whose length is unambiguous are accepted.
 Source: ITU-T T.81, annex B.
 """
 
@@ -15,10 +15,11 @@ _PASSED_OVER = frozenset({0xC4, 0xCC, 0xDB, 0xDC, 0xDD, 0xFE, *range(0xE0, 0xF0)
 
 @dataclass(frozen=True, slots=True)
 class JpegHeader:
-    """All up to the first entropy-coded data.
+    """Everything up to the first entropy-coded data.
 
-    ``samples``: of all components together. ``one_pass``: the first scan has all of them, so that the decoder goes row
-    by row; else it keeps every sample in two bytes until the last scan. ``data_at``: where the coded data begin.
+    ``samples``: of all components together. ``one_pass``: the first scan contains all of them, so that the decoder
+    works row by row; else it keeps every sample in two bytes until the last scan. ``data_at``: offset of the coded
+    data.
     """
 
     width: int
@@ -29,7 +30,7 @@ class JpegHeader:
 
 
 def jpeg_header(jpeg: bytes) -> JpegHeader | None:
-    """The header of ``jpeg``; None: it is not one, is cut off, or could be read in two ways."""
+    """Return the header of ``jpeg``; None: no JPEG, truncated, or ambiguous."""
     if not jpeg.startswith(b"\xff\xd8"):
         return None
     frame: tuple[int, bytes] | None = None

@@ -1,9 +1,8 @@
-"""A camera that libcamera runs, such as those at the ribbon cable of a Raspberry Pi.
+"""A camera that libcamera runs, such as those on the ribbon cable of a Raspberry Pi.
 
-libcamera is in a process of its own (``libcamera_process``), under the system's Python: its binding is built only for
-that one, and a crash ends the process but not the program, which opens the camera again. An image is
-copied once, as with V4L2: the process hands over descriptors of libcamera's buffers (dma-buf), and then only tells
-which one is filled.
+libcamera runs in a process of its own (``libcamera_process``) under the system's Python: its binding is built only for
+that, and a crash ends the process but not the program, which reopens the camera. Images are copied once, as with V4L2:
+the process hands over descriptors of libcamera's buffers (dma-buf), and then only reports which one is filled.
 Source: libcamera, ``SensorTimestamp`` of control_ids_core.yaml; Linux ``include/uapi/linux/dma-buf.h``.
 By hand: ``python -m drivers.camera.libcamera [CAMERA] [--list]``.
 """
@@ -50,8 +49,8 @@ COMMAND = ("/usr/bin/python3", "-I", str(Path(__file__).with_name("libcamera_pro
 LOG_LEVELS = "LIBCAMERA_LOG_LEVELS"  # set in the environment: libcamera's log goes to stderr
 MAX_WAIT_S = 0.25  # of one read
 OPENING_S = 15.0  # at most; a small computer loads everything from its card
-STARTING_S = 3.0  # until the first image, beyond the usual; those with an exposure that is not settled are held back
-ENDING_S = 0.4  # then the process is killed; an ending daemon has no more time
+STARTING_S = 3.0  # extra time until the first image: those before the exposure settles are held back
+ENDING_S = 0.4  # then the process is killed; a daemon that shuts down has no more time
 _MAX_MESSAGE = 65536
 _MAX_BUFFERS = 32
 _SYNC = 0x4008_6200  # DMA_BUF_IOCTL_SYNC
@@ -69,7 +68,7 @@ _ERRORS: dict[str, type[DriverError]] = {
 
 
 class Listed(msgspec.Struct, frozen=True):
-    """A camera as libcamera calls it: its sensor, and the id that no other has."""
+    """A camera as libcamera lists it: its sensor, and its unique id."""
 
     name: str
     id: str
@@ -136,7 +135,7 @@ class _Process:
         return bool(poller.poll(timeout_s * 1e3))
 
     def receive(self) -> tuple[_Message, list[int]] | None:
-        """The next message and the descriptors that came with it; None: there is none yet."""
+        """Return the next message and the descriptors that came with it; None: none yet."""
         try:
             data, descriptors, _, _ = socket.recv_fds(self._socket, _MAX_MESSAGE, _MAX_BUFFERS)
         except BlockingIOError:
@@ -151,17 +150,17 @@ class _Process:
         return message, descriptors
 
     def give_back(self, index: int) -> None:
-        """Let libcamera fill this buffer again. That the process is gone is noticed by the next ``receive``."""
+        """Let libcamera fill this buffer again. If the process is gone, the next ``receive`` notices."""
         with contextlib.suppress(ConnectionError):
             self._socket.send(bytes([index]))
 
     def close(self) -> None:
-        """End it."""
+        """End the process."""
         self._socket.close()
         self._end()
 
     def _end(self) -> str:
-        """How it ended."""
+        """Describe how it ended."""
         try:
             status = self._process.wait(ENDING_S)
         except subprocess.TimeoutExpired:
@@ -231,7 +230,7 @@ class LibcameraCamera:
         self._interval_ns = round(1e9 / fps)
 
     def read(self) -> Sequence[Frame]:
-        """The newest image, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """Return the newest image, after waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
         began_ns = self._clock.monotonic_ns()
         frames = self._take() if self._process.wait(MAX_WAIT_S) else []
         if not frames:
@@ -239,11 +238,11 @@ class LibcameraCamera:
         return frames
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Close the camera."""
         self._resources.close()
 
     def _take(self) -> list[Frame]:
-        """The newest of the filled buffers; all go back to libcamera."""
+        """Return the image of the newest filled buffer; all go back to libcamera."""
         filled: list[_FilledBuffer] = []
         while len(filled) < len(self._memory) and (received := self._process.receive()) is not None:
             filled_buffer = received[0]
@@ -261,7 +260,7 @@ class LibcameraCamera:
         stamp_ns = self._arrivals.stamp(claimed_ns, self._queued_ns[newest.index], now_ns)
         try:
             if len(filled) == len(self._memory) and (self._arrivals.is_late(stamp_ns, now_ns) or stamp_ns == now_ns):
-                # Without a free buffer the camera dropped what came after these; a fresh image is on its way.
+                # All buffers were full, so the camera dropped newer images; a fresh one is on its way.
                 self.counts["overtaken"] += 1
                 return []
             image = self._luminance(newest)
@@ -292,17 +291,17 @@ class LibcameraCamera:
 
 
 def cameras(command: Sequence[str] | None = None) -> list[Listed]:
-    """The cameras that libcamera finds. Raises ``DriverError``."""
+    """List the cameras that libcamera finds. Raises ``DriverError``."""
     with contextlib.closing(_Process("libcamera", {"device": ""}, command or COMMAND)) as process:
         message, _ = _first(process, "libcamera")
         return message.cameras if isinstance(message, _Cameras) else []
 
 
 def monotonic(stamp_ns: int, latest_ns: int) -> int:
-    """A stamp of CLOCK_BOOTTIME or CLOCK_MONOTONIC as one of CLOCK_MONOTONIC, where it is ``latest_ns`` at most.
+    """Convert a stamp of CLOCK_BOOTTIME or CLOCK_MONOTONIC to CLOCK_MONOTONIC, where it is at most ``latest_ns``.
 
-    libcamera says that its stamps are of the former, and passes on what the kernel stamps, which are of the latter. The
-    clocks differ by the time that the computer has slept.
+    libcamera documents its stamps as the former, but passes on the kernel's, which are the latter. The clocks differ by
+    the time that the computer was suspended.
     """
     if stamp_ns <= latest_ns:
         return stamp_ns
@@ -331,13 +330,13 @@ def _map(
 
 
 def _sync(descriptor: int, phase: bytes) -> None:
-    """Make what the camera wrote visible to the processor, where caches do not by themselves."""
+    """Make what the camera wrote visible to the processor, where caches are not coherent."""
     with contextlib.suppress(OSError):  # memory that is no dma-buf needs none
         fcntl.ioctl(descriptor, _SYNC, phase)
 
 
 def _list() -> int:
-    """Cameras that libcamera finds. Return the exit status: 1, with a line on stderr, for none."""
+    """Print the cameras that libcamera finds. Return the exit status: 1, with a line on stderr, for none."""
     found = cameras()
     if not found:
         usb = by_hand.list_command("drivers.camera.v4l2")

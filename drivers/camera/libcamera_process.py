@@ -4,12 +4,12 @@ It runs under the system's own Python, for which Debian builds libcamera's bindi
 a socket of whole messages (``SOCK_SEQPACKET``), ``REQUEST`` the settings as JSON. Messages out, as JSON, each with its
 ``type``:
 
-- ``cameras``: what there is, where the request has no device; then the process ends.
-- ``ready``: what was granted; with it go the descriptors of the buffers, which the reader maps.
+- ``cameras``: those present, where the request has no device; then the process ends.
+- ``ready``: what was granted, with the descriptors of the buffers, which the reader maps.
 - ``picture``: a buffer is filled.
 - ``failure``: ``kind`` and ``text`` for the user; then the process ends.
 
-In come the numbers of buffers that were read, a byte each. The process ends when the socket is closed.
+Messages in: the numbers of buffers that were read, one byte each. The process ends when the socket is closed.
 Source: libcamera's Python binding 0.4 (Debian 13) and its control and property definitions.
 """
 
@@ -43,14 +43,14 @@ PIXEL_FORMATS = {  # libcamera's names, which are the bytes' order in a word: th
     "RGB888": "BGR3",
     "MJPEG": "MJPG",
 }
-_RAW = re.compile(r"(?:S[RGB]{4}|R)(\d+)")  # of a sensor; its bits
+_RAW = re.compile(r"(?:S[RGB]{4}|R)(\d+)")  # a sensor's raw format, with its bits
 _MAX_SIZES = 12
-_MAX_SHARE = 0.95  # of the widest field of view is as good
+_MAX_SHARE = 0.95  # of the widest field of view, which counts as the same
 _MANUAL, _AUTOMATIC, _OFF = 1, 0, 0
 _LOCKED = ("ExposureTime", "AnalogueGain")
 
 
-class Refused(Exception):  # noqa: N818  # it is no fault of the program
+class Refused(Exception):  # noqa: N818  # no fault of the program
     """The request cannot be met."""
 
     def __init__(self, kind: str, text: str) -> None:
@@ -59,7 +59,7 @@ class Refused(Exception):  # noqa: N818  # it is no fault of the program
 
 
 def serve(libcamera: Any, connection: socket.socket, request: dict[str, Any]) -> None:
-    """Hand images over until the other end closes. Raises ``Refused``."""
+    """Deliver images until the other end closes. Raises ``Refused``."""
     manager = libcamera.CameraManager.singleton()
     if not request["device"]:
         _send(connection, "cameras", cameras=[{"name": _model(one), "id": one.id} for one in manager.cameras])
@@ -74,7 +74,7 @@ def serve(libcamera: Any, connection: socket.socket, request: dict[str, Any]) ->
 
 
 def _find(manager: Any, device: str) -> Any:
-    """The camera that has this name or id, whole or in part, or whose pipeline has this node in /dev."""
+    """Return the camera with this name or id, in full or in part, or whose pipeline has this node in /dev."""
     cameras = list(manager.cameras)
     if not cameras:
         raise why_none(sorted(Path("/dev").glob("media*")))
@@ -96,7 +96,7 @@ def _find(manager: Any, device: str) -> Any:
 
 
 def why_none(media: list[Path]) -> Refused:
-    """What keeps libcamera from finding a camera. Whoever runs one has its media device locked."""
+    """Return why libcamera finds no camera. Another program that runs one holds a lock on its media device."""
     for path in media:
         try:
             with path.open("r+b", buffering=0) as device:
@@ -180,7 +180,7 @@ def _pass_on(libcamera: Any, connection: socket.socket, stream: Any, done: Any) 
 
 
 def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[Any, dict[str, Any]]:
-    """The camera's stream, set up, and what was granted."""
+    """Set up the camera's stream; return it, and what was granted."""
     width, height, fps = request["width"], request["height"], request["fps"]
     offered = camera.generate_configuration([libcamera.StreamRole.Viewfinder]).at(0).formats
     readable = {PIXEL_FORMATS[str(one)]: one for one in offered.pixel_formats if str(one) in PIXEL_FORMATS}
@@ -204,7 +204,7 @@ def _configure(libcamera: Any, camera: Any, request: dict[str, Any]) -> tuple[An
 
 
 def _configuration(libcamera: Any, camera: Any, pixel_format: Any, width: int, height: int, mode: Any = None) -> Any:
-    """One that is granted as it is asked for; None: there is none."""
+    """Return a configuration that is granted as requested; None: there is none."""
     config = camera.generate_configuration([libcamera.StreamRole.Viewfinder])
     stream = config.at(0)
     stream.pixel_format, stream.size, stream.buffer_count = pixel_format, libcamera.Size(width, height), BUFFERS
@@ -218,10 +218,10 @@ def _configuration(libcamera: Any, camera: Any, pixel_format: Any, width: int, h
 
 
 def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: Any, fallback: Any) -> Any:
-    """The configuration with the sensor's smallest mode of those that see the most, at the rate that is asked for.
+    """Return the configuration with the sensor's smallest mode of those with the widest view, at the requested rate.
 
-    Left alone, libcamera takes the mode whose size is nearest, which on many sensors is a part of the image. What a
-    mode sees is only known once it is set up. ``fallback``: where modes cannot be chosen.
+    By default libcamera takes the mode of the nearest size, which on many sensors is a crop. The view of a mode is
+    known only once it is set up. ``fallback``: where modes cannot be chosen.
     """
     offers: list[tuple[int, int, Any]] = []
     for mode in _modes(libcamera, camera):
@@ -241,7 +241,7 @@ def _widest(libcamera: Any, camera: Any, request: dict[str, Any], pixel_format: 
 
 
 def _modes(libcamera: Any, camera: Any) -> Iterator[Any]:
-    """The sensor's modes, where the pipeline reports what they see and lets them be chosen."""
+    """Yield the sensor's modes, where the pipeline reports their view and lets them be chosen."""
     if _property(camera, "ScalerCropMaximum", None) is None or not hasattr(libcamera, "SensorConfiguration"):
         return
     raw = camera.generate_configuration([libcamera.StreamRole.Raw])
@@ -268,13 +268,13 @@ def _check_rate(camera: Any, fps: float) -> None:
 
 
 def _limits(camera: Any) -> tuple[int, int]:
-    """Shortest and longest time of a frame in µs; 0, 0: unknown."""
+    """Return the shortest and longest frame duration, µs; 0, 0: unknown."""
     info = _known(camera).get("FrameDurationLimits")
     return (int(_first(info[1].min)), int(_first(info[1].max))) if info else (0, 0)
 
 
 def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
-    """What is set at the start. Raises ``Refused`` for what the camera does not have or grant."""
+    """Return the controls to set at the start. Raises ``Refused`` for those the camera lacks or refuses."""
     known = _known(camera)
     chosen: dict[str, Any] = {}
     exposure_s, gain, power_line_hz = request["exposure_s"], request["gain"], request["power_line_hz"]
@@ -285,7 +285,7 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
         chosen["ExposureTime"] = _within(known, "ExposureTime", "camera.exposure_s", round(exposure_s * 1e6), 1e-6)
     if gain is not None:
         chosen["AnalogueGain"] = _within(known, "AnalogueGain", "camera.gain", float(gain))
-    if "ExposureTimeMode" in known:  # of libcamera 0.5 on; before, a value is a lock
+    if "ExposureTimeMode" in known:  # since libcamera 0.5; before that, setting a value locks it
         chosen["ExposureTimeMode"] = _AUTOMATIC if exposure_s is None else _MANUAL
     if "AnalogueGainMode" in known:
         chosen["AnalogueGainMode"] = _AUTOMATIC if gain is None else _MANUAL
@@ -305,17 +305,17 @@ def _controls(camera: Any, request: dict[str, Any]) -> dict[Any, Any]:
 
 
 def _in_order(controls: dict[Any, Any]) -> tuple[dict[Any, Any], dict[Any, Any]]:
-    """What goes with the first request and what with the second, of what the camera was started with.
+    """Split the controls between the first and the second request.
 
-    Before 0.5 libcamera takes the controls that come together in any order, and switching the automatic off or on
-    forgets a value that is locked already (agc_channel.cpp); some pipelines take none at the start (rkisp1.cpp).
+    Before 0.5 libcamera applies controls of one request in any order, and switching the automatic off or on resets a
+    value that is already locked (agc_channel.cpp); some pipelines take no controls at the start (rkisp1.cpp).
     """
     values = {control: value for control, value in controls.items() if control.name in _LOCKED}
     return {control: value for control, value in controls.items() if control not in values}, values
 
 
 def _within(known: dict[str, Any], name: str, key: str, value: float, unit: float = 1.0) -> float:
-    """The value, where the control can have it. ``unit``: of the control, in the key's."""
+    """Check that the control can take the value, and return it. ``unit``: of the control, in the key's."""
     if name not in known:
         raise Refused("unsupported", f"{key} cannot be set; leave it unset")
     low, high = _first(known[name][1].min) or 0, _first(known[name][1].max) or math.inf
@@ -326,7 +326,7 @@ def _within(known: dict[str, Any], name: str, key: str, value: float, unit: floa
 
 
 def _known(camera: Any) -> dict[str, tuple[Any, Any]]:
-    """The camera's controls by name."""
+    """Return the camera's controls by name."""
     return {control.name: (control, info) for control, info in camera.controls.items()}
 
 
@@ -339,7 +339,7 @@ def _model(camera: Any) -> str:
 
 
 def _node(path: str) -> int:
-    """The device number of a node; 0: there is none."""
+    """Return the device number of a node; 0: none."""
     try:
         return os.stat(path).st_rdev  # noqa: PTH116  # as libcamera does
     except OSError:
@@ -362,7 +362,7 @@ def _send(connection: socket.socket, what: str, descriptors: list[int] | None = 
 
 @contextmanager
 def _refusing(kind: str, text: str) -> Iterator[None]:
-    """What libcamera raises, as ``Refused``; that the reader is gone stays what it is."""
+    """Turn what libcamera raises into ``Refused``; errors of the closed socket pass through."""
     try:
         yield
     except ConnectionError:

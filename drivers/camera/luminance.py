@@ -1,8 +1,8 @@
-"""From the bytes of a buffer to grey, not by way of colours where the format allows.
+"""Luminance from the bytes of a buffer, without decoding colours where the format allows.
 
-GREY is grey already; NV12, YU12 and their like begin with a plane of it (Y); YUYV and UYVY carry it in every second
-byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw images of a sensor with
-colours (Bayer) and RGB are weighted sums of their colours (ITU-R BT.601).
+GREY is luminance already; NV12, YU12 and similar begin with a plane of it (Y); YUYV and UYVY carry it in every second
+byte; MJPG is decoded to its Y component. Of more than 8 bits the upper 8 are kept. Raw Bayer images and RGB become
+weighted sums of their colours (ITU-R BT.601).
 Source: Linux "Video for Linux API", Image Formats; ITU-T T.81 (JPEG), annex B, for the markers.
 """
 
@@ -33,7 +33,7 @@ _MARKER = re.compile(rb"\xff[^\x00\xff\xd0-\xd7]")  # one that cannot be within 
 
 @dataclass(frozen=True, slots=True)
 class _Layout:
-    """``octets`` carry ``pixels`` of a row; ``grey`` makes luminance of its own memory from rows without padding."""
+    """``octets`` hold ``pixels`` of a row; ``grey`` copies luminance from rows without padding."""
 
     octets: int
     pixels: int
@@ -45,7 +45,7 @@ class _Layout:
 
 
 def _packed(octets: int, pixels: int) -> Callable[[Grey], Grey]:
-    """MIPI: the upper 8 bits of some pixels, then the lower ones of all of them."""
+    """MIPI packing: the upper 8 bits of each pixel of a group, then the lower bits of all of them."""
 
     def grey(rows: Grey) -> Grey:
         uppers = rows.reshape(len(rows), -1, octets)[:, :, :pixels].view(f"u{pixels}")  # each group as one number
@@ -55,7 +55,7 @@ def _packed(octets: int, pixels: int) -> Callable[[Grey], Grey]:
 
 
 def _words(bits: int) -> Callable[[Grey], Grey]:
-    """16 bits a pixel, little-endian, the lower ``bits`` used."""
+    """16 bits per pixel, little-endian, the lower ``bits`` used."""
     if bits == 8:
         return lambda rows: rows.view("<u2").astype(np.uint8)  # the upper ones fall away
     return lambda rows: (rows.view("<u2") >> (bits - 8)).astype(np.uint8)
@@ -119,19 +119,19 @@ PIXEL_FORMATS = (
 
 
 class FrameError(DriverError):
-    """One image that cannot be used; the text says why in two or three words, for counting."""
+    """One unusable image; the text is the reason in two or three words, for counting."""
 
 
 def min_stride(pixel_format: str, width: int) -> int:
-    """Bytes from one row to the next where the device does not say; 0 for MJPG."""
+    """Return the stride in bytes where the device does not report it; 0 for MJPG."""
     return _LAYOUTS[pixel_format].row(width) if pixel_format in _LAYOUTS else 0
 
 
 def luminance(pixel_format: str, data: memoryview, width: int, height: int, stride: int, reduction: int = 1) -> Grey:
-    """Grey of its own memory from ``data``, the filled part of a buffer; ``stride``: bytes from one row to the next.
+    """Return a copy of the luminance of ``data``, the filled part of a buffer; ``stride``: bytes per row.
 
-    ``reduction``: by how much larger the image in a JPEG is, one of ``REDUCTIONS``.
-    Raises ``FrameError``: "short", "corrupt", "wrong size".
+    ``reduction``: factor by which the image in a JPEG is larger, one of ``REDUCTIONS``. Raises ``FrameError``: "short",
+    "corrupt", "wrong size".
     """
     if pixel_format == "MJPG":
         return _decode(bytes(data), width, height, reduction)
@@ -144,7 +144,7 @@ def luminance(pixel_format: str, data: memoryview, width: int, height: int, stri
 
 
 def _decode(jpeg: bytes, width: int, height: int, reduction: int) -> Grey:
-    """The size comes from the header first: a few bytes can decode to gigabytes."""
+    """Decode a JPEG, after checking the size in its header: a few bytes can decode to gigabytes."""
     if not jpeg:
         raise FrameError("short")
     header = jpeg_header(jpeg)
@@ -152,7 +152,7 @@ def _decode(jpeg: bytes, width: int, height: int, reduction: int) -> Grey:
         raise FrameError("corrupt")
     if (header.width, header.height) != (width * reduction, height * reduction):
         raise FrameError("wrong size")
-    end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill up what is missing and call it an image
+    end = _MARKER.search(jpeg, header.data_at)  # the decoder would fill in a truncated image
     if end is None or end.group() != b"\xff\xd9":
         raise FrameError("corrupt")
     try:

@@ -20,7 +20,7 @@ from drivers.camera.v4l2_ioctl import (
 )
 
 RATE_TOLERANCE = 0.01  # 29.97 is 30
-_MAX_LIST = 256  # a list that does not end is the device's mistake
+_MAX_LIST = 256  # guards against a faulty device whose list never ends
 _MAX_SIZES = 12
 
 
@@ -96,7 +96,7 @@ def rates(node: Node, pixel_format: str, width: int, height: int) -> list[RateOf
 
 
 def grants(node: Node, pixel_format: str, width: int, height: int, fps: float) -> bool:
-    """Whether the device offers all that together, as far as it says. Raises ``OSError``."""
+    """Whether the device offers this combination, as far as it reports. Raises ``OSError``."""
     offered_sizes = sizes(node, pixel_format)
     if offered_sizes and not any(offer.grants(width, height) for offer in offered_sizes):
         return False
@@ -125,7 +125,7 @@ def _describe_sizes(node: Node, pixel_format: str) -> str:
 
 
 def _enumerate(node: Node, request: int, question: Callable[[int], Argument]) -> Iterator[Argument]:
-    """What it answers for index 0, 1, … up to the end of the device's list."""
+    """Yield the device's answers for index 0, 1, … to the end of its list."""
 
     def answers() -> Iterator[Argument]:
         index = 0

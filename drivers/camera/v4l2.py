@@ -105,7 +105,7 @@ class V4l2Camera:
         self._arrivals = Arrivals(device, self.mode.fps, self.counts)
 
     def read(self) -> Sequence[Frame]:
-        """The newest image, waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
+        """Return the newest image, after waiting at most ``MAX_WAIT_S``. Raises ``DriverError``."""
         began_ns = self._clock.monotonic_ns()
         with as_driver_errors(self.name):
             events = self._node.poll(MAX_WAIT_S)
@@ -117,12 +117,12 @@ class V4l2Camera:
         return frames
 
     def close(self) -> None:
-        """Let the camera go."""
+        """Close the camera."""
         with contextlib.suppress(OSError):
             self._resources.close()
 
     def _take(self) -> list[Frame]:
-        """The newest of the filled buffers; all go back to the camera."""
+        """Return the image of the newest filled buffer; all go back to the camera."""
         filled: list[Filled] = []
         while len(filled) < len(self._memory) and (buffer := self._dequeue()) is not None:
             filled.append(buffer)
@@ -137,7 +137,7 @@ class V4l2Camera:
         late = self._arrivals.is_late(stamp_ns, now_ns)
         try:
             if len(filled) == len(self._memory) and (late or stamp_ns == now_ns):
-                # Without a free buffer the camera dropped what came after these; a fresh image is on its way.
+                # All buffers were full, so the camera dropped newer images; a fresh one is on its way.
                 self.counts["overtaken"] += 1
                 return []
             image = self._luminance(newest)
@@ -150,7 +150,7 @@ class V4l2Camera:
         return [Frame(stamp_ns, self._arrivals.seq, image)]
 
     def _dequeue(self) -> Filled | None:
-        """A filled buffer, its image counted; None: there is none."""
+        """Dequeue a filled buffer and count its image; None: there is none."""
         try:
             filled = self._buffers.dequeue(self._node)
         except BlockingIOError:
@@ -163,7 +163,7 @@ class V4l2Camera:
         self._buffers.queue(self._node, index)
 
     def _stamp(self, filled: Filled, now_ns: int) -> int:
-        """The kernel's stamp where it can be true, else now."""
+        """Return the kernel's stamp if it is plausible, else now."""
         self.stamped_at_exposure = filled.flags & FLAG_STAMP_SOURCE_MASK == FLAG_STAMPED_AT_EXPOSURE
         monotonic = filled.flags & FLAG_TIMESTAMP_MASK == FLAG_TIMESTAMP_MONOTONIC
         return self._arrivals.stamp(filled.stamp_ns if monotonic else None, self._queued_ns[filled.index], now_ns)
@@ -177,7 +177,7 @@ class V4l2Camera:
 
 
 def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, height: int, fps: float) -> Mode:
-    """Format, size and rate, set and read back. Raises ``UnsupportedSettingError``, ``OSError``."""
+    """Set format, size and rate, and read them back. Raises ``UnsupportedSettingError``, ``OSError``."""
     candidates = PIXEL_FORMATS if pixel_format == "auto" else (pixel_format,)
     readable = [name for name in offers.formats(node) if name in PIXEL_FORMATS]
     choices = [(name, 1) for name in candidates if name in readable]
@@ -207,7 +207,7 @@ def _set_mode(node: Node, buffers: Buffers, pixel_format: str, width: int, heigh
 
 
 def _set_rate(node: Node, fps: float) -> float:
-    """The rate that the camera will have; the one asked for where none can be set."""
+    """Set the rate; return what was granted, or the requested one where it cannot be set."""
     parameters = StreamParm(type=node.buffer_type, numerator=1000, denominator=round(1000 * fps))
     try:
         granted = node.ask(S_PARM, parameters)
@@ -232,7 +232,7 @@ def _map_buffers(node: Node, buffers: Buffers, resources: contextlib.ExitStack) 
 
 
 def _list() -> int:
-    """Cameras, and which of their formats can be read. Return the exit status: 1, with a line on stderr, for none."""
+    """Print cameras and their readable formats. Return the exit status: 1, with a line on stderr, for none."""
     listed = 0
     for listed, node in enumerate(cameras(), start=1):  # noqa: B007  # how many there were
         with as_driver_errors(node.path):

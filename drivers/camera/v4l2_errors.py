@@ -18,8 +18,8 @@ NEEDS_LIBCAMERA = (
     'gives images only through libcamera, as ribbon-cable cameras do; set camera.driver = "libcamera"'
     " (docs/raspberry-pi.md)"
 )
-NOT_SET_UP = (errno.EINVAL, errno.EPIPE, errno.ENOLINK)  # of STREAMON: the pipeline does not fit, or leads nowhere
-NOT_IMPLEMENTED = (errno.EINVAL, errno.ENOTTY)  # what a driver answers to a request that it does not know
+NOT_SET_UP = (errno.EINVAL, errno.EPIPE, errno.ENOLINK)  # of STREAMON: the pipeline's formats or links are not set up
+NOT_IMPLEMENTED = (errno.EINVAL, errno.ENOTTY)  # for requests that a driver does not implement
 
 
 _MEANINGS: dict[int, tuple[type[DriverError], str]] = {
@@ -39,7 +39,7 @@ _MEANINGS: dict[int, tuple[type[DriverError], str]] = {
 
 
 def driver_error(name: str, error: OSError) -> DriverError:
-    """The error, with its remedy, for ``error`` of the camera ``name``."""
+    """Return the typed error, with its fix, for ``error`` of the camera ``name``."""
     known = _MEANINGS.get(error.errno or 0)
     if known is None:
         return DeviceLostError(f"{name}: fails ({error.strerror}); check cable and power")
@@ -49,7 +49,7 @@ def driver_error(name: str, error: OSError) -> DriverError:
 
 @contextmanager
 def started(name: str) -> Iterator[None]:
-    """Raises ``WrongDeviceError`` where a node that took its settings does not start: it is part of a pipeline."""
+    """Raise ``WrongDeviceError`` where a configured node does not start, as it is part of a pipeline."""
     try:
         yield
     except OSError as error:
@@ -61,7 +61,7 @@ def started(name: str) -> Iterator[None]:
 
 @contextmanager
 def as_driver_errors(name: str) -> Iterator[None]:
-    """Turns ``OSError`` into ``DriverError``."""
+    """Turn ``OSError`` into ``DriverError``."""
     try:
         yield
     except OSError as error:

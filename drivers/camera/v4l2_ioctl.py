@@ -1,4 +1,4 @@
-"""The kernel's V4L2 interface as far as the driver needs it: structures, request numbers, system calls.
+"""The part of the kernel's V4L2 interface that the driver needs: structures, request numbers, system calls.
 
 Source: Linux UAPI ``include/uapi/linux/videodev2.h`` (names there: ``VIDIOC_QUERYCAP``, ``struct v4l2_buffer``, …).
 Single- and multi-planar capture with memory-mapped buffers. The layout is that of 64-bit Linux, the same on x86-64 and
@@ -24,7 +24,7 @@ MAX_PLANES = 8  # VIDEO_MAX_PLANES
 CAP_VIDEO_CAPTURE = 0x0000_0001
 CAP_VIDEO_CAPTURE_MPLANE = 0x0000_1000
 CAP_STREAMING = 0x0400_0000
-CAP_IO_MC = 0x2000_0000  # a part of a pipeline that somebody must set up through the media controller
+CAP_IO_MC = 0x2000_0000  # part of a pipeline that must be set up through the media controller
 CAP_DEVICE_CAPS = 0x8000_0000  # the node's own capabilities are listed apart from those of the whole device
 CAP_TIMEPERFRAME = 0x1000  # of StreamParm: the rate can be set
 
@@ -392,15 +392,15 @@ class Node:
 
     @property
     def needs_libcamera(self) -> bool:
-        """Whether images come only when sensor and pipeline are run through the media controller.
+        """Whether it delivers images only when sensor and pipeline are run through the media controller.
 
-        So are cameras at the ribbon cable: the node takes sizes and formats, and then does not start.
+        Cameras on the ribbon cable are like that: the node accepts sizes and formats, and then does not start.
         """
         return self._captures and (self.caps & CAP_IO_MC != 0 or self.is_signal_processor)
 
     @property
     def is_signal_processor(self) -> bool:
-        """Whether it works on the images of others; it need not report it, and exists without a camera too."""
+        """Whether it processes images of other nodes; not all report that, and they exist without a camera, too."""
         return self._driver in _SIGNAL_PROCESSORS
 
     @property
