@@ -1,4 +1,4 @@
-"""Watching a device from the command line: rate, jitter, errors and values once a second."""
+"""Watch a device from the command line: rate, jitter, errors and values once a second."""
 
 import argparse
 import math
@@ -23,8 +23,8 @@ def watch(
 ) -> int:
     """Open a device, report on what it delivers for ``seconds``, and close it.
 
-    ``describe``: the values of a record in a few words. Return the exit status: 1, with one line on stderr,
-    when the device fails; an interrupt ends it well.
+    ``describe``: the values of a record in a few words. Return the exit status: 1, with one line on stderr, when the
+    device fails; 0 after an interrupt.
     """
     try:
         device = open_device()
@@ -41,7 +41,7 @@ def watch(
 
 
 def positive(text: str) -> float:
-    """A number above 0, of a command line. Raises ``argparse.ArgumentTypeError``."""
+    """Parse a number above 0. Raises ``argparse.ArgumentTypeError``."""
     try:
         number = float(text)
     except ValueError:
@@ -52,14 +52,14 @@ def positive(text: str) -> float:
 
 
 def describe_imu(sample: ImuSample) -> str:
-    """The values of an inertial sample."""
+    """Format an inertial sample."""
     gyro = " ".join(f"{value:+8.4f}" for value in sample.gyro)
     accel = " ".join(f"{value:+8.3f}" for value in sample.accel)
     return f"gyro {gyro} rad/s  accel {accel} m/s²{'  saturated' * sample.saturated}"
 
 
 def describe_frame(frame: Frame) -> str:
-    """Size and brightness of an image."""
+    """Format size and brightness of an image."""
     height, width = frame.image.shape
     return f"{width}x{height}, mean {frame.image.mean():.0f}"
 

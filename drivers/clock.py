@@ -1,4 +1,4 @@
-"""The clock that drivers read: the system's monotonic one, or another that a test turns by hand."""
+"""The clock of the drivers: the system's monotonic one, or one that a test controls."""
 
 import time
 from typing import Protocol

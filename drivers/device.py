@@ -11,9 +11,9 @@ Record = TypeVar("Record")
 Delivered_co = TypeVar("Delivered_co", covariant=True)
 
 FIRST_PAUSE_S = 0.1
-MAX_PAUSE_S = 1.0  # with the opening itself a device is back within 2 s of coming back
+MAX_PAUSE_S = 1.0  # so that a device, with the time to open it, is in use within 2 s of coming back
 MAX_HOPELESS_PAUSE_S = 10.0  # after errors that only the user can fix
-EXCESS = ("excess_bytes", "excess_samples")  # counts of what was dropped because no real device sends so much
+EXCESS = ("excess_bytes", "excess_samples")  # counts of what exceeded the rate of any real device
 
 
 class Device(Protocol[Delivered_co]):
@@ -26,22 +26,21 @@ class Device(Protocol[Delivered_co]):
     counts: Counter[str]
 
     def read(self) -> Sequence[Delivered_co]:
-        """Wait for what comes next and return it, oldest first; the wait is bounded by the device's rate.
+        """Wait for new records and return them, oldest first; the wait is bounded by the device's rate.
 
-        Return nothing where what came was refused and counted. Raises ``DriverError`` when the device must be opened
-        again.
+        Return nothing if all were refused and counted. Raises ``DriverError`` when the device must be reopened.
         """
         ...
 
     def close(self) -> None:
-        """Let the device go; never raises, may be called twice."""
+        """Close the device; never raises, may be called twice."""
         ...
 
 
 class KeptOpen(Generic[Record]):
-    """A device that is opened again whenever it fails, with pauses that grow to ``MAX_PAUSE_S``.
+    """A device that is reopened whenever it fails, with pauses that grow to ``MAX_PAUSE_S``.
 
-    ``error``: why it is not open, None while it is. ``counts``: the device's own of all its openings, and
+    ``error``: why it is not open, None while it is. ``counts``: the device's own, over all its openings, and
     ``opened``, ``failed``.
     """
 
@@ -60,7 +59,7 @@ class KeptOpen(Generic[Record]):
         return self._past if self._device is None else self._past + self._device.counts
 
     def read(self) -> Sequence[Record]:
-        """Return what the device delivers; empty, after a pause, while it is away. Never raises ``DriverError``."""
+        """Return new records; none, after a pause, while the device is absent. Never raises ``DriverError``."""
         try:
             if self._device is None:
                 self._device = self._open()
@@ -83,7 +82,7 @@ class KeptOpen(Generic[Record]):
         self._pause_s = min(2 * self._pause_s, longest_s)
 
     def close(self) -> None:
-        """Let the device go."""
+        """Close the device."""
         if self._device is not None:
             self._device.close()
             self._past += self._device.counts

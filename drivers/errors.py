@@ -1,16 +1,16 @@
-"""What goes wrong with a device: one line that names it and what to do; ``retry``: trying again can help."""
+"""Errors of devices: one line with the device, the fault and the fix; ``retry``: trying again can help."""
 
 from typing import ClassVar
 
 
 class DriverError(Exception):
-    """A device that cannot be used, or no longer; its text is the whole message."""
+    """A device cannot be used, or no longer; the text is the whole message."""
 
     retry: ClassVar[bool] = True
 
 
 class DeviceMissingError(DriverError):
-    """Nothing there by that name or at that address; it may still be plugged in."""
+    """No device by that name or at that address; it may be plugged in later."""
 
 
 class DeviceBusyError(DriverError):
@@ -30,15 +30,15 @@ class MissingSoftwareError(DriverError):
 
 
 class DeviceLostError(DriverError):
-    """It was there, and went away: unplugged, hung up, or its bus keeps failing."""
+    """It was there and went away: unplugged, hung, or its bus keeps failing."""
 
 
 class DeviceStalledError(DriverError):
-    """It is there, but nothing has come for longer than its rate allows."""
+    """It is there, but has been silent for longer than its rate allows."""
 
 
 class WrongDeviceError(DriverError):
-    """Something else answers: another chip, another protocol, another baud rate."""
+    """Something else answers: another chip, protocol or baud rate."""
 
     retry = False
 

@@ -1,41 +1,40 @@
-"""When samples were made, inferred from when they arrived: the device's own steady rate with the jitter removed.
+"""Sample times inferred from arrival times: the device's own steady rate, with the jitter removed.
 
-A device makes sample n at ``start + n * period`` of its own clock; the sample arrives later, by a serial adapter's
-latency timer, a poll or the scheduler, and never earlier. So the arrivals lie on or above a straight line, and the line
-wanted is the highest that lies below them all: it goes through the edge of their lower convex hull that spans the mean
+A device makes sample n at ``start + n * period`` of its own clock; the sample arrives later, delayed by a serial
+adapter's latency timer, polling or the scheduler, and never earlier. So arrivals lie on or above a straight line, and
+the estimate is the highest line below them all: it contains the edge of their lower convex hull that spans the mean
 index (the linear program of Zhang, Liu & Xia, "Clock Synchronization Algorithms for Network Measurements", INFOCOM
-2002). A delay that is always there cannot be seen from here: that is what ``imu.time_offset_s`` is for.
+2002). A constant delay is not observable here: that is what ``imu.time_offset_s`` is for.
 """
 
 from collections import deque
 from collections.abc import Sequence
 from itertools import accumulate, pairwise
 
-FIRST_BLOCK_NS = 50e6  # of each block only the arrival with the least delay is kept
+FIRST_BLOCK_NS = 50e6  # of each block only the arrival with the smallest delay is kept
 BLOCK_NS = 200e6
-BLOCKS = 50  # kept: a rate that drifts is followed within 10 s
-NOMINAL_TRUST_NS = 0.25e9  # after so long only the rate seen counts, not the nominal one
-RATE_TRUST_NS = 2.5e9  # the same for a rate that was known before a gap
-KNOWN_NS = 0.5e9  # a rate that was seen for this long is known
-ASTRAY_PERIODS = 1.5  # as far from the line: samples that nobody counted, or counted twice; polls explain up to 1
-ASTRAY_NS = 10e6  # … and at least so far
-LATE_NS = 100e6  # … and late for so long: a backlog is read faster
+BLOCKS = 50  # kept: a drifting rate is tracked within 10 s
+NOMINAL_TRUST_NS = 0.25e9  # after this only the measured rate counts, not the nominal one
+RATE_TRUST_NS = 2.5e9  # the same for a rate known before a gap
+KNOWN_NS = 0.5e9  # a rate measured for this long is known
+ASTRAY_PERIODS = 1.5  # off the line: samples missed, or counted twice; polling explains up to 1
+ASTRAY_NS = 10e6  # … and at least this far
+LATE_NS = 100e6  # … and late for this long: a backlog clears faster
 LATE_CALLS = 5
-MAX_AHEAD_NS = 100_000_000  # of the arrival: while the rate is not known yet, stamps may be too early or too late
+MAX_AHEAD_NS = 100_000_000  # of the arrival: until the rate is known, stamps may be early or late
 SLEW = 0.005  # share by which stamps are stretched to follow the line once the rate is known
-FIRST_SLEW = 0.5  # … and shrunk at most before
+FIRST_SLEW = 0.5  # … and shrunk, at most, before
 
 Point = tuple[int, float]  # sample, ns since the base
 
 
 class SampleClock:
-    """Recovers a device's own steady rate from the times at which its samples arrive (jitter removed).
+    """Recovers a device's own steady rate from the arrival times of its samples.
 
     Stamps are strictly increasing, also across ``restart``. A rate that is off nominal is known after about 1 s; until
-    then the nominal one helps out. A gap in which nobody counted the samples lost is noticed by what comes after being
-    late, for ``LATE_NS``; up to 1.5 samples lost pass for jitter. A device whose own time runs away
-    takes its stamps ``MAX_AHEAD_NS`` into the future at most, and 1 ns more for each sample. Memory is ``BLOCKS``
-    points.
+    then the nominal one is used. A gap of uncounted samples is detected when later ones stay late for ``LATE_NS``; up
+    to 1.5 lost samples pass as jitter. Stamps of a device whose clock runs away are at most ``MAX_AHEAD_NS`` in the
+    future, and 1 ns more for each sample. Memory is ``BLOCKS`` points.
     """
 
     def __init__(self, nominal_rate_hz: float) -> None:
@@ -47,15 +46,15 @@ class SampleClock:
 
     @property
     def rate_hz(self) -> float:
-        """The rate recovered so far, in seconds of the monotonic clock."""
+        """The rate recovered so far, by the monotonic clock."""
         return 1e9 / self._period_ns
 
     def restart(self) -> None:
-        """Begin anew, after the device was initialised again."""
+        """Restart, after the device was initialised again."""
         self._anchor(self._nominal_ns, NOMINAL_TRUST_NS)
 
     def _anchor(self, period_ns: float, trust_ns: float) -> None:
-        """Forget the arrivals; go by ``period_ns`` until arrivals over more than ``trust_ns`` say otherwise."""
+        """Forget the arrivals; use ``period_ns`` until arrivals over more than ``trust_ns`` show otherwise."""
         self._period_ns = self._prior_ns = period_ns
         self._trust_ns = trust_ns
         self._base_ns: int | None = None  # of the arrivals below
@@ -69,17 +68,17 @@ class SampleClock:
         self._late_calls = 0
 
     def stamps_ns(self, arrival_ns: int, count: int, lost: int = 0) -> list[int]:
-        """When each of ``count`` samples was made, oldest first, ns.
+        """Return the stamps of ``count`` samples, oldest first, ns.
 
-        All of them were there at ``arrival_ns``, the newest had just been made; ``lost`` samples are known to be
-        missing before them.
+        All were available at ``arrival_ns``, the newest had just been made; ``lost`` samples are known to be missing
+        before them.
         """
         return self.stamps_of_steps_ns(arrival_ns, [lost + 1] + [1] * (count - 1)) if count > 0 else []
 
     def stamps_of_steps_ns(self, arrival_ns: int, steps: Sequence[int]) -> list[int]:
-        """The same for samples of which each was made ``steps`` periods (1 or more) after the one before it.
+        """The same for samples made ``steps`` periods (1 or more) after the one before.
 
-        With the ticks of a device's own clock for periods, samples need not be evenly spaced.
+        With ticks of a device's own clock as periods, samples need not be evenly spaced.
         """
         if not steps:
             return []
@@ -94,7 +93,7 @@ class SampleClock:
         ]
 
     def _out_of_step(self, now_ns: float) -> bool:
-        """Whether samples were missed or counted twice, so that the line must be laid anew; keeps the rate."""
+        """Whether samples were missed or counted twice, so that the line must be refitted; keeps the rate."""
         delay_ns = self._delay_ns((self._sample, now_ns))
         astray_ns = max(ASTRAY_PERIODS * self._period_ns, ASTRAY_NS)
         if delay_ns < astray_ns:
@@ -103,14 +102,14 @@ class SampleClock:
         else:
             self._late_calls += 1
         late = self._late_calls >= LATE_CALLS and now_ns - self._on_time_ns > LATE_NS
-        rate_known = self._seen_ns > KNOWN_NS  # else it may be what is wrong
+        rate_known = self._seen_ns > KNOWN_NS  # else the rate may be wrong
         astray = rate_known and (late or delay_ns < -astray_ns)
         if astray:
             self._anchor(self._period_ns, RATE_TRUST_NS)
         return astray
 
     def _take(self, point: Point) -> None:
-        """Let an arrival of the newest sample move the line."""
+        """Update the line with an arrival of the newest sample."""
         if point[1] - self._block_ns > min(max(self._seen_ns / 8, FIRST_BLOCK_NS), BLOCK_NS):
             self._blocks.append(self._lowest)
             self._lowest, self._block_ns = point, point[1]
@@ -144,7 +143,7 @@ class SampleClock:
 
 
 def _slope_below(points: deque[Point]) -> float:
-    """Slope of the line below all points with the least distance to them, ns a sample."""
+    """Slope of the line below all points and closest to them, ns per sample."""
     hull: list[Point] = []
     for x, y in points:
         while len(hull) > 1:

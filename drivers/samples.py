@@ -1,7 +1,6 @@
 """What sources deliver: frames, inertial samples, speeds.
 
-SI units. An IMU's samples come in its own axes; ``imu.axes`` turns them into the camera's: x right, y down,
-z forward.
+SI units. An IMU's samples are in its own axes; ``imu.axes`` maps them to the camera's: x right, y down, z forward.
 """
 
 from dataclasses import dataclass
@@ -17,7 +16,7 @@ class Frame:
     """One frame: an image with its stamp and number."""
 
     stamp_ns: int  # start of exposure
-    seq: int  # counts images of the source; gaps are drops
+    seq: int  # image counter of the source; gaps are dropped images
     image: npt.NDArray[np.uint8]  # (height, width) luminance
 
 
@@ -28,7 +27,7 @@ class ImuSample:
     stamp_ns: int
     gyro: tuple[float, float, float]  # rad/s
     accel: tuple[float, float, float]  # m/s², specific force: at rest it points away from the ground
-    saturated: bool = False  # an axis was at the end of its range
+    saturated: bool = False  # an axis was at full scale
 
 
 @dataclass(frozen=True, slots=True)

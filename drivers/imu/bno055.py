@@ -4,12 +4,12 @@ BNO055 data sheet, BST-BNO055-DS000-14 revision 1.4; Linux (bno055.c) agrees on 
 modes without fusion the gyro's counts follow the range (2^15 counts, as the Linux driver found), not the 16 counts for
 1 °/s of table 3-22. Fusion means 100 Hz, 4 g and 2000 °/s, whatever is asked, and a gyro whose bias the chip takes out.
 
-There is no FIFO: the registers are polled, and what they still hold from last time is dropped. The chip stretches the
-clock; bus masters that do not wait for it (Raspberry Pi) read bytes with a flipped top bit. So a jump must be seen in
-two reads, else it is refused; a software bus (i2c-gpio) or a slower clock cures it.
+There is no FIFO: the registers are polled, and repeated values are dropped. The chip stretches the clock; bus masters
+that do not support that (Raspberry Pi) read bytes with a flipped top bit. So a jump counts only if two reads agree; a
+software bus (i2c-gpio) or a slower clock avoids the problem.
 
-A reset takes 650 ms, in which the chip acknowledges nothing, often not even the reset itself. So it is not reset at
-each start but switched to CONFIG, the mode in which it takes settings; only a system error asks for a reset.
+A reset takes 650 ms, in which the chip acknowledges nothing, often not even the reset itself. So at start it is not
+reset but switched to CONFIG, the mode in which it takes settings; only a system error requires a reset.
 """
 
 import struct
@@ -55,9 +55,9 @@ READS = 3  # of one sample, until two agree
 JUMP = 100  # counts from one sample to the next, 6 °/s or 1 m/s²; the flips are of 128 and of 32768
 
 PERIOD_NS = round(1e9 / RATE_HZ)
-CLOSELY_S = 0.125 / RATE_HZ  # between looks for the first sample after a gap
-POLL_S = 0.618 / RATE_HZ  # sees every sample, at ever other moments after it was made
-MAX_REPEAT_NS = 30_000_000  # at perfect rest a value that stays is a sample too
+CLOSELY_S = 0.125 / RATE_HZ  # between polls for the first sample after a gap
+POLL_S = 0.618 / RATE_HZ  # sees every sample, at varying delays
+MAX_REPEAT_NS = 30_000_000  # then a repeated value counts as a sample: at perfect rest
 
 IDENTITIES = {0xA0: "BNO055"}
 GYRO_RANGES = dict.fromkeys((250, 500, 1000, 2000), GYRO_RANGE)
@@ -95,7 +95,7 @@ class Bno055(I2cImu):
         self._clock.sleep_s(TO_CONFIG_S)
 
     def _reboot(self) -> None:
-        """Reset the chip and wait until it says who it is. Raises ``DeviceLostError``."""
+        """Reset the chip and wait until it identifies itself. Raises ``DeviceLostError``."""
         self._command_reset(SYS_TRIGGER, RESET)
         end_ns = self._clock.monotonic_ns() + round(MAX_BOOT_S * 1e9)
         self._clock.sleep_s(BOOT_S)
@@ -111,7 +111,7 @@ class Bno055(I2cImu):
         self._clock.sleep_s(SWITCH_S)
         self._believed: tuple[int, ...] = ()
         self._newest_ns = self._changed_ns = self._polled_ns = self._clock.monotonic_ns()
-        self._unsure = True  # of how many samples there were since the newest
+        self._unsure = True  # how many samples there were since the newest
 
     def _settings_hold(self) -> bool:
         in_mode = self._read(OPR_MODE, 1)[0] & 0x0F == IMU_MODE
@@ -125,10 +125,10 @@ class Bno055(I2cImu):
         late_ns, self._polled_ns = self._polled_ns + PERIOD_NS, self._clock.monotonic_ns()
         counts = self._believable()
         now_ns = self._clock.monotonic_ns()
-        if not any(counts):  # refused, or the registers of a chip that does not run
+        if not any(counts):  # refused, or the chip does not run
             self._unsure = True
             return []
-        if self._polled_ns > late_ns and not self._unsure:  # which of those that were missed would it be?
+        if self._polled_ns > late_ns and not self._unsure:  # unknown which of the missed samples this is
             self._unsure = True
             self._believed, self._changed_ns = counts, now_ns
             return []
@@ -143,7 +143,7 @@ class Bno055(I2cImu):
         return [self._scale.sample(self._newest_ns, *_halves(counts))]
 
     def _believable(self) -> tuple[int, ...]:
-        """Accelerometer and gyro; nothing when the reads contradict each other and what came before."""
+        """Return accelerometer and gyro; nothing if the reads contradict each other and the last sample."""
         before = self._believed
         for refused in range(READS):
             counts = self._poll()
@@ -162,7 +162,7 @@ class Bno055(I2cImu):
 
 
 def _close(counts: tuple[int, ...], others: tuple[int, ...]) -> bool:
-    """Whether one can follow upon the other."""
+    """Whether one can follow the other."""
     return bool(others) and all(abs(one - other) < JUMP for one, other in zip(counts, others, strict=True))
 
 

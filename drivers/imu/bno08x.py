@@ -1,10 +1,10 @@
 """CEVA BNO080, BNO085 and BNO086 over I2C, with the rates of its gyro (UART-RVC gives angles only).
 
-What is said is in ``shtp``; sources there, and Adafruit's CircuitPython driver for the reading: first the header of the
-next packet, then the packet whole, with its header again. The chip stretches the clock, which some masters do not wait
-for (Raspberry Pi): they read wrong bits. So a header is believed only when it comes twice the same, a report only
-within its range; a software bus (i2c-gpio) or the UART is better. It keeps what nobody has read yet, so it is looked at
-some 60 times a second. While it boots it acknowledges nothing; it is never reset.
+The protocol is in ``shtp``, with its sources; the transfers follow Adafruit's CircuitPython driver: first the header of
+the next packet, then the whole packet, with its header again. The chip stretches the clock, which some masters do not
+support (Raspberry Pi): they read wrong bits. So a header counts only if it is read twice the same, and a report only
+within its range; a software bus (i2c-gpio) or the UART is better. The chip queues its packets, so it is polled about 60
+times a second. While it boots it acknowledges nothing; it is never reset.
 """
 
 import math
@@ -27,7 +27,7 @@ BOOT_S = 0.5  # from the supply's coming up, 0.2 as a rule
 BOOT_LOOK_S = 0.05
 MAX_PACKETS = 64  # in one go
 BATCH_S = 0.015
-GOLDEN = 0.618  # of a period: it is looked at at ever other moments, some of them right after a sample
+GOLDEN = 0.618  # of a period: polls come at varying phases, some of them right after a sample
 STALL_S = 2.0
 
 GYRO_RANGES = dict.fromkeys((250, 500, 1000, 2000), Range(0, math.radians(1) / RADPS_PER_UNIT))  # it has but one
@@ -72,13 +72,13 @@ class Bno08x:
 
     @classmethod
     def recognised(cls, bus: I2cBus, address: int) -> str | None:
-        """The model that is there; None: no such chip, or one that has nothing to say. Writes nothing."""
+        """Return the model at an address; None: no such chip, or a silent one. Writes nothing."""
         header = bus.receive(address, HEADER.size, tries=2)
         return cls.chip if is_plausible(header) and bus.receive(address, HEADER.size, tries=2) == header else None
 
     @property
     def rate_hz(self) -> float:
-        """As the hub granted it."""
+        """The rate that the hub granted."""
         return self._hub.rate_hz
 
     def read(self) -> Sequence[ImuSample]:
@@ -108,7 +108,7 @@ class Bno08x:
         ]
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.close()
 
     def _meet(self) -> None:
@@ -140,7 +140,7 @@ class Bno08x:
 
     def _say(self) -> None:
         for packet in self._hub.to_say(self._clock.monotonic_ns(), heard=self._heard):
-            with suppress(TransferError):  # it is booting: this is sent again
+            with suppress(TransferError):  # while it boots; sent again
                 self._bus.send(self.address, packet, tries=2)
         self._heard = False
 
@@ -154,7 +154,7 @@ class Bno08x:
         return readings
 
     def _packet(self) -> bytes | None:
-        """The next one; None: there is none, or it is malformed. Raises ``TransferError``."""
+        """Return the next packet; None: none, or malformed. Raises ``TransferError``."""
         header = self._bus.receive(self.address, HEADER.size)
         length = HEADER.unpack(header)[0] & ~CONTINUED
         if length == 0:

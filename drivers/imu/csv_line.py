@@ -1,8 +1,8 @@
-"""A plain line a sample, for everybody's own microcontroller: ``docs/serial-imu.md`` describes it.
+"""One text line per sample, for your own microcontroller: ``docs/serial-imu.md`` describes it.
 
 ``time_us,gx,gy,gz,ax,ay,az`` in µs of the device's own clock, rad/s and m/s²; the time may be left out; ``,1`` at the
 end of a line with time says that an axis was at the end of its range; ``*XX`` after all that is the exclusive or of the
-characters before it, in two hexadecimal digits. Lines that begin with ``#`` are remarks.
+characters before it, in two hexadecimal digits. Lines that begin with ``#`` are comments.
 """
 
 import math
@@ -27,10 +27,10 @@ LINE = re.compile(
 
 
 class CsvParser:
-    """Reads lines; one that is damaged, too long or of another form than the one before it is refused.
+    """Parses lines; one that is damaged, too long or of another form than the one before it is refused.
 
-    See ``Parser``; any line of printable characters is well formed. What comes before the first end of a line is passed
-    over: it may be the rest of one.
+    See ``Parser``; any line of printable characters is well formed. Data before the first end of line is skipped, as it
+    may be part of a line.
     """
 
     def __init__(self) -> None:

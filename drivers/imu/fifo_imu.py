@@ -1,6 +1,6 @@
-"""IMUs with a hardware FIFO: it is emptied some 60 times a second, so that a late wake-up loses nothing.
+"""IMUs with a hardware FIFO, which is read about 60 times a second, so that a late wake-up loses nothing.
 
-A read that failed halfway, or a FIFO that ran full, has lost the alignment of its frames: it is emptied, never read on.
+A read that failed halfway, or an overrun, has lost the alignment of frames: the FIFO is then flushed.
 """
 
 import struct
@@ -14,8 +14,8 @@ from drivers.samples import ImuSample
 
 BATCH_S = 0.015  # between reads, or one sample where that is longer
 START_UP_S = 0.1  # gyros need up to 80 ms
-GOLDEN = 0.618  # of a period: reads come at ever other moments of it, so some come right after a sample
-CLOSELY = 1 / 8  # of a period between looks for the first sample
+GOLDEN = 0.618  # of a period: reads come at varying phases, so that some come right after a sample
+CLOSELY = 1 / 8  # of a period, between polls for the first sample
 
 
 class FifoImu(I2cImu):
@@ -23,17 +23,17 @@ class FifoImu(I2cImu):
 
     fifo_register: ClassVar[int]
     fifo_bytes: int  # how many it holds
-    word_bytes: ClassVar[int] = 12  # read whole or not at all
+    word_bytes: ClassVar[int] = 12  # the unit in which it is read
     frame: ClassVar[struct.Struct] = struct.Struct("<6h")
     gyro_first: ClassVar[bool] = True
 
     @abstractmethod
     def _fifo_level(self) -> int:
-        """Bytes in the FIFO; ``fifo_bytes`` when it ran over."""
+        """Return the bytes in the FIFO; ``fifo_bytes`` after an overrun."""
 
     @abstractmethod
     def _empty_fifo(self) -> None:
-        """Drop what is in the FIFO and begin anew."""
+        """Flush the FIFO."""
 
     def _begin(self) -> None:
         self._clock.sleep_s(START_UP_S)
@@ -79,17 +79,17 @@ class FifoImu(I2cImu):
         return []
 
     def _burst(self, length: int) -> bytes:
-        """Raises ``TransferError`` at the first fault: what was read till then is gone from the FIFO."""
+        """Read from the FIFO. Raises ``TransferError`` at the first fault: what was read is gone from the FIFO."""
         most = BLOCK_BYTES - BLOCK_BYTES % self.word_bytes
         parts = [self._read(self.fifo_register, min(most, length - at), tries=1) for at in range(0, length, most)]
         return b"".join(parts)
 
     def _frames(self, data: bytes) -> Iterator[tuple[Counts, Counts]]:
-        """Gyro and accelerometer of each frame."""
+        """Yield gyro and accelerometer of each frame."""
         for a, b, c, d, e, f in self.frame.iter_unpack(data):
             yield ((a, b, c), (d, e, f)) if self.gyro_first else ((d, e, f), (a, b, c))
 
 
 def closest(rates_hz: Iterable[float], rate_hz: float) -> float:
-    """The rate that is closest."""
+    """Return the closest rate."""
     return min(rates_hz, key=lambda offered_hz: abs(offered_hz - rate_hz))

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Sequence
 from drivers.samples import STANDARD_GRAVITY_MPS2, ImuSample
 
 WINDOW_S = 0.5
-STILL_RADPS = 0.05  # from the least to the largest rate of an axis; the gyro's bias does not matter
+STILL_RADPS = 0.05  # range of an axis's rates at rest; the gyro's bias does not matter
 STILL_MPS2 = 1.0
 
 
 class Gravity:
-    """Looks at windows of ``WINDOW_S`` until one was at rest."""
+    """Examines windows of ``WINDOW_S`` until one is at rest."""
 
     def __init__(self, rate_hz: float) -> None:
         self._window_samples = max(round(WINDOW_S * rate_hz), 4)

@@ -1,9 +1,8 @@
-"""An I2C bus of Linux (``/dev/i2c-N``): register transfers that are tried again, counted, and end in typed errors.
+"""A Linux I2C bus (``/dev/i2c-N``): register transfers with retries, counts of failures, and typed errors.
 
-Registers are reached by byte and block transfers of SMBus, so that every adapter and ``i2c-stub`` will do; a chip
-without registers is sent plain bytes. What the kernel
-answers: ENXIO, EREMOTEIO and often EIO mean that nobody acknowledged, EAGAIN a lost arbitration, ETIMEDOUT a line held
-low or a clock stretched too long (Linux, ``Documentation/i2c/fault-codes.rst``).
+Registers are accessed by SMBus byte and block transfers, which every adapter and ``i2c-stub`` supports; chips without
+registers get plain bytes. The kernel's error numbers: ENXIO, EREMOTEIO and often EIO mean no acknowledge, EAGAIN lost
+arbitration, ETIMEDOUT a line held low or a clock stretched too long (Linux, ``Documentation/i2c/fault-codes.rst``).
 """
 
 import errno
@@ -24,9 +23,9 @@ from drivers.errors import (
     UnsupportedSettingError,
 )
 
-BLOCK_BYTES = 32  # the most that one SMBus transfer carries
+BLOCK_BYTES = 32  # the limit of an SMBus transfer
 TRIES = 5
-TIMEOUT_TRIES = 2  # what a timeout counts for: the kernel has waited a second already
+TIMEOUT_TRIES = 2  # that a timeout counts for, as the kernel has already waited a second
 FIRST_PAUSE_S = 0.001  # doubled after each failure
 ADDRESSES = range(0x08, 0x78)  # the others are reserved
 
@@ -43,7 +42,7 @@ Answer = TypeVar("Answer")
 
 
 class Smbus(Protocol):
-    """What is used of ``smbus2.SMBus``; each transfer raises ``OSError``."""
+    """The part of ``smbus2.SMBus`` in use; each transfer raises ``OSError``."""
 
     def read_byte(self, i2c_addr: int, /) -> int:
         """One byte, without naming a register."""
@@ -62,11 +61,11 @@ class Smbus(Protocol):
         ...
 
     def i2c_rdwr(self, *messages: smbus2.i2c_msg) -> None:
-        """Bytes without a register, 1 to 8192 a message; those read are in it then."""
+        """Plain transfers of 1 to 8192 bytes per message; data read is then in the message."""
         ...
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         ...
 
 
@@ -81,7 +80,7 @@ class TransferError(DeviceLostError):
 class I2cBus:
     """A bus. ``counts``: failed transfers by reason.
 
-    ``smbus``: what does the transfers; not given: ``/dev/i2c-<number>`` under ``dev`` is opened. Raises
+    ``smbus``: does the transfers; if not given, ``/dev/i2c-<number>`` under ``dev`` is opened. Raises
     ``DeviceMissingError``, ``DeviceForbiddenError`` or ``DeviceLostError``.
     """
 
@@ -95,7 +94,7 @@ class I2cBus:
         self._smbus = _open(self.path) if smbus is None else smbus
 
     def read(self, address: int, register: int, length: int, tries: int = TRIES) -> bytes:
-        """``length`` bytes (1 to 32) from ``register`` on. Raises ``TransferError``."""
+        """Read 1 to 32 bytes from ``register`` on. Raises ``TransferError``."""
         return bytes(
             self._try(address, tries, lambda: self._smbus.read_i2c_block_data(address, register, length)),
         )
@@ -108,18 +107,18 @@ class I2cBus:
             self._try(address, tries, lambda: self._smbus.write_i2c_block_data(address, register, list(data)))
 
     def receive(self, address: int, length: int, tries: int = TRIES) -> bytes:
-        """``length`` bytes (1 to 8192) of a chip that has no registers. Raises ``TransferError``."""
+        """Read 1 to 8192 bytes from a chip without registers. Raises ``TransferError``."""
         message = smbus2.i2c_msg.read(address, length)
         self._try(address, tries, lambda: self._smbus.i2c_rdwr(message))
         return bytes(message)
 
     def send(self, address: int, data: bytes, tries: int = TRIES) -> None:
-        """Write bytes (1 to 8192) to a chip that has no registers. Raises ``TransferError``."""
+        """Write 1 to 8192 bytes to a chip without registers. Raises ``TransferError``."""
         message = smbus2.i2c_msg.write(address, data)
         self._try(address, tries, lambda: self._smbus.i2c_rdwr(message))
 
     def scan(self, addresses: Iterable[int] = ADDRESSES) -> list[int]:
-        """Addresses at which somebody acknowledges, or that a kernel driver owns; ends early when the bus hangs."""
+        """Return the addresses that acknowledge or that a kernel driver owns; stops early when the bus hangs."""
         found = []
         for address in addresses:
             try:
@@ -133,7 +132,7 @@ class I2cBus:
         return found
 
     def close(self) -> None:
-        """Let the bus go; never raises."""
+        """Close the bus; never raises."""
         self._closed = True
         with suppress(OSError):
             self._smbus.close()

@@ -1,4 +1,4 @@
-"""Opening an I2C chip by the name that the configuration gives it."""
+"""Open an I2C chip by its name in the configuration."""
 
 import argparse
 from collections import Counter
@@ -18,7 +18,7 @@ from drivers.samples import ImuSample
 
 
 class I2cChip(Protocol):
-    """An open chip, and what its class says without one."""
+    """An open chip, and what its class tells about it."""
 
     chip: ClassVar[str]
     addresses: ClassVar[tuple[int, ...]]  # the usual one first
@@ -33,12 +33,12 @@ class I2cChip(Protocol):
 
     @classmethod
     def recognised(cls, bus: I2cBus, address: int) -> str | None:
-        """The model that is there, None: no such chip. Writes nothing."""
+        """Return the model at an address, None: no such chip. Writes nothing."""
         ...
 
     @property
     def rate_hz(self) -> float:
-        """What was granted."""
+        """The granted rate."""
         ...
 
     def read(self) -> Sequence[ImuSample]:
@@ -53,7 +53,7 @@ class I2cChip(Protocol):
 def open_chip(
     driver: str, bus: int, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
 ) -> Device[ImuSample]:
-    """The chip at an address (0: its usual one) of ``/dev/i2c-<bus>``.
+    """Open the chip at an address (0: its usual one) of ``/dev/i2c-<bus>``.
 
     Raises ``DriverError``, as ``I2cBus`` and ``I2cImu`` do.
     """
@@ -63,7 +63,7 @@ def open_chip(
 def chip_on(
     bus: I2cBus, driver: str, address: int = 0, settings: ImuSettings = DEFAULT_SETTINGS, clock: Clock = SYSTEM_CLOCK
 ) -> I2cChip:
-    """The same on a bus that is open already; the chip owns it from now on."""
+    """The same on an open bus, which the chip then owns."""
     if not registry.has_interface(driver, "i2c"):
         bus.close()
         known = ", ".join(registry.names("i2c"))
@@ -73,7 +73,7 @@ def chip_on(
 
 
 def run_by_hand(driver: str, argv: Sequence[str] | None) -> int:
-    """The command line of one chip's driver."""
+    """Run the command line of one chip's driver."""
     parser = argparse.ArgumentParser(prog=f"python -m drivers.imu.{driver}")
     parser.add_argument("--bus", type=int, default=1, help="N of /dev/i2c-N (%(default)s)")
     parser.add_argument("--address", type=_number, default=0, help="0: the chip's usual one")

@@ -1,7 +1,7 @@
-"""What the I2C IMUs have in common: identity, settings that are read back, the die's temperature, starting anew.
+"""What I2C IMUs share: identity, settings with read-back, die temperature, recovery from resets.
 
-A chip's file declares its registers; ``I2cImu`` sets them and looks every ``CHECK_S`` whether they still hold: when
-they do not, the chip has reset itself and is set up again. ``fifo_imu`` and ``bno055`` read samples on top of it.
+A chip's file declares its registers; ``I2cImu`` sets them and checks them every ``CHECK_S``: if they changed, the chip
+has reset itself and is set up again. ``fifo_imu`` and ``bno055`` build on it to read samples.
 """
 
 import math
@@ -27,8 +27,8 @@ from drivers.samples import STANDARD_GRAVITY_MPS2, ImuSample
 
 MAX_COUNT = 32767
 
-CHECK_S = 0.5  # between looks at the settings and the temperature
-PATIENCE = 8  # samples that may stay away before a look at the settings
+CHECK_S = 0.5  # between checks of settings and temperature
+PATIENCE = 8  # missing samples before the settings are checked
 STALL_S = 0.5  # without a sample
 
 Counts = tuple[int, int, int]
@@ -36,36 +36,36 @@ Counts = tuple[int, int, int]
 
 @dataclass(frozen=True, slots=True)
 class Range:
-    """A range that a chip has."""
+    """A measuring range of a chip."""
 
     code: int  # in its register
-    lsb: float  # counts for 1 °/s or 1 g
-    end: int = 0  # the count at its end; 0: where range and word length put it
+    lsb: float  # counts per °/s or g
+    end: int = 0  # the count at full scale; 0: by range and word length
 
     def end_of(self, full_scale: int) -> int:
-        """Return the count from which on an axis is saturated."""
+        """Return the count at which an axis saturates."""
         return self.end or min(int(full_scale * self.lsb), MAX_COUNT)
 
 
 @dataclass(frozen=True, slots=True)
 class Thermometer:
-    """Where the die's temperature is and what it means: ``zero_c + counts / lsb_per_c``."""
+    """Register and scale of the die temperature: ``zero_c + counts / lsb_per_c``."""
 
     register: int
     byte_order: Literal["big", "little"]
     lsb_per_c: float
     zero_c: float  # at a count of 0
     size: int = 2
-    invalid: int | None = None  # what is read while there is none
+    invalid: int | None = None  # the count while there is none
 
     def celsius(self, data: bytes) -> float:
-        """Temperature, °C; NaN: none yet."""
+        """Convert to °C; NaN: none yet."""
         counts = int.from_bytes(data, self.byte_order, signed=True)
         return math.nan if counts == self.invalid else self.zero_c + counts / self.lsb_per_c
 
 
 class Scale:
-    """Counts to SI units; a count at the end of the range that was set is saturated."""
+    """Converts counts to SI units; a count at the end of the set range is saturated."""
 
     def __init__(self, gyro: Range, gyro_range_dps: int, accel: Range, accel_range_g: int) -> None:
         self._gyro_radps = math.radians(1) / gyro.lsb
@@ -74,7 +74,7 @@ class Scale:
         self._accel_end = accel.end_of(accel_range_g)
 
     def sample(self, stamp_ns: int, gyro: Counts, accel: Counts) -> ImuSample:
-        """The counts of one sample in SI units."""
+        """Convert one sample."""
         p, q, r = gyro
         x, y, z = accel
         end, far = self._gyro_end, self._accel_end
@@ -126,11 +126,11 @@ class I2cImu(ABC):
 
     @classmethod
     def recognised(cls, bus: I2cBus, address: int) -> str | None:
-        """The model that is there, by its identity alone; None: no such chip. Writes nothing."""
+        """Return the model at an address by its identity alone; None: no such chip. Writes nothing."""
         return cls.identities.get(bus.read(address, cls.identity_register, 1, tries=2)[0])
 
     def read(self) -> Sequence[ImuSample]:
-        """Samples since the last call, after waiting for some; none when they were lost and counted.
+        """Return the samples since the last call, after waiting for some; none when they were lost and counted.
 
         Raises ``DeviceLostError`` when the bus fails, ``DeviceStalledError`` when no samples come.
         """
@@ -138,7 +138,7 @@ class I2cImu(ABC):
         self._wait()
         samples = self._samples()
         now_ns = self._clock.monotonic_ns()
-        # a late wake-up of ours is not the chip's silence
+        # our own late wake-up does not count as the chip's silence
         self._silence_s = 0.0 if samples else self._silence_s + min((now_ns - begin_ns) / 1e9, STALL_S / 4)
         missing = self._silence_s * self.rate_hz
         if (now_ns >= self._next_check_ns or missing > PATIENCE) and not self._settings_hold():
@@ -149,18 +149,18 @@ class I2cImu(ABC):
         return samples
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self._bus.close()
 
     # What each chip defines.
 
     @abstractmethod
     def _granted_rate_hz(self, rate_hz: float) -> float:
-        """The closest rate that the chip has."""
+        """Return the closest rate that the chip offers."""
 
     @abstractmethod
     def _registers(self, gyro_code: int, accel_code: int) -> Mapping[int, int]:
-        """Registers to set for ``rate_hz`` and the ranges, in this order; they read back as written."""
+        """Return the registers to set for ``rate_hz`` and the ranges, in order; they read back as written."""
 
     @abstractmethod
     def _reset(self) -> None:
@@ -168,7 +168,7 @@ class I2cImu(ABC):
 
     @abstractmethod
     def _begin(self) -> None:
-        """Start sampling; the settings are made."""
+        """Start sampling, after the settings."""
 
     @abstractmethod
     def _wait(self) -> None:
@@ -176,7 +176,7 @@ class I2cImu(ABC):
 
     @abstractmethod
     def _samples(self) -> list[ImuSample]:
-        """Return the samples that are there now, oldest first."""
+        """Return the samples available now, oldest first."""
 
     # What they share.
 
@@ -187,12 +187,12 @@ class I2cImu(ABC):
         self._bus.write(self.address, register, bytes(values), tries)
 
     def _command_reset(self, register: int, command: int) -> None:
-        """Have the chip reset itself, which it may do before it acknowledges: what it was asked is not asked again."""
+        """Have the chip reset itself; it may do so before acknowledging, so the command is not retried."""
         with suppress(TransferError):
             self._write(register, command, tries=1)
 
     def _identify(self, copy: int | None) -> str:
-        """Return the model by the chip's identity. ``copy``: another identity to accept, of a copy of the chip."""
+        """Return the model by the chip's identity. ``copy``: the identity of a copy of the chip, to accept too."""
         try:
             found = self._read(self.identity_register, 1)[0]
         except TransferError as error:
@@ -223,7 +223,7 @@ class I2cImu(ABC):
         return self.identities[found]
 
     def _driver_of(self, identity: int) -> str | None:
-        """The driver of the chip that says this of itself at the same address and register."""
+        """Return the driver of the chip with this identity at the same address and register."""
         for driver, kind in registry.chips().items():
             if not issubclass(kind, I2cImu) or self.address not in kind.addresses:
                 continue
@@ -250,7 +250,7 @@ class I2cImu(ABC):
         return [register for register, value in self._settings.items() if self._read(register, 1)[0] != value]
 
     def _settings_hold(self) -> bool:
-        """Whether the chip still is as it was set up; looks at the temperature too."""
+        """Whether the chip still has its settings; reads the temperature too."""
         self._next_check_ns = self._clock.monotonic_ns() + round(CHECK_S * 1e9)
         if self._not_held():
             return False

@@ -1,9 +1,8 @@
 """IMUs that the kernel owns, through its Industrial I/O subsystem (``/sys/bus/iio``).
 
-Linux, ``Documentation/ABI/testing/sysfs-bus-iio``. With a buffer (and its trigger, where it has one) whole scans come
-from ``/dev/iio:deviceN`` with the kernel's stamps; without, the values are polled. Some drivers show gyro and
-accelerometer as two devices (``lsm6dso_gyro``, ``lsm6dso_accel``; ``icm42688-gyro``, ``icm42688-accel``): these are
-polled together.
+Linux, ``Documentation/ABI/testing/sysfs-bus-iio``. With a buffer (and trigger, if any) whole scans come from
+``/dev/iio:deviceN`` with the kernel's stamps; without, values are polled. Some drivers expose gyro and accelerometer as
+two devices (``lsm6dso_gyro``, ``lsm6dso_accel``; ``icm42688-gyro``, ``icm42688-accel``), which are polled together.
 """
 
 import argparse
@@ -55,7 +54,7 @@ BATCH_S = 0.015
 STALL_S = 0.5
 PATIENT_PERIODS = 10
 TEMPERATURE_NS = 1_000_000_000
-TRIES = 10  # reads that may fail in a row
+TRIES = 10  # consecutive reads that may fail
 
 
 class Iio:
@@ -98,14 +97,14 @@ class Iio:
             raise
 
     def read(self) -> Sequence[ImuSample]:
-        """Samples since the last call, after waiting for some. Raises ``DeviceStalledError``, ``DeviceLostError``."""
+        """Wait for samples and return them. Raises ``DeviceStalledError``, ``DeviceLostError``."""
         if self._clock.monotonic_ns() >= self._look_at_ns:
             self._look_at_ns = self._clock.monotonic_ns() + TEMPERATURE_NS
             self._look_at_temperature()
         return self._source.read()
 
     def close(self) -> None:
-        """Let the device go."""
+        """Close the device."""
         self._source.close()
 
     def _look_at_temperature(self) -> None:
@@ -117,7 +116,7 @@ class Iio:
 
 
 def _take(node: Path, folder: Path) -> int:
-    """Open the character device, which only one program can, and stop what a killed one may have left running."""
+    """Open the character device, which only one program can, and stop a buffer that a killed one left running."""
     try:
         file = os.open(node, os.O_RDONLY | os.O_NONBLOCK | os.O_CLOEXEC)
     except OSError as error:
@@ -136,7 +135,7 @@ def _leave(file: int | None) -> None:
 
 
 class _Scale:
-    """Raw counts of the six channels to a sample."""
+    """Converts raw counts of the six channels to a sample."""
 
     def __init__(self, channels: Mapping[str, Channel]) -> None:
         ordered = [channels[name] for name in (*GYRO, *ACCEL)]
@@ -151,7 +150,7 @@ class _Scale:
 
 
 class _Polled:
-    """Six values read one after the other, at the device's rate."""
+    """Polls the six values one after the other, at the device's rate."""
 
     def __init__(
         self,
@@ -202,7 +201,7 @@ class _Polled:
 
 
 class _Buffer:
-    """Whole scans from the character device."""
+    """Reads whole scans from the character device."""
 
     def __init__(self, folder: Path, file: int, channels: Mapping[str, Channel], rate_hz: float, clock: Clock) -> None:
         self._folder = folder

@@ -33,7 +33,7 @@ SCAN_TYPE = re.compile(  # of Documentation/driver-api/iio/buffers.rst, in which
 
 @dataclass(frozen=True, slots=True)
 class Channel:
-    """How the counts of an axis become SI units: (counts + offset) * scale."""
+    """Scale of an axis to SI units: (counts + offset) * scale."""
 
     scale: float
     offset: float
@@ -59,7 +59,7 @@ def find(device: str, root: Path) -> tuple[Path, Path]:
 
 
 def set_rate(gyro: Path, accel: Path, rate_hz: float) -> float:
-    """Set the closest rate on offer and return the one that holds; sensors may share one."""
+    """Set the closest rate on offer and return the resulting one; sensors may share it."""
     written = []
     for folder, own in ((gyro, "in_anglvel_sampling_frequency"), (accel, "in_accel_sampling_frequency")):
         name = own if (folder / own).exists() else "sampling_frequency"
@@ -87,7 +87,7 @@ def _set_range(folder: Path, kind: str, full_scale: float) -> None:
 
 
 def _choose(attribute: Path, available: Path, target: float) -> None:
-    """Write the closest value on offer, spelled as it is offered; nothing when it holds already."""
+    """Write the closest value on offer, spelled as offered; nothing if it is already set."""
     text = text_of(available)
     try:
         if text.startswith("["):
@@ -102,7 +102,7 @@ def _choose(attribute: Path, available: Path, target: float) -> None:
 
 
 def channel(folder: Path, name: str) -> Channel:
-    """How the counts of a channel are to be taken."""
+    """Return the scale of a channel."""
     kind = name.rpartition("_")[0]
 
     def first(suffix: str, otherwise: float) -> float:
@@ -121,10 +121,10 @@ class Scan:
     """The layout of one scan."""
 
     type: np.dtype[np.void]
-    shifts: dict[str, tuple[int, int]]  # left, then right: brings the bits that count into place, with their sign
+    shifts: dict[str, tuple[int, int]]  # left, then right: extracts the significant bits, sign-extended
 
     def column(self, scans: npt.NDArray[np.void], name: str) -> list[int]:
-        """The counts of a channel."""
+        """Return the counts of a channel."""
         left, right = self.shifts[name]
         counts: list[int] = (scans[name] << left >> right).tolist()
         return counts
@@ -165,12 +165,12 @@ def has(folder: Path, name: str) -> bool:
 
 
 def has_buffer(folder: Path) -> bool:
-    """Whether scans of gyro and accelerometer can be had."""
+    """Whether scans of gyro and accelerometer are available."""
     return (folder / "buffer/enable").exists() and all(has(folder, name) for name in (*GYRO, *ACCEL))
 
 
 def has_trigger(folder: Path, root: Path) -> bool:
-    """Whether scans are triggered; a trigger of the device's own is set where none is."""
+    """Whether scans are triggered; without a trigger, one of the device's own is set."""
     current = folder / "trigger/current_trigger"
     if not current.exists() or text_of(current):
         return True  # a hardware FIFO needs none
@@ -183,7 +183,7 @@ def has_trigger(folder: Path, root: Path) -> bool:
 
 
 def text_of(attribute: Path) -> str:
-    """What an attribute says; nothing when it is not there or cannot say it now."""
+    """Read an attribute as text; empty if it is missing or cannot be read now."""
     try:
         return attribute.read_text(errors="replace").strip()
     except OSError:
@@ -191,7 +191,7 @@ def text_of(attribute: Path) -> str:
 
 
 def number_of(attribute: Path) -> float:
-    """What an attribute says. Raises ``DriverError``."""
+    """Read an attribute as a number. Raises ``DriverError``."""
     try:
         return float(attribute.read_text(errors="replace"))
     except OSError as error:
@@ -211,7 +211,7 @@ def write_to(attribute: Path, text: str) -> None:
 
 
 def driver_error(error: OSError, path: Path) -> DriverError:
-    """The typed error for what the kernel said."""
+    """Return the typed error for the kernel's."""
     if error.errno in (errno.EACCES, errno.EPERM):
         return DeviceForbiddenError(
             f"{path}: no permission; install the udev rule that gives IIO to the daemon's group"

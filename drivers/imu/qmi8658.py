@@ -51,7 +51,7 @@ START_UP_S = 0.17  # of the gyro 150 ms, then three samples
 
 DATA = struct.Struct("<B2xHB2x3h3h")
 NUMBERS = 2**24
-POLL = 0.97  # of a period: every sample is seen, at ever other moments after it was made
+POLL = 0.97  # of a period: every sample is seen, at varying delays
 
 ODR_HZ = {28.025: 8, 56.05: 7, 112.1: 6, 224.2: 5, 448.4: 4, 896.8: 3}  # with both sensors on
 # What is called 512 °/s is asked for as 500, and so on.
@@ -67,7 +67,7 @@ IDENTITIES = {0x05: "QMI8658"}
 
 
 class Qmi8658(I2cImu):
-    """QMI8658; see ``I2cImu``. ``counts["lost"]``: samples that nobody read in time."""
+    """QMI8658; see ``I2cImu``. ``counts["lost"]``: samples not read in time."""
 
     chip = "QMI8658"
     addresses = (0x6B, 0x6A)
@@ -114,7 +114,7 @@ class Qmi8658(I2cImu):
         self._number: int | None = None  # of the newest sample
 
     def _command(self, command: int) -> None:
-        """Have CTRL9 do something, and wait for its end. Raises ``DeviceLostError``."""
+        """Execute a CTRL9 command and wait for its end. Raises ``DeviceLostError``."""
         for value, done in ((command, DONE), (ACKNOWLEDGE, 0)):
             self._write(CTRL9, value)
             for _ in range(COMMAND_LOOKS):

@@ -1,7 +1,7 @@
-"""Every IMU driver: the one list that configuration, ``lcf-edge doctor``, documents and tests read.
+"""All IMU drivers: the one list that configuration, ``lcf-edge doctor``, documents and tests read.
 
-A new IMU is a module here, one row below, a model in ``hil_mocks`` and a row in ``docs/imus.md``. Nothing is imported
-before it is asked for, so that a vehicle with one chip does not load the drivers of the others.
+A new IMU is a module here, one row below, a model in ``hil_mocks`` and a row in ``docs/imus.md``. Modules are imported
+only when needed, so that a vehicle with one chip does not load the drivers of the others.
 """
 
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ Interface: TypeAlias = Literal["i2c", "serial", "iio"]
 
 @dataclass(frozen=True, slots=True)
 class ImuDriver:
-    """Where a driver is. ``name``: what ``imu.driver`` calls it."""
+    """Location of a driver. ``name``: its value of ``imu.driver``."""
 
     name: str
     interface: Interface

@@ -1,4 +1,4 @@
-"""What the parsers of serial protocols share: cutting a stream of bytes into frames, and what they find."""
+"""What the parsers of serial protocols share: splitting a byte stream into frames, and the readings in them."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator
@@ -17,13 +17,13 @@ class Reading:
     saturated: bool = False
     lost: int = 0  # samples known to be missing before this one
     ticks: int | None = None  # of the device's own clock, where the protocol has it
-    spans: int = 0  # periods that the values are the mean of, up to now; 0: they are of now
+    spans: int = 0  # periods up to now over which the values are averaged; 0: instantaneous
 
 
 class Parser(Protocol):
-    """Bytes in, readings out, the same however the bytes are split; knows no port and no time.
+    """Bytes in, readings out, however the bytes are split; independent of port and time.
 
-    ``counts``: what was refused, by reason. ``frames``: how many were well formed, also those that gave no reading.
+    ``counts``: refused data by reason. ``frames``: number of well-formed frames, including those without a reading.
     Memory is bounded.
     """
 
@@ -44,14 +44,14 @@ class Talker(Parser, Protocol):
     """A parser whose IMU must be configured to send."""
 
     def to_say(self, rate_hz: float, now_ns: int) -> list[bytes]:
-        """What to send to the IMU now, asking for samples at this rate."""
+        """Return what to send to the IMU now, to request samples at this rate."""
         ...
 
 
 class Framer:
-    """Cuts frames out of a stream, and finds the next one after damage by looking for ``header`` byte by byte.
+    """Splits a stream into frames, and resynchronises after damage by searching for ``header`` byte by byte.
 
-    ``length`` gives the length of a frame from its first bytes: 0 when more are needed, -1 when no frame begins so.
+    ``length`` returns the length of a frame from its first bytes: 0 when more are needed, -1 when they begin no frame.
     ``is_whole`` checks it. Counts ``skipped_bytes`` and ``bad_frame``; ``frames`` are the good ones.
     """
 
@@ -71,11 +71,11 @@ class Framer:
 
     @property
     def held_bytes(self) -> int:
-        """What is kept of a frame whose end has not come yet."""
+        """Bytes kept of an incomplete frame."""
         return len(self._buffer)
 
     def feed(self, data: bytes) -> Iterator[bytes]:
-        """The frames that ``data`` completes."""
+        """Yield the frames that ``data`` completes."""
         stream = bytes(self._buffer) + data
         start = 0
         while (begin := self._find(stream, start)) < len(stream):
@@ -103,7 +103,7 @@ class Framer:
             self._counts["skipped_bytes"] += count
 
     def _find(self, stream: bytes, start: int) -> int:
-        """Where the next header begins, or could begin at the very end of what has come."""
+        """Return where the next header begins, or may begin at the end of the data so far."""
         begin = stream.find(self._header, start)
         if begin >= 0:
             return begin

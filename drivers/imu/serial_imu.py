@@ -1,4 +1,4 @@
-"""An IMU at a serial port that sends by itself: the port, a parser, and the times of its samples put together."""
+"""A free-running IMU at a serial port: port, parser and sample clock together."""
 
 import argparse
 from collections import Counter
@@ -17,31 +17,31 @@ from drivers.imu.settings import ImuSettings
 from drivers.sample_clock import SampleClock
 from drivers.samples import ImuSample
 
-FIRST_BYTE_S = 4.0  # many boards start anew when their port is opened
+FIRST_BYTE_S = 4.0  # many boards reset when their port is opened
 STALLED_S = 1.0
-MAX_NOISE_BYTES = 4096  # without a reading among them: another baud rate, or another device
+MAX_NOISE_BYTES = 4096  # without a reading: another baud rate, or another device
 FRAMES_BY_CHANCE = 3  # that noise can imitate
-TICKS = 2**32  # counters of most devices begin anew after so many
-MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it was started anew
-MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, by USB, whatever baud rate is set
-MAX_LINE_SHARE = 1.25 / 10  # bytes a second for each baud, of lines that are faster
+TICKS = 2**32  # after which the counters of most devices wrap
+MAX_PAUSE_S = 1.0  # of the device's own clock; more means that it restarted
+MAX_BYTES_PER_S = 200_000  # 2000 lines of 100 bytes, over USB at any baud rate
+MAX_LINE_SHARE = 1.25 / 10  # bytes per second and baud, of faster lines
 MAX_SAMPLES_PER_S = 2500  # the fastest IMUs send 2000
 MAX_READS_PER_S = 1000  # then several pieces are read at once
-EXCESS_PAUSE_S = 0.01  # meanwhile the kernel holds what comes, 4096 bytes and more
+EXCESS_PAUSE_S = 0.01  # meanwhile the kernel buffers 4096 bytes or more
 
 
 @dataclass(frozen=True, slots=True)
 class SerialProtocol:
-    """How a family of IMUs speaks. ``bauds``: those in use, the default first."""
+    """The protocol of a family of IMUs. ``bauds``: those in use, the default first."""
 
     name: str
     bauds: tuple[int, ...]
     parser: Callable[[], Parser]
     needs: str  # what must be switched on in the IMU, for the user
-    rate_hz: float | None = None  # where it is always the same
-    tick_hz: float | None = None  # of the device's own clock, where readings can have its time
-    wraps: tuple[int, ...] = (TICKS,)  # after how many ticks it goes on from 0, by series
-    byte_pause_s: float = 0.0  # that the IMU wants between the bytes that it is sent
+    rate_hz: float | None = None  # where it is fixed
+    tick_hz: float | None = None  # of the device's own clock, where readings may carry its time
+    wraps: tuple[int, ...] = (TICKS,)  # ticks after which that wraps to 0, by series
+    byte_pause_s: float = 0.0  # that the IMU needs between the bytes sent to it
 
 
 class SerialImu:
@@ -107,7 +107,7 @@ class SerialImu:
         self._port.close()
 
     def _slowed(self, data: bytes, now_ns: int) -> bytes:
-        """What is within the allowance; pauses where there was more, so that the pipeline gets its turn."""
+        """Return the data within the allowance; pause where there was more, so that the pipeline gets its turn."""
         within = self._bytes.take(len(data), now_ns)
         if within < len(data):
             self.counts["excess_bytes"] += len(data) - within
@@ -118,7 +118,7 @@ class SerialImu:
         return data[:within]
 
     def _newest(self, readings: Sequence[Reading], now_ns: int) -> list[Reading]:
-        """As many as are within the allowance; the first of them says how many were skipped."""
+        """Return as many readings as the allowance permits; the first of them counts those skipped."""
         within = self._samples.take(len(readings), now_ns)
         excess, kept = readings[: len(readings) - within], list(readings[len(readings) - within :])
         if excess:
@@ -156,7 +156,7 @@ class SerialImu:
     def _stamps_ns(self, now_ns: int, readings: Sequence[Reading]) -> list[int]:
         if not readings:
             return []
-        if self._stamps is None:  # the first reading says whether the device sends its own time
+        if self._stamps is None:  # the first reading shows whether the device sends its own time
             self._unit_hz = (self._protocol.tick_hz if readings[0].ticks is not None else None) or self._rate_hz
             self._stamps = SampleClock(self._unit_hz)
         steps = [self._step(reading) for reading in readings]
@@ -167,7 +167,7 @@ class SerialImu:
         return self._stamps.stamps_of_steps_ns(now_ns, [step or step_by_rate for step in steps])
 
     def _step(self, reading: Reading) -> int:
-        """Return units of the clock since the reading before; 0: unknown, the device's clock began anew."""
+        """Return clock units since the last reading; 0: unknown, as the device's clock restarted."""
         if self._unit_hz != self._protocol.tick_hz or reading.ticks is None:
             return round((reading.lost + 1) * self._unit_hz / self._rate_hz)
         before, self._ticks = self._ticks, reading.ticks
@@ -190,14 +190,14 @@ def open_port(
 ) -> Device[ImuSample]:
     """Open the IMU at a serial port.
 
-    ``driver``: a serial one of the registry. ``baud``: 0 for the protocol's usual one. ``settings``: only the rate
-    counts, as the one to start from; serial IMUs send as they were set up. Raises what ``SerialImu`` raises.
+    ``driver``: a serial one of the registry. ``baud``: 0 for the protocol's default. ``settings``: only the rate is
+    used, as the initial estimate; serial IMUs send as they were set up. Raises what ``SerialImu`` raises.
     """
     return SerialImu(registry.DRIVERS[driver].load(), port, baud, settings.rate_hz, clock)
 
 
 def run_by_hand(protocol: SerialProtocol, argv: Sequence[str] | None) -> int:
-    """The command line of a protocol: open a port, print what comes."""
+    """Run the command line of a protocol: open a port, print its samples."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--port", default="/dev/ttyUSB0")
     parser.add_argument("--baud", type=int, default=0, help=f"0: {protocol.bauds[0]}")

@@ -1,4 +1,4 @@
-"""A serial port that is opened for one reader, read in bounded time, and says in one line what is wrong with it."""
+"""A serial port with exclusive access, bounded reads and one-line errors."""
 
 import errno
 import os
@@ -32,11 +32,11 @@ _FORBIDDEN = {
 
 
 class SerialPort:
-    """An open port: 8 data bits, no parity, 1 stop bit. What was received before it was opened is thrown away.
+    """An open port: 8 data bits, no parity, 1 stop bit. Data received before opening is discarded.
 
-    ``path``: as /dev/ttyUSB0, or better /dev/serial/by-id/..., which is the same after a replug. Raises
+    ``path``: such as /dev/ttyUSB0, or better /dev/serial/by-id/..., which survives a replug. Raises
     ``DeviceMissingError``, ``DeviceForbiddenError``, ``DeviceBusyError``, ``WrongDeviceError`` (no serial port) or
-    ``UnsupportedSettingError`` (a baud rate that the port cannot do).
+    ``UnsupportedSettingError`` (unsupported baud rate).
     """
 
     def __init__(self, path: str, baud: int) -> None:
@@ -48,8 +48,8 @@ class SerialPort:
             raise _explained(error, path, baud) from error
 
     def read(self) -> bytes:
-        """What has come, or what comes first; nothing after ``READ_S``. Raises ``DeviceLostError``."""
-        try:  # one look and one read, where the library's own read takes several
+        """Return the data received, after waiting up to ``READ_S`` for some. Raises ``DeviceLostError``."""
+        try:  # two system calls, where the library's own read takes several
             come, _, _ = select.select([self._serial], [], [], READ_S)
             data = os.read(self._serial.fileno(), MAX_READ_BYTES) if come else b""
         except OSError as error:
@@ -71,13 +71,13 @@ class SerialPort:
         return DeviceLostError(f"{self.path}: the serial port went away; plug the IMU in again")
 
     def close(self) -> None:
-        """Let it go."""
+        """Close the port."""
         with suppress(OSError, termios.error):
             self._serial.close()
 
 
 def ports(devices: Path = Path("/dev")) -> list[str]:
-    """The serial ports that are there, those with a lasting name first."""
+    """List the serial ports, those with persistent names first."""
     return [str(path) for pattern in PORT_PATTERNS for path in sorted(devices.glob(pattern))]
 
 

@@ -1,9 +1,9 @@
-"""What a BNO08x sends and receives, over any wire: SHTP packets with the SH-2 messages in them.
+"""The protocol of a BNO08x, over any transport: SHTP packets with SH-2 messages.
 
 CEVA "Sensor Hub Transport Protocol" (1000-3535), "SH-2 Reference Manual" (1000-3625) and "BNO08X Data Sheet"
 (1000-3927); Adafruit's CircuitPython driver agrees. A packet is its length with these four bytes (little-endian, the
-top bit: a continuation), channel, number, cargo. The hub sends nothing until it is asked for a sensor, and forgets that
-when it resets itself; it says so then. Accelerometer and gyro come as reports of their own, numbered each.
+top bit: a continuation), channel, number, cargo. The hub sends nothing until a sensor is enabled, which it forgets when
+it resets itself, and then announces that. Accelerometer and gyro send separate reports, each with its own numbers.
 """
 
 import struct
@@ -35,10 +35,10 @@ PATIENCE_NS = 700_000_000  # without a sample; then it is asked once more
 
 
 class Hub:
-    """One conversation: packets in, readings out, and what to say next. Knows no wire and no clock.
+    """The state of one connection: packets in, readings and replies out. Independent of transport and clock.
 
-    Counts ``implausible`` reports, those ``lost``, ``chip_reset`` by itself. ``rate_hz``: as the hub grants it, once it
-    said so.
+    Counts ``implausible`` reports, ``lost`` ones, and each ``chip_reset``. ``rate_hz``: as granted by the hub, once
+    known.
     """
 
     def __init__(self, rate_hz: float, counts: Counter[str]) -> None:
@@ -52,7 +52,7 @@ class Hub:
         self._ask_at_ns: int | None = None  # at once
 
     def take(self, packet: bytes) -> list[Reading]:
-        """A whole packet of the hub's."""
+        """Take a whole packet from the hub."""
         self.packets += 1
         _, channel, _ = HEADER.unpack_from(packet)
         cargo = packet[HEADER.size :]
@@ -67,7 +67,7 @@ class Hub:
         return []
 
     def to_say(self, now_ns: int, *, heard: bool) -> list[bytes]:
-        """Packets to send now. ``heard``: there was a sample since the last call."""
+        """Return the packets to send now. ``heard``: there was a sample since the last call."""
         if heard and self._ask_at_ns is not None:
             self._ask_at_ns = now_ns + PATIENCE_NS
         if self._ask_at_ns is not None and now_ns < self._ask_at_ns:
@@ -108,7 +108,7 @@ class Hub:
 
 
 def is_plausible(header: bytes) -> bool:
-    """Whether a packet can begin so."""
+    """Whether a packet can begin with this header."""
     length: int
     channel: int
     length, channel, _ = HEADER.unpack_from(header)
