@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, lengths, path
+from lcf_edge.filter cimport edge_equations, lengths, path, situation
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.patches cimport Patches
@@ -38,7 +38,6 @@ cdef class PatchGroups:
 
 cdef bint stands(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
 cdef bint is_obstacle(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
-cdef double ground_inverse(double y, Situation around) noexcept nogil
 cdef bint is_upright(Patches patches, Py_ssize_t p, Situation around) noexcept nogil
 cdef bint is_in_way(PatchGroups groups, Py_ssize_t g, Patches patches, bint is_known, Situation around) noexcept nogil
 cdef bint agree(Patches patches, Py_ssize_t p, Py_ssize_t q) noexcept nogil

@@ -7,7 +7,7 @@ updated is left to them.
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, lengths, path
+from lcf_edge.filter import edge_equations, lengths, path, situation
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import Bytes, octets
@@ -79,15 +79,10 @@ def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
     above_m = up_m + around.camera_height_m
     if not (1 - LOWEST_SHARE) * around.camera_height_m < above_m < around.height_m:
         return False
-    ground = ground_inverse(patches.y[p] + 0.5 * half, around)
+    ground = situation.ground_inverse(around, patches.y[p] + 0.5 * half)
     return inverse > (1 + GROUND_MARGIN) * ground + doubt or (
-        inverse > ground_inverse(patches.y[p], around) and is_upright(patches, p, around)
+        inverse > situation.ground_inverse(around, patches.y[p]) and is_upright(patches, p, around)
     )
-
-
-def ground_inverse(y: float, around: Situation) -> float:
-    """1/Z of the ground at an image row, 1/m; 0 above the horizon."""
-    return max(y - around.horizon_y, 0.0) / around.pinhole.fy / around.camera_height_m
 
 
 def is_upright(patches: Patches, p: int, around: Situation) -> bool:

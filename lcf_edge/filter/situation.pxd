@@ -13,3 +13,4 @@ cdef class Situation:
 
 cpdef void follow(Situation around, double ray_x, double ray_y, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil
 cpdef double ground_range_m(Situation around, double y) noexcept nogil
+cpdef double ground_inverse(Situation around, double y) noexcept nogil

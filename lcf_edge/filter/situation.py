@@ -58,3 +58,11 @@ def ground_range_m(around: Situation, y: float) -> float:
     if below > focal * around.pitch_sigma_rad and around.camera_height_m > 0:
         return around.camera_height_m * focal / max(below, 1.0)
     return NAN
+
+
+def ground_inverse(around: Situation, y: float) -> float:
+    """1/Z of the ground at image row ``y``, 1/m, from a known height; 0 at the horizon and above it.
+
+    To compare another 1/Z with, near the horizon too, where ``ground_range_m`` gives no range for want of certainty.
+    """
+    return max(y - around.horizon_y, 0.0) / around.pinhole.fy / around.camera_height_m

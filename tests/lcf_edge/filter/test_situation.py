@@ -12,7 +12,7 @@ from lcf_edge.config import Camera, Config
 from lcf_edge.filter import Motion
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.heading import Heading, turn_heading
-from lcf_edge.filter.situation import Situation, follow, ground_range_m
+from lcf_edge.filter.situation import Situation, follow, ground_inverse, ground_range_m
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 
@@ -83,3 +83,16 @@ def test_no_ground_is_seen_at_the_horizon_or_from_an_unknown_height(situation: C
     for row in (0, 239, 240, 241):
         assert math.isnan(ground_range_m(known, row))
         assert math.isnan(ground_range_m(unknown, row + 200))
+
+
+@pytest.mark.parametrize("range_m", [0.6, 2.0, 8.0])
+def test_the_inverse_range_of_the_ground_is_that_of_its_range(range_m: float, situation: Callable[..., Any]) -> None:
+    around = situation(camera_height_m=0.3)
+    row = around.horizon_y + 500 * 0.3 / range_m
+    assert ground_inverse(around, row) == pytest.approx(1 / ground_range_m(around, row), rel=1e-12)
+
+
+def test_the_inverse_range_of_the_ground_falls_to_0_at_the_horizon(situation: Callable[..., Any]) -> None:
+    around = situation(camera_height_m=0.3)
+    rows = [around.horizon_y + below for below in (4, 1, 0.25, 0, -100)]
+    assert [ground_inverse(around, row) for row in rows] == pytest.approx([4 / 150, 1 / 150, 1 / 600, 0, 0])
