@@ -37,4 +37,4 @@ cdef int weakest_row(CircleColumns circles, Settings settings) noexcept nogil
 cdef void release(EdgeColumns edges, CircleColumns circles, bint rebel) noexcept nogil
 cdef int make_room(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil
 @cython.locals(c=int)
-cdef int row_for_newborn(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil
+cpdef int row_for_newborn(EdgeColumns edges, CircleColumns circles, bint rebel, Settings settings) noexcept nogil

@@ -153,6 +153,12 @@ def make_room(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings:
 
 
 def row_for_newborn(edges: EdgeColumns, circles: CircleColumns, rebel: bool, settings: Settings) -> int:
-    """A row for a new circle, free or evicted; -1: there is none. ``rebel``: of C_r, else of C_n."""
+    """A row for a new circle, free or evicted; -1: there is none. ``rebel``: of C_r, else of C_n.
+
+    In a full table this counts as an eviction: of the circle whose row it was, or else of the new one.
+    """
     c = free_row(circles)
-    return c if c >= 0 else make_room(edges, circles, rebel, settings)
+    if c < 0:
+        circles.evicted += 1
+        c = make_room(edges, circles, rebel, settings)
+    return c

@@ -32,5 +32,5 @@ cdef void join(CoarseGroups groups, CoarseMotion coarse) noexcept nogil
 cdef void gather(CoarseGroups groups, Members members, CoarseMotion coarse, double dt_s) noexcept nogil
 @cython.locals(k=int)
 cdef void set_cause(CoarseGroups groups, CoarseMotion coarse, int g, CircleColumns circles, int c, Situation around) noexcept nogil
-@cython.locals(evicted=int, g=int, c=int, in_the_air=bint, enough=bint)
-cdef int update(CoarseGroups groups, CoarseMotion coarse, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(g=int, c=int, in_the_air=bint, enough=bint)
+cdef void update(CoarseGroups groups, CoarseMotion coarse, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -121,14 +121,13 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
-    """Update C_r from groups that reach below the horizon: what moves stands on the ground. Return evictions.
+) -> None:
+    """Update C_r from groups that reach below the horizon: what moves stands on the ground.
 
     ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
     """
-    evicted = 0
     if not begin(groups, coarse):
-        return evicted
+        return
     join(groups, coarse)
     gather(groups, groups.members, coarse, around.dt_s)
     for g in range(coarse.columns * coarse.rows):
@@ -138,7 +137,6 @@ def update(
             continue
         c = shared.nearest_circle(groups.members, g, circles, settings)
         if c < 0:
-            evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)
             if c < 0:
                 continue
@@ -150,4 +148,3 @@ def update(
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
         updated[c] = 1
         set_cause(groups, coarse, g, circles, c, around)
-    return evicted

@@ -24,6 +24,7 @@ cdef class EdgeColumns:
 @cython.final
 cdef class CircleColumns:
     cdef public Py_ssize_t capacity
+    cdef public int evicted
     cdef unsigned char[::1] active, cause
     cdef unsigned int[::1] id
     cdef int[::1] support

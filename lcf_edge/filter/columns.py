@@ -50,10 +50,11 @@ class EdgeColumns:
 
 
 class CircleColumns:
-    """Of a ``CircleTable``."""
+    """Of a ``CircleTable``. ``evicted``: circles, old or new, that did not fit since it was set to 0."""
 
     def __init__(self, memory: Memory) -> None:
         self.capacity = len(memory["x"])
+        self.evicted = 0
         self.active, self.id, self.support, self.cause = (
             memory["active"],
             memory["id"],

@@ -458,9 +458,10 @@ class LineCircleFilter:
         """Update circles, objects and ψ; return evictions."""
         edges, normal, rebel, psi = self.edges.columns, self.normal.columns, self.rebel.columns, self.psi.columns
         candidates, around, settings = self._candidates, self._around, self._settings
+        normal.evicted = rebel.evicted = 0
         feedback.mark_ignored(candidates, psi)
-        evicted = normal_circles.update(self._flowing, edges, normal, candidates.ignored, around, settings, self._ids)
-        evicted += rebel_circles.update(
+        normal_circles.update(self._flowing, edges, normal, candidates.ignored, around, settings, self._ids)
+        rebel_circles.update(
             self._rebel_groups,
             edges,
             rebel,
@@ -477,7 +478,7 @@ class LineCircleFilter:
             settings,
             self._ids,
         )
-        evicted += square_expert.update(
+        evicted = square_expert.update(
             self._squares,
             self.objects.columns,
             rebel,
@@ -492,10 +493,10 @@ class LineCircleFilter:
             settings,
             self._object_ids,
         )
-        evicted += object_circles.update(self.objects.columns, rebel, edges, self._plane, around, settings, self._ids)
+        object_circles.update(self.objects.columns, rebel, edges, self._plane, around, settings, self._ids)
         evicted += feedback.write(psi, normal, edges, candidates, self._keys, around, settings, self._psi_ids)
         feedback.give_way(psi, candidates, edges, rebel, self._plane, settings.psi_margin_px)
-        return int(evicted)
+        return int(evicted + normal.evicted + rebel.evicted)
 
     def _sizes(self, corners: int, omitted: int, evicted: int) -> Sizes:
         n = self.edges.count

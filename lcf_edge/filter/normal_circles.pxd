@@ -46,8 +46,7 @@ cdef int cell_of(double x, double y, double expansion, Situation around, double 
 cdef void sort_left(Flowing flowing, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef int largest_cell(Flowing flowing, int support) noexcept nogil
 cdef void average_cell(Flowing flowing, int cell, Members members, EdgeColumns edges, Py_ssize_t c) noexcept nogil
-@cython.locals(evicted=int)
-cdef int found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
-cpdef int update(Flowing flowing, EdgeColumns edges, CircleColumns circles, unsigned char[::1] ignored, Situation around, Settings settings, Ids ids) noexcept nogil
+cdef void found(Flowing flowing, EdgeColumns edges, CircleColumns circles, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef void update(Flowing flowing, EdgeColumns edges, CircleColumns circles, unsigned char[::1] ignored, Situation around, Settings settings, Ids ids) noexcept nogil
 @cython.locals(edges=int)
 cpdef double mean_expansion(CircleColumns circles) noexcept nogil

@@ -294,16 +294,11 @@ def average_cell(flowing: Flowing, cell: int, members: Members, edges: EdgeColum
 
 def found(
     flowing: Flowing, edges: EdgeColumns, circles: CircleColumns, around: Situation, settings: Settings, ids: Ids
-) -> int:
-    """Found circles from the remaining edges, those of one cell together, the largest groups first.
-
-    Return how many circles, old or new, did not fit.
-    """
-    evicted = 0
+) -> None:
+    """Found circles from the remaining edges, those of one cell together, the largest groups first."""
     sort_left(flowing, edges, around, settings)
     cell = largest_cell(flowing, settings.circle_support)
     while cell >= 0:
-        evicted += shared.free_row(circles) < 0
         c = shared.row_for_newborn(edges, circles, False, settings)
         if c >= 0:
             average_cell(flowing, cell, flowing.members, edges, c)
@@ -314,7 +309,6 @@ def found(
     for j in range(flowing.count):
         if flowing.cell[j] >= 0:
             flowing.cell_size[flowing.cell[j]] = 0
-    return evicted
 
 
 def update(
@@ -325,8 +319,8 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
-    """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve); return evictions.
+) -> None:
+    """C_n from E_n (eqs. EdgeEncompare, EdgeCirclenormalcompare, percentinvolve).
 
     ``ignored``: (capacity,), circles under an active ψ, which are predicted only.
     """
@@ -339,9 +333,8 @@ def update(
         if circles.trust[c] < settings.tr_cr:
             circles.active[c] = 0
     shared.release(edges, circles, False)
-    evicted = found(flowing, edges, circles, around, settings, ids)
+    found(flowing, edges, circles, around, settings, ids)
     direct(circles, around)
-    return evicted
 
 
 def mean_expansion(circles: CircleColumns) -> float:

@@ -35,5 +35,5 @@ cdef void show(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ss
 cdef bint has_left(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 @cython.locals(ended=int, o=int)
 cdef void end_outside(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(evicted=int, o=Py_ssize_t, c=int, is_due=bint)
-cpdef int update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(o=Py_ssize_t, c=int, is_due=bint)
+cpdef void update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -122,13 +122,10 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
+) -> None:
     """C_r from S: an object that is seen, and more likely met than not, keeps a circle even if its edges hardly break
     the flow.
-
-    Return evictions.
     """
-    evicted = 0
     correct(objects, circles, settings)
     end_outside(objects, circles, edges, plane, around)
     for o in range(objects.capacity):
@@ -137,11 +134,9 @@ def update(
             continue
         c = own_circle(circles, o)
         if c < 0:
-            evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)
             if c < 0:
                 continue
             shared.begin(circles, c, ids)
             circles.square[c] = o
         show(objects, o, circles, c, around, settings)
-    return evicted

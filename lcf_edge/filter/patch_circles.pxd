@@ -49,5 +49,5 @@ cdef void claim(PatchGroups groups, Py_ssize_t p, Patches patches, int circle) n
 cdef int circle_of(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint continues(PatchGroups groups, CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void set_cause(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
-@cython.locals(seen=bint, is_shown=bint, is_known=bint, evicted=int, c=int)
-cdef int update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(seen=bint, is_shown=bint, is_known=bint, c=int)
+cdef void update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -225,14 +225,13 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
-    """Update C_r from the obstacles that patches show; return evictions.
+) -> None:
+    """Update C_r from the obstacles that patches show.
 
     ``updated``: circles that rebels have updated; those updated here are marked too.
     """
-    evicted = 0
     if not around.speed_mps > 0:
-        return evicted
+        return
     for p in range(patches.capacity):
         seen = patches.active[p] and not patches.misses[p] and patches.elapsed_s[p] >= MIN_ELAPSED_S
         groups.obstacle[p] = 1 if seen and is_obstacle(patches, p, around) else 0
@@ -249,7 +248,6 @@ def update(
             continue
         is_shown = c >= 0 and updated[c] != 0  # updated by rebels, and left to them
         if c < 0:
-            evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)
             if c >= 0:
                 shared.give_birth(circles, c, groups.members, p, settings, ids)
@@ -260,4 +258,3 @@ def update(
         if c >= 0 and not is_shown:
             updated[c] = 1
             set_cause(groups, p, circles, c, around, settings)
-    return evicted

@@ -113,8 +113,7 @@ cdef bint is_aligned(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Py
 cpdef double bounded(double size_px, double shown_px) noexcept nogil
 cdef void meet(RebelGroups groups, Py_ssize_t g, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef int largest_new(RebelGroups groups) noexcept nogil
-@cython.locals(evicted=int)
-cdef int found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
+cdef void found(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Settings settings, Ids ids) noexcept nogil
 cpdef double own_expansion(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cdef double expansion_of(RebelGroups groups, Py_ssize_t g, bint stands, double range_m, Situation around) noexcept nogil
 @cython.locals(stands=bint)
@@ -126,4 +125,4 @@ cdef int cause_of(RebelGroups groups, Py_ssize_t g, CircleColumns circles, bint 
 cdef bint is_hidden(CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
 @cython.locals(near=bint, waits=bint)
 cdef void lose_trust(RebelGroups groups, CircleColumns circles, Situation around, Settings settings) noexcept nogil
-cpdef int update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Turmoil disorder, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef void update(RebelGroups groups, EdgeColumns edges, CircleColumns circles, Verdicts verdicts, int[::1] breaking, Py_ssize_t rebels, Patches patches, PatchGroups patch_groups, Turmoil disorder, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around, Settings settings, Ids ids) noexcept nogil

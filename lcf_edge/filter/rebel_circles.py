@@ -624,12 +624,10 @@ def largest_new(groups: RebelGroups) -> int:
     return largest
 
 
-def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, settings: Settings, ids: Ids) -> int:
-    """Found circles for the groups without one, largest first; return how many, old or new, did not fit."""
-    evicted = 0
+def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, settings: Settings, ids: Ids) -> None:
+    """Found circles for the groups without one, largest first."""
     g = largest_new(groups)
     while g >= 0:
-        evicted += shared.free_row(circles) < 0
         c = shared.row_for_newborn(edges, circles, True, settings)
         if c >= 0:
             shared.give_birth(circles, c, groups.members, g, settings, ids)
@@ -640,7 +638,6 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
         else:
             groups.odd[g] = 1
         g = largest_new(groups)
-    return evicted
 
 
 # Contact
@@ -765,10 +762,10 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
+) -> None:
     """C_r from E_r (eqs. EdgeErcompareER, EdgeCirclerebelcompareER, percentinvolve), patches, coarse motion, turmoil.
 
-    Return evictions. The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
+    The rebels are the first ``rebels`` rows of ``breaking``, see ``alpha.gather_rebels``.
     """
     for c in range(circles.capacity):
         groups.updated[c] = 0
@@ -783,7 +780,7 @@ def update(
     for g in range(groups.groups):
         if groups.circle[g] >= 0:
             meet(groups, g, circles, around, settings)
-    evicted = found(groups, edges, circles, settings, ids)
+    found(groups, edges, circles, settings, ids)
     for g in range(groups.groups):
         c = groups.circle[g]
         if c >= 0:
@@ -793,9 +790,8 @@ def update(
     for k in range(groups.count):
         if groups.group[k] >= 0:
             edges.circle[verdicts.row[groups.verdict[k]]] = groups.circle[groups.group[k]]
-    evicted += patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
-    evicted += coarse_circles.update(coarse_groups, coarse, edges, circles, groups.updated, around, settings, ids)
-    evicted += turmoil.update(disorder, edges, circles, groups.updated, coarse, around, settings, ids)
+    patch_circles.update(patch_groups, patches, edges, circles, groups.updated, around, settings, ids)
+    coarse_circles.update(coarse_groups, coarse, edges, circles, groups.updated, around, settings, ids)
+    turmoil.update(disorder, edges, circles, groups.updated, coarse, around, settings, ids)
     lose_trust(groups, circles, around, settings)
     shared.release(edges, circles, True)
-    return evicted

@@ -73,5 +73,5 @@ cdef bint is_shown_by(CircleColumns circles, Py_ssize_t c) noexcept nogil
 cdef void set_cause(CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(k=int, found=double, lost=double)
 cdef bint rages_on(Turmoil turmoil, CircleColumns circles, Py_ssize_t c) noexcept nogil
-@cython.locals(evicted=int, c=int, seen=bint)
-cdef int update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, CoarseMotion coarse, Situation around, Settings settings, Ids ids) noexcept nogil
+@cython.locals(c=int, seen=bint)
+cdef void update(Turmoil turmoil, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, CoarseMotion coarse, Situation around, Settings settings, Ids ids) noexcept nogil

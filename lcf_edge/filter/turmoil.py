@@ -337,19 +337,18 @@ def update(
     around: Situation,
     settings: Settings,
     ids: Ids,
-) -> int:
-    """Update C_r from regions in turmoil; return evictions.
+) -> None:
+    """Update C_r from regions in turmoil.
 
     ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
     """
-    evicted = 0
     seen = see(turmoil, around, settings)
     for c in range(circles.capacity):
         if is_shown_by(circles, c) and not updated[c]:
             updated[c] = rages_on(turmoil, circles, c)
     count_pieces(turmoil, coarse)
     if not seen:
-        return evicted
+        return
     join_cells(turmoil)
     gather(turmoil)
     for g in range(turmoil.across * turmoil.down):
@@ -359,7 +358,6 @@ def update(
         if c < 0 and not looks_changed(turmoil, g):
             continue
         if c < 0:
-            evicted += shared.free_row(circles) < 0
             c = shared.row_for_newborn(edges, circles, True, settings)
             if c < 0:
                 continue
@@ -372,4 +370,3 @@ def update(
         updated[c] = 1
         if is_shown_by(circles, c):
             set_cause(circles, c, around)
-    return evicted

@@ -46,7 +46,6 @@ class Scene:
         self.circles = CircleTable(capacity)
         self.flowing, self.ids = Flowing(210, capacity), Ids()
         self.settings = Settings(Filter(**settings), around.pinhole)
-        self.evicted = 0
 
     def add(self, places: Places, expansion: float = 0.5) -> slice:
         """Edges that flow out at so much of their distance a second."""
@@ -68,7 +67,7 @@ class Scene:
     def update(self, times: int = 1) -> "Scene":
         nobody = np.zeros(self.circles.capacity, np.uint8)
         for _ in range(times):
-            self.evicted += normal_circles.update(
+            normal_circles.update(
                 self.flowing,
                 self.edges.columns,
                 self.circles.columns,
@@ -217,7 +216,7 @@ def test_in_a_full_table_a_newborn_replaces_only_what_is_trusted_less(situation:
     first = scene.add(cluster(*LOWER_RIGHT))
     scene.update(2)
     second = scene.add(cluster(*UPPER_LEFT, number=20))
-    assert scene.update().evicted == 1
+    assert scene.update().circles.columns.evicted == 1
     assert scene.of(first) == {0}
     assert scene.of(second) == {-1}
 

@@ -58,10 +58,9 @@ class Known:
         circles.active[c], circles.trust[c], circles.square[c], circles.id[c] = True, trust, square, 70 + c
         circles.x[c], circles.y[c] = x, 260.0
 
-    def update(self) -> int:
-        """Return evictions."""
+    def update(self) -> None:
         rows = self.objects.columns, self.circles.columns, self.edges.columns
-        return int(object_circles.update(*rows, ImagePlane(LENS), self.around, SETTINGS, self.ids))
+        object_circles.update(*rows, ImagePlane(LENS), self.around, SETTINGS, self.ids)
 
     def trusted(self) -> list[int]:
         """Rows of circles that are published."""
@@ -73,9 +72,10 @@ class Known:
 
 def test_what_will_be_met_has_a_circle_though_no_edge_breaks_the_flow(situation: Situation) -> None:
     known = Known(situation())
-    assert known.update() == 0
+    known.update()
     (c,) = known.trusted()
     circles = known.circles
+    assert circles.columns.evicted == 0
     assert (circles.x[c], circles.y[c], circles.radius[c]) == (350.0, 260.0, 40.0)
     assert (circles.width[c], circles.height[c], circles.support[c]) == (60.0, 80.0, 9)
     assert (circles.ttc[c], circles.range[c], circles.lateral[c]) == (2.0, 3.0, pytest.approx(0.1))
@@ -142,7 +142,8 @@ def test_a_full_table_is_counted(situation: Situation) -> None:
     known = Known(situation())
     for c in (0, 1):
         known.add_circle(c, 100.0, TR_S)
-    assert known.update() == 1
+    known.update()
+    assert known.circles.columns.evicted == 1
     assert known.trusted() == [0, 1]
 
 
