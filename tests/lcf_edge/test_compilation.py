@@ -69,6 +69,41 @@ def test_no_function_of_a_compiled_module_silently_stays_python(declarations: Pa
     assert declared <= written
 
 
+@pytest.mark.parametrize("declarations", sorted(DECLARATIONS), ids=lambda path: path.stem)
+def test_a_compiled_module_is_plain_python_and_only_its_declarations_know_cython(declarations: Path) -> None:
+    tree = ast.parse(declarations.with_suffix(".py").read_text("utf-8"))
+    imported = {
+        name.split(".")[0]
+        for node in ast.walk(tree)
+        if isinstance(node, ast.Import | ast.ImportFrom)
+        for name in [getattr(node, "module", None) or "", *(alias.name for alias in node.names)]
+    }
+    named = {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)}
+    assert not {"cython", "Cython"} & (imported | named)
+
+
+_MEMORY = f"""
+from importlib import import_module
+from pathlib import Path
+import cv2, msgspec, numpy
+import lcf_edge.config, lcf_edge.messages
+def anonymous_kb():
+    lines = Path("/proc/self/smaps_rollup").read_text().splitlines()
+    return sum(int(line.split()[1]) for line in lines if line.startswith("Anonymous:"))
+before = anonymous_kb()
+for name in {sorted(".".join(path.relative_to(ROOT).with_suffix("").parts) for path in PAIRS)}:
+    import_module(name)
+print(anonymous_kb() - before)
+"""
+
+
+@needs_extension
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="an emulator's own memory would count")
+def test_the_extension_takes_less_than_2_mib_of_memory_besides_the_pages_of_its_file() -> None:
+    """Those are the page cache's: shared by all processes, and given up when memory is short."""
+    assert int(in_another_process(_MEMORY)) < 2048
+
+
 # Compiled and not, it is the same
 
 
