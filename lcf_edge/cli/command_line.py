@@ -92,8 +92,12 @@ def _record(arguments: argparse.Namespace) -> None:
 
 
 def _daemon_address(arguments: argparse.Namespace) -> "DaemonAddress":
+    from lcf_edge.config.endpoint import fault  # noqa: PLC0415
     from lcf_edge.monitor.live.daemon_address import DaemonAddress  # noqa: PLC0415
 
+    wrong = fault(arguments.connect)
+    if wrong:
+        raise LcfError(f"--connect: {wrong}")
     return DaemonAddress(arguments.connect, arguments.prefix, arguments.zenoh_config)
 
 

@@ -59,10 +59,12 @@ def test_a_configuration_with_one_is_refused(key: str) -> None:
         load(None, [f'zenoh.{key}=["tcp/127.0.0.1"]'])
 
 
-@pytest.mark.parametrize("command", ["watch", "view"])
-def test_who_looks_is_reported_at_once(command: str, capsys: pytest.CaptureFixture[str]) -> None:
+@pytest.mark.parametrize("command", ["watch", "view", "foxglove"])
+def test_a_command_refuses_it_at_once_by_the_name_of_its_option(
+    command: str, capsys: pytest.CaptureFixture[str]
+) -> None:
     assert main([command, "--connect", "tcp/127.0.0.1"]) == 1
-    assert capsys.readouterr().err.startswith("lcf-edge: zenoh.connect: tcp/127.0.0.1: no port; write ")
+    assert capsys.readouterr().err.startswith("lcf-edge: --connect: tcp/127.0.0.1: no port; write ")
 
 
 def test_a_planner_is_reported_at_once() -> None:
