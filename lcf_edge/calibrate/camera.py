@@ -16,6 +16,7 @@ from lcf_edge.calibrate.sources import SensorSource
 from lcf_edge.calibrate.target import Sighting, Target
 from lcf_edge.calibrate.views import CELLS, Views
 from lcf_edge.lens import Lens
+from lcf_edge.printable import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -231,7 +232,7 @@ def _result(solution: Solution, kept: list[Sighting], dropped: int, views: Views
     left_out = ", ".join(f"{count} {reason}" for reason, count in views.left_out.most_common())
     findings = (
         f"{len(kept)} views of {views.board.name}, {sum(len(view.corners) for view in kept)} corners"
-        + (f"; {dropped} views left out, with outlying errors" if dropped else ""),
+        + (f"; {counted(dropped, 'view')} left out, with outlying errors" if dropped else ""),
         f"images left out: {left_out or 'none'}",
         f"reprojection error: {solution.error_px:.3f} px; of a view {errors.min():.3f} to {errors.max():.3f} px",
         f"image covered: {views.covered().mean():.0%}; board tilted by up to {tilt_deg:.0f}°",

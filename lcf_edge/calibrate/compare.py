@@ -12,6 +12,7 @@ from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.calibrate.tracks import Tracker
 from lcf_edge.config import Config
 from lcf_edge.lens import Lens
+from lcf_edge.printable import counted
 
 LIVE_S = 20.0
 
@@ -59,7 +60,7 @@ def watch(source: SensorSource, config: Config, seconds: float | None, guide: Gu
     guide.end()
     if tracker is not None:
         for reason, count in tracker.left_out.items():
-            guide.say(f"left out: {count} intervals, {reason}")
+            guide.say(f"left out: {counted(count, 'interval')}, {reason}")
     return watched
 
 

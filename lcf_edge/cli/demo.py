@@ -34,6 +34,7 @@ from lcf_edge.config import Camera, Config, Vehicle, Zenoh, to_toml
 from lcf_edge.errors import LcfError, PublishError, UsageError
 from lcf_edge.messages import Cause
 from lcf_edge.pipeline import run
+from lcf_edge.printable import counted
 from lcf_edge.recording.read import Recording, open_recording
 from lcf_edge.rendered import scenes
 from lcf_edge.sinks import cannot_write, check_output
@@ -114,7 +115,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         *summary.lines(recording.skipped),
         f"memory   {memory_mib:.0f} MiB at most, of the process that filters and publishes",
         f"received {received.scenes} of {publisher.sent} scenes in the second process, "
-        f"{received.bytes / 1e3:.0f} kB, {received.circles} circles, {received.broken} broken",
+        f"{received.bytes / 1e3:.0f} kB, {counted(received.circles, 'circle')}, {received.broken} broken",
         "",
         "To see it live, publish in one terminal and subscribe in another:",
         *([] if endpoint == default else [f"(after you have stopped what has {default} now)"]),

@@ -15,6 +15,7 @@ from lcf_edge.evaluate.evaluation import evaluate as write_report
 from lcf_edge.evaluate.one_recording import Task
 from lcf_edge.evaluate.report import Numbers, RecordingRow, Report
 from lcf_edge.evaluate.workers import Outcome, by_cluster, by_processes
+from lcf_edge.printable import counted
 
 Say = Callable[[str], None]
 
@@ -53,7 +54,7 @@ def evaluate(question: Question, folder: Path, work: Work, warn: Say) -> list[st
 
 def _summary(now: Report, before: Report | None) -> list[str]:
     failed = len(now.recordings) - len(now.read)
-    lines = [f"read      {report.count(len(now.read), 'recording')}" + (f", {failed} left out" if failed else "")]
+    lines = [f"read      {counted(len(now.read), 'recording')}" + (f", {failed} left out" if failed else "")]
     known = {row.name: row for row in before.read} if before else {}
     for has_truth, title in ((True, "with truth"), (False, "without truth, as if nothing moved and nothing were met")):
         rows = [row for row in now.read if row.has_truth == has_truth]

@@ -9,6 +9,7 @@ from msgspec.structs import asdict
 
 from lcf_edge.config import Memory
 from lcf_edge.messages import Cause, Kind, ObjectClass, PipelineScene
+from lcf_edge.printable import counted
 
 _DEFAULT_MEMORY = Memory()
 _NEARLY = 0.98  # of its capacity; a row may have been removed since the table was full
@@ -72,8 +73,8 @@ class Summary:
             f"frames   {self.frames}, {seconds:.1f} s of recording",
             f"objects  {len(self._objects)}{_by_name(self._objects.values(), ObjectClass)}, "
             f"{self._object_rows / self.frames:.2f} a frame",
-            f"normal   {len(self._normal)} circles",
-            f"rebels   {len(self._rebels)} circles{_by_name(self._rebels.values(), Cause)}, "
+            f"normal   {counted(len(self._normal), 'circle')}",
+            f"rebels   {counted(len(self._rebels), 'circle')}{_by_name(self._rebels.values(), Cause)}, "
             f"{self._rebel_rows / self.frames:.2f} a frame",
             f"psi      {self.omitted / max(self.corners, 1):.1%} of {self.corners / self.frames:.0f} corners "
             "a frame omitted",
@@ -81,8 +82,8 @@ class Summary:
         ]
         if self.evicted:
             lines.append(
-                f"evicted  {self.evicted} rows in {self._evicting} of {self.frames} frames, because a table was full; "
-                f"{self._remedy()}"
+                f"evicted  {counted(self.evicted, 'row')} in {self._evicting} of {counted(self.frames, 'frame')}, "
+                f"because a table was full; {self._remedy()}"
             )
         if self._notes:
             lines.append(f"notes    {_counted(self._notes)} frames")

@@ -7,7 +7,8 @@ from html import escape
 from importlib.resources import files
 
 from lcf_edge.evaluate import report
-from lcf_edge.evaluate.report import ImageRow, Numbers, RecordingRow, Report, count
+from lcf_edge.evaluate.report import ImageRow, Numbers, RecordingRow, Report
+from lcf_edge.printable import counted
 
 Value = float | None
 
@@ -85,7 +86,7 @@ def _totals(result: Report, known: dict[str, RecordingRow]) -> str:
         now, then = report.total(rows), report.total(same) if same else None
         cells = "".join(_tile(measure, now, then) for measure in MEASURES)
         parts.append(
-            f"<h2>{title}</h2><p>{count(len(rows), 'recording')}, {count(now.pictures, 'frame')}, "
+            f"<h2>{title}</h2><p>{counted(len(rows), 'recording')}, {counted(now.pictures, 'frame')}, "
             f"{now.scored} of them scored</p>"
         )
         parts.append(f'<div class="tiles">{cells}</div>')

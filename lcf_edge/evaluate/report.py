@@ -187,11 +187,6 @@ def events(lines: Sequence[FrameLine]) -> list[Event]:
     return runs
 
 
-def count(number: int, thing: str) -> str:
-    """Return a number of things, in words."""
-    return f"{number} {thing}" + ("" if number == 1 else "s")
-
-
 def _known(value: float) -> float | None:
     return None if math.isnan(value) else round(value, 3)
 

@@ -13,10 +13,12 @@ import numpy as np
 import numpy.typing as npt
 
 from lcf_edge.messages import Cause, Kind, ObjectClass, ObjectState, PipelineScene, Shape, View
+from lcf_edge.printable import counted
 from lcf_edge.sinks.lettering import Mask, lettering
 
 Image = npt.NDArray[np.uint8]
 Colour = tuple[int, int, int]
+Figures = tuple[tuple[str, Colour], ...]
 """Blue, green, red."""
 
 YELLOW: Colour = (0, 225, 255)
@@ -76,10 +78,10 @@ def _line_expert(panel: Image, scene: PipelineScene, view: View) -> None:
         panel,
         (
             (f"frame {scene.seq}  {scene.stamp_ns / 1e9 % 1000:.2f} s  {speed}", WHITE),
-            (f"{sizes.corners} corners", YELLOW),
+            (counted(sizes.corners, "corner"), YELLOW),
             (f"{sizes.omitted} omitted", LIGHT_RED),
-            (f"{sizes.edges_normal} edges", BLUE),
-            (f"{sizes.groups} groups", GREEN),
+            (counted(sizes.edges_normal, "edge"), BLUE),
+            (counted(sizes.groups, "group"), GREEN),
             (f"{sizes.psi} psi", YELLOW),
         ),
     )
@@ -109,18 +111,21 @@ def _found(panel: Image, scene: PipelineScene, view: View) -> None:
     for circle in rebels[np.argsort(rebels["ttc"], kind="stable")]:
         around = (circle["x"], circle["y"], circle["radius"], circle["radius"])
         _beside(panel, _label(circle), around, taken, LIGHT_RED)
-    sizes = scene.sizes
-    count, met = len(scene.objects), int((scene.objects["probability"] >= _PROBABLY).sum())
-    _caption(
-        panel,
-        (
-            (f"{count} object{'s' * (count > 1)}" if count else "", LIGHT_BLUE),
-            (f"{met} to be met" if met else "", ORANGE),
-            (f"{len(is_rebel) - is_rebel.sum()} normal circles", GREEN),  # as many as are drawn and published
-            (f"{is_rebel.sum()} rebel circles, {sizes.edges_rebel} edges", LIGHT_RED),
-            (f"{sizes.chains} chains", WHITE),
-            (", ".join(scene.notes), YELLOW),
-        ),
+    _caption(panel, found_figures(scene))
+
+
+def found_figures(scene: PipelineScene) -> Figures:
+    """The caption of the right panel; of circles, as many as are drawn and published."""
+    sizes, count = scene.sizes, len(scene.objects)
+    met = int((scene.objects["probability"] >= _PROBABLY).sum())
+    rebels = int((scene.circles["kind"] == Kind.REBEL).sum())
+    return (
+        (counted(count, "object") if count else "", LIGHT_BLUE),
+        (f"{met} to be met" if met else "", ORANGE),
+        (counted(len(scene.circles) - rebels, "normal circle"), GREEN),
+        (f"{counted(rebels, 'rebel circle')}, {counted(sizes.edges_rebel, 'edge')}", LIGHT_RED),
+        (counted(sizes.chains, "chain"), WHITE),
+        (", ".join(scene.notes), YELLOW),
     )
 
 
@@ -267,7 +272,7 @@ def _write(panel: Image, mask: Mask, left_top: tuple[int, int], colour: Colour) 
         place[...] = dark + (mask / np.float32(255)) * (np.array(colour, np.float32) - dark)
 
 
-def _caption(panel: Image, parts: tuple[tuple[str, Colour], ...]) -> None:
+def _caption(panel: Image, parts: Figures) -> None:
     """A dark strip at the foot with ``parts`` in a row, shrunk until they fit."""
     strip = panel[-_STRIP_PX:]
     strip //= 3

@@ -120,5 +120,5 @@ def test_a_view_whose_error_stands_out_is_left_out_and_reported(studio: Make) ->
     views = studio(CHECKERBOARD, WEBCAM).sightings(12)
     views.kept[3].corners[20:30, 0] += 4.0  # as when somebody bends it
     result = solve(views, "radial-tangential")
-    assert "1 views left out, with outlying errors" in result.findings[0]
+    assert "; 1 view left out, with outlying errors" in result.findings[0]
     is_that_lens(result, WEBCAM)

@@ -19,6 +19,7 @@ from lcf_edge.messages import (
     ObjectState,
     PipelineScene,
     Shape,
+    Sizes,
     View,
 )
 from lcf_edge.sinks.overlay import (
@@ -33,10 +34,12 @@ from lcf_edge.sinks.overlay import (
     Colour,
     Image,
     draw,
+    found_figures,
 )
 
 WIDTH, HEIGHT = 320, 240
 NO_POINTS = np.zeros((0, 2), np.float32)
+NO_SIZES = Sizes()
 
 
 def points(*rows: tuple[float, ...]) -> npt.NDArray[np.float32]:
@@ -63,6 +66,31 @@ def region(shape: Shape, x: float, y: float, width: float, height: float) -> npt
     return np.array([(1, shape, x, y, width, height, 5)], PSI_REGION)
 
 
+def scene_of(
+    *,
+    circles: npt.NDArray[np.void] | None = None,
+    psi: npt.NDArray[np.void] | None = None,
+    objects: npt.NDArray[np.void] | None = None,
+    circle_objects: tuple[int, ...] = (),
+    size: tuple[int, int] = (WIDTH, HEIGHT),
+    notes: tuple[str, ...] = (),
+    sizes: Sizes = NO_SIZES,
+) -> PipelineScene:
+    return PipelineScene(
+        stamp_ns=1_000_000_000,
+        seq=1,
+        image_width=size[0],
+        image_height=size[1],
+        vehicle_speed=1.0,
+        circles=np.zeros(0, CIRCLE) if circles is None else circles,
+        psi=np.zeros(0, PSI_REGION) if psi is None else psi,
+        sizes=sizes,
+        notes=notes,
+        objects=np.zeros(0, OBJECT) if objects is None else objects,
+        circle_objects=np.array(circle_objects, np.uint32),
+    )
+
+
 def panels_of(
     *,
     circles: npt.NDArray[np.void] | None = None,
@@ -75,18 +103,7 @@ def panels_of(
     **view: Any,
 ) -> Image:
     width, height = size
-    scene = PipelineScene(
-        stamp_ns=1_000_000_000,
-        seq=1,
-        image_width=width,
-        image_height=height,
-        vehicle_speed=1.0,
-        circles=np.zeros(0, CIRCLE) if circles is None else circles,
-        psi=np.zeros(0, PSI_REGION) if psi is None else psi,
-        notes=notes,
-        objects=np.zeros(0, OBJECT) if objects is None else objects,
-        circle_objects=np.array(circle_objects, np.uint32),
-    )
+    scene = scene_of(circles=circles, psi=psi, objects=objects, circle_objects=circle_objects, size=size, notes=notes)
     parts = {
         "corners": NO_POINTS,
         "omitted": np.zeros(0, np.bool_),
@@ -265,6 +282,25 @@ def test_a_circle_of_an_object_leaves_the_telling_to_it() -> None:
     assert text_pixels(own[left], none[left]).size > 20
     assert text_pixels(with_labels[right], own[right]).size > 20
     assert (panels_of(circles=rebels) == with_labels).all(), "nobody said which circle is of which object"
+
+
+@pytest.mark.parametrize(
+    ("number", "words"),
+    [
+        (0, ["", "", "0 normal circles", "0 rebel circles, 0 edges", "0 chains", ""]),
+        (1, ["1 object", "1 to be met", "1 normal circle", "1 rebel circle, 1 edge", "1 chain", ""]),
+        (2, ["2 objects", "2 to be met", "2 normal circles", "2 rebel circles, 2 edges", "2 chains", ""]),
+    ],
+)
+def test_the_caption_says_one_thing_in_the_singular(number: int, words: list[str]) -> None:
+    scene = scene_of(
+        circles=np.concatenate([circle(kind=kind) for kind in (Kind.REBEL, Kind.NORMAL) for _ in range(number)])
+        if number
+        else None,
+        objects=np.concatenate([thing(probability=0.9)] * number) if number else None,
+        sizes=Sizes(edges_rebel=number, chains=number),
+    )
+    assert [text for text, _ in found_figures(scene)] == words
 
 
 def test_the_caption_counts_objects() -> None:
