@@ -18,6 +18,7 @@ from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
 from lcf_edge.calibrate.sources import SensorSource, for_a_while
 from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config
+from lcf_edge.printable import counted
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -92,7 +93,7 @@ def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, 
         raise CalibrationError(
             f"camera: nothing stands still in {stillness.frames} images; outline what is in view with --polygon"
         )
-    words = f"{stillness.frames} images; {len(polygons)} own parts, {own.mean():.1%} of the image"
+    words = f"{counted(stillness.frames, 'image')}; {counted(len(polygons), 'own part')}, {own.mean():.1%} of the image"
     return _result(polygons, image, config, (words,))
 
 
@@ -102,7 +103,7 @@ def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon]
     guide.end()
     if image is None:
         raise CalibrationError("camera: no images came; check camera.device, or name another recording")
-    return _result(polygons, image, config, (f"{len(polygons)} own parts, as given",))
+    return _result(polygons, image, config, (f"{counted(len(polygons), 'own part')}, as given",))
 
 
 def own_parts(stillness: Stillness) -> Marked:
