@@ -32,10 +32,10 @@ class ObjectClass(IntEnum):
 
     UNKNOWN = 0
     STANDING = 1
-    CROSSING = 2  # goes to the side
+    CROSSING = 2  # moves sideways
     ONCOMING = 3  # comes towards the vehicle
-    LEADING = 4  # goes ahead of it
-    CUTTING_IN = 5  # goes ahead of it, and to the side into its path
+    LEADING = 4  # moves ahead of it
+    CUTTING_IN = 5  # moves ahead of it, and sideways into its path
 
     @classmethod
     def _missing_(cls, value: object) -> "ObjectClass":  # noqa: ARG003
@@ -43,7 +43,7 @@ class ObjectClass(IntEnum):
 
 
 class ObjectState(IntEnum):
-    """How an object is known in this frame. A number that is none of these is ``COASTING``, the least sure."""
+    """Whether an object is seen in this frame. Other numbers are ``COASTING``, the least certain."""
 
     SEEN = 0
     HIDDEN = 1  # behind a nearer one
@@ -170,7 +170,7 @@ class Scene:
 
 @dataclass(frozen=True, slots=True)
 class PipelineScene(Scene):
-    """A scene with what is known only where it was made.
+    """A scene with what only the pipeline knows.
 
     ``circle_objects``: uint32 (circles,), the id of the object that a circle belongs to, 0: none.
     """
@@ -192,4 +192,4 @@ class View:
     groups: npt.NDArray[np.float32]  # (g, 3) λ: x, y, BS
     edge_group: npt.NDArray[np.intp]  # (m,) row of `groups` that an edge belongs to, -1: none
     focus: npt.NDArray[np.float32]  # (2,) focus of expansion, O
-    own_parts: tuple[npt.NDArray[np.float32], ...] = ()  # polygons (n, 2): nothing is looked for there
+    own_parts: tuple[npt.NDArray[np.float32], ...] = ()  # polygons (n, 2): ignored

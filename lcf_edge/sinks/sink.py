@@ -45,7 +45,7 @@ class Sink(ABC):
         self.close()
 
     def start(self) -> None:
-        """Start threads, if it has some."""
+        """Start threads, if any."""
 
     def put_sample(self, sample: ImuSample | SpeedSample) -> None:
         """Take a sample that the pipeline got.
@@ -55,7 +55,7 @@ class Sink(ABC):
         """
 
     def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
-        """Take how each part of the daemon is, once a second, as of ``stamp_ns`` of the monotonic clock."""
+        """Take the status of each part of the daemon, once a second, as of ``stamp_ns`` of the monotonic clock."""
 
     def show_config(self, config: Config) -> None:
         """Take the configuration after a reload. What ``shed`` gave up may be used again."""
@@ -64,7 +64,7 @@ class Sink(ABC):
         """Give up memory, because the budget is nearly used up."""
 
     def status(self) -> DeviceStatus | None:
-        """Return how it is, for the diagnostics; None: nothing to report."""
+        """Return its status for the diagnostics; None: nothing to report."""
         return None
 
     def join(self, timeout_s: float) -> bool:  # noqa: ARG002

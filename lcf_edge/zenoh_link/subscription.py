@@ -25,8 +25,8 @@ def reading_from(endpoint: str, config_file: str = "") -> config.Zenoh:
 class Scenes(Iterator[Scene]):
     """An iterator over scenes that waits for the next one. Close it, or let it go.
 
-    ``key``: of the last scene, which says whose it is if several rovers match. ``broken`` counts payloads
-    that were no scene; they are skipped.
+    ``key``: of the last scene, which names the rover if several match. ``broken``: number of payloads that were no
+    scene, and were skipped.
     """
 
     def __init__(self, options: config.Zenoh, key: str, kept: int) -> None:
@@ -63,7 +63,7 @@ def scenes(endpoint: str, key: str = "lcf/scene", *, kept: int = 64, config_file
     """Subscribe to a running pipeline: yields each scene until interrupted.
 
     Connects to ``endpoint``, a daemon or a router (``tcp/127.0.0.1:7447``), now or as soon as it listens, and again
-    when the connection was lost. Of scenes not yet asked for the newest ``kept`` wait; what is no scene is skipped and
+    when the connection was lost. At most the ``kept`` newest scenes queue; payloads that are no scene are skipped and
     counted. ``config_file``: a Zenoh configuration (JSON5), for TLS. Raises ``PublishError`` for a bad endpoint, key
     or file.
     """
