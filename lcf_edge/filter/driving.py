@@ -10,7 +10,7 @@ from lcf_edge.filter.situation import Situation
 
 MIN_BASELINE_S = 0.15  # motion over less time is lost in noise
 MOVES_SIGMAS = 3.0
-MIN_R_SHARE = 0.1  # of the focal length; nearer to O an edge hardly flows
+MIN_R_SHARE = 0.1  # of the focal length; closer to O the flow is too small
 MIN_A_SIDE = 8  # edges that flow outward left of O, and right of it
 FLOW_SHARE = 0.6  # of all edges
 MAX_ASTRAY = 0.2  # edges that move otherwise, as a share of those that flow
@@ -49,7 +49,7 @@ def look(
 
 
 def measure(test: DrivingTest, verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
-    """Set ``drives``. What approaches a stationary vehicle flows outward as well, but its surroundings are stationary.
+    """Set ``drives``. An object approaching a parked vehicle flows outward too, but its surroundings are stationary.
 
     Edges that have not moved for long count as own parts and are not judged, but they are evidence of rest.
     """

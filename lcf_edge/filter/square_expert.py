@@ -1,7 +1,7 @@
-"""Square expert, S: circles that belong to one thing are an object, with its range, its motion and how sure they are.
+"""Square expert, S: circles of one thing are an object, with its range and motion, and their uncertainty.
 
-The third layer (Tafrishi, Dai & Kandjani 2021). Rebel circles join the object that moves as they do and is near them;
-what is left founds new ones. Objects keep their identity while they are hidden or not seen for a short time.
+The third layer (Tafrishi, Dai & Kandjani 2021). Rebel circles join a nearby object of the same motion; the rest found
+new ones. Objects keep their identity while they are occluded, or not seen for a short time.
 """
 
 import math
@@ -24,70 +24,70 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import ObjectClass, ObjectState
 
-MIN_EDGES = 2  # whose motion a circle tells
-SIDE_GAP = 0.25  # of the larger extent, by which circles of one object may lie apart to the side,
-STACK_GAP = 0.75  # and one above the other: who walks has few corners between head and feet
-WIDE_GAP = 0.8  # in widths, and
-TOWER_GAP = 2.0  # of those that move very much alike
-LIKE_SIGMAS = 3.0  # by which motions of one object differ,
-LIKE_SHARE = 0.25  # and share of their speed: limbs swing;
-VERY_LIKE_SHARE = 0.1
-DOUBT_SHARE = 0.5  # and not by more than this because of what is unsure: a doubtful object would take in all around it
-LIKE_SHARE_OF_LINK = 0.2  # and this many of the px within which rebels are linked, each second
-STRAY_SIGMAS = 4.0  # of noise, and
-STRAY_SHARE = 0.35  # share of its speed, by which an edge of an object may move otherwise;
-JOIN_SHARE = 0.1  # one that is no rebel by less:
-SIDE_REACH = 0.1  # within the box of those that are, and so much of it beside
-STACK_REACH = 0.3  # and above and below, what breaks the flow; the ground before it moves much as it does
-ALL = -1  # all edges of an object tell how it moves
-WANDER_MPS = 1.0  # 1 sigma of how much a velocity changes in a second,
-UNSEEN_MPS = 0.3  # and of what is not seen is taken to change
-BODY_SHARE = 0.1  # of m, 1 sigma, by which an object is not what its edges show: some lie farther off,
-BODY_HZ = 0.015  # and at least this;
-SWING_SHARE = 0.1  # so of q
+MIN_EDGES = 2  # needed to measure a motion
+SIDE_GAP = 0.25  # largest gap between circles of one object, of the larger extent: horizontal,
+STACK_GAP = 0.75  # and vertical, since a pedestrian has few corners between head and feet;
+WIDE_GAP = 0.8  # where the motions agree closely: horizontal, of the width,
+TOWER_GAP = 2.0  # and vertical
+LIKE_SIGMAS = 3.0  # tolerance for motions of one object,
+LIKE_SHARE = 0.25  # plus this share of the speed, since limbs swing,
+VERY_LIKE_SHARE = 0.1  # or this one, for close agreement;
+DOUBT_SHARE = 0.5  # bounds the sigmas, as a share of the speed: an uncertain object would absorb its surroundings
+LIKE_SHARE_OF_LINK = 0.2  # plus this share of the link distance of rebels, per second
+STRAY_SIGMAS = 4.0  # of noise, plus
+STRAY_SHARE = 0.35  # this share of its speed: tolerance for the motion of an object's edge,
+JOIN_SHARE = 0.1  # less for one that is no rebel
+SIDE_REACH = 0.1  # margin in which edges that break the flow may join, as a share of the box of its edges,
+STACK_REACH = 0.3  # and above and below; the ground before it moves much as it does, so others join only inside
+ALL = -1  # all edges of an object measure its motion
+WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second,
+UNSEEN_MPS = 0.3  # less where it is not seen
+BODY_SHARE = 0.1  # model error of m, 1 sigma, as a share: some edges lie farther off than the rest,
+BODY_HZ = 0.015  # and in quadrature with it;
+SWING_SHARE = 0.1  # the same of q
 SWING_HZ = 0.006
-NOISE_GAIN = 1.7  # corners wander more than their noise tells: they are not points of the thing
-MAX_LAG = 0.5  # share by which a rate is brought from the middle of its window to now
-NEWS_SIGMAS = 4.0  # beyond which a measurement is held to be an outlier, and counts less
-PERSISTS_S = 0.055  # time constant with which the logarithmic odds of standing are forgotten
-MAX_ODDS = 4.0  # of which no more is kept
-GROWS_S = 0.07  # time constant with which a box follows edges outside it,
-SHRINKS_S = 0.3  # and edges that show it smaller,
-FOOT_S = 1.2  # and with which a foot is forgotten that is not seen,
-FOOT_BELOW_S = 3.0  # below the image
-EDGE_PX = 1.0  # by which a corner lies inside of what it is a corner of
-TURMOIL_HZ = 1.0  # 1 sigma of m and q of what shows no motion that could be followed
-FRAMES_UNREPORTED = 2.0  # of a new object,
-UNSURE = 0.25  # and three more with fewer edges than
+NOISE_GAIN = 1.7  # corners wander more than their noise suggests: they are not fixed points of the object
+MAX_LAG = 0.5  # bounds the correction of a rate from the middle of its window to now
+NEWS_SIGMAS = 4.0  # beyond this an innovation is an outlier and is down-weighted
+PERSISTS_S = 0.055  # time constant with which the log odds of standing decay,
+MAX_ODDS = 4.0  # which are clamped to this
+GROWS_S = 0.07  # time constant with which a side of a box moves outwards,
+SHRINKS_S = 0.3  # and inwards,
+FOOT_S = 1.2  # and with which the foot rises to a higher lowest edge,
+FOOT_BELOW_S = 3.0  # if it was below the image
+EDGE_PX = 1.0  # inset of a corner from the outline
+TURMOIL_HZ = 1.0  # 1 sigma of m and q where no motion can be tracked
+FRAMES_UNREPORTED = 2.0  # of a new object
+UNSURE = 0.25  # trust gained per frame, instead of 1, with fewer edges than
 SURE_EDGES = 7
-COAST_S = 0.3  # an object goes on unseen for so long without losing trust,
-HIDDEN_S = 1.0  # and behind another one for so long,
-OUTSIDE_S = 1.0  # beside the image,
-COMING_S = 3.0  # and if it moves towards the path there;
-NEAR_S = 1.0  # where it is near,
+COAST_S = 0.3  # an unseen object keeps its trust for this long,
+HIDDEN_S = 1.0  # occluded by another one,
+OUTSIDE_S = 1.0  # out of view,
+COMING_S = 3.0  # and out of view, but moving towards the path;
+NEAR_S = 1.0  # nearer than ``NEAR_M``, at least,
 NEAR_M = 1.5
-REMNANT_SHARE = 0.33  # of the edges that lately showed what is that near: fewer do not tell how it moves,
-USUAL_S = 3.0  # where these are forgotten with this time constant,
-LEAVES_S = 0.5  # unless it will have left the image so soon
-RESTING_S = 2.0  # where it stands, or is near, before a vehicle that stands, too,
-LINGERS_S = 6.0  # and if nothing is seen through it;
-THROUGH_S = 0.5  # what has kept its place in the image for so long is
-MIN_THROUGH = 3  # when there are so many of it in the middle of its box,
-THROUGH_SHARE = 0.3  # no farther from there than this share of it
-LOSES_HZ = 20.0  # trust that it loses then
-FOOT_PX = 2.0  # 1 sigma of where the lowest edge is
+REMNANT_SHARE = 0.33  # fewer edges of such a near object, as a share of its recent number, do not measure its motion;
+USUAL_S = 3.0  # time constant with which that number decays;
+LEAVES_S = 0.5  # unless it leaves the image within this time
+RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
+LINGERS_S = 6.0  # and near, not seen through;
+THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
+MIN_THROUGH = 3  # at least so many,
+THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
+LOSES_HZ = 20.0  # trust lost per second after that
+FOOT_PX = 2.0  # 1 sigma of the row of the lowest edge
 BORDER_PX = 4.0
-CUT_SHARE = 0.15  # of its height: with its lowest edge so near to the image's border its foot may be below that,
-CUT_HIDES = 0.75  # which is so likely
-PASSED_M = 0.1  # what is not seen and nearer than this is passed
-MOVES_SIGMAS = 1.5  # by which a velocity is above its noise
+CUT_SHARE = 0.15  # of its height: if the lowest edge is this near to the image's border, the foot may be below it,
+CUT_HIDES = 0.75  # with this probability
+PASSED_M = 0.1  # an unseen object nearer than this is passed
+MOVES_SIGMAS = 1.5  # a velocity above this is significant
 SLOW_MPS = 0.15
-INTO_PATH = 0.2  # share of the motion forward, by which what leads goes to the side when it cuts in
-RESTS_MPS = 0.05  # a slower vehicle rests,
-STILL_HZ = 0.05  # and what has a smaller looming and sideways rate, with it
-RATE_SIGMAS = 1.0  # by which a looming is above its noise where a time to contact is told
+INTO_PATH = 0.2  # least sideways motion of an object that cuts in, as a share of its forward motion
+RESTS_MPS = 0.05  # a slower vehicle is at rest,
+STILL_HZ = 0.05  # and so is an object before it with a smaller looming and sideways rate
+RATE_SIGMAS = 1.0  # a time to contact is reported for a looming above this
 EVEN = 0.5
-MAX_RANGE_M = 1000.0  # farther off nothing is known
+MAX_RANGE_M = 1000.0  # larger ranges are not reported
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
 SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
@@ -96,11 +96,11 @@ NAN = float("nan")
 
 
 class Squares:
-    """Room for one frame.
+    """Scratch memory of one frame.
 
     ``parts``: the motion of each circle; ``wholes``: of each object; ``members``: its edges; ``resting``: those of
-    them that are there while the vehicle rests; ``bounds``: where others may join it. ``obedient``: whether the edge of
-    a verdict moves as its object does.
+    them that are matched while the vehicle is at rest; ``bounds``: within which edges may join it. ``obedient``:
+    whether the edge of a verdict moves as its object does.
     """
 
     def __init__(self, circles: int, objects: int, edges: int) -> None:
@@ -114,7 +114,7 @@ class Squares:
 
 
 def derotate(objects: ObjectColumns, h: Homography) -> None:
-    """H = K·R·K⁻¹ on the centres of objects."""
+    """Apply H = K·R·K⁻¹ to the centres of objects."""
     for o in range(objects.capacity):
         if objects.active[o]:
             flow.warp(h, objects.x[o], objects.y[o])
@@ -122,7 +122,7 @@ def derotate(objects: ObjectColumns, h: Homography) -> None:
 
 
 def looming_at(objects: ObjectColumns, o: int, speed_mps: float) -> float:
-    """m at another speed of the vehicle than the one at which it was measured, 1/s."""
+    """Returns m, 1/s, converted to another speed of the vehicle than the one at which it was measured."""
     gained_mps = speed_mps - objects.reference[o]
     if objects.middle[o] > 0 and math.isfinite(gained_mps):
         return objects.looming[o] + gained_mps / objects.middle[o]
@@ -130,17 +130,17 @@ def looming_at(objects: ObjectColumns, o: int, speed_mps: float) -> float:
 
 
 def velocity_x(objects: ObjectColumns, o: int, x: float, looming: float, around: Situation) -> float:
-    """Image velocity of a part of an object at ``x``, px/s: to the side, and by looming about O."""
+    """Returns the image velocity of a part of an object at ``x``, px/s: sideways motion, and looming about O."""
     return objects.sideways[o] * around.pinhole.fx + looming * (x - around.focus_x)
 
 
 def velocity_y(y: float, looming: float, around: Situation) -> float:
-    """Image velocity of a part of an object at ``y``, px/s: what moves on the ground moves about the horizon."""
+    """Returns the image velocity of a part at ``y``, px/s: motion on the ground expands about the horizon."""
     return looming * (y - around.horizon_y)
 
 
 def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
-    """S': each object goes on as it moves, and is the less sure of it."""
+    """Predict S': propagate each object by its motion, with growing uncertainty, and delete those out of reach."""
     for o in range(objects.capacity):
         if not objects.active[o]:
             continue
@@ -186,29 +186,29 @@ def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
 
 
 def is_passed(objects: ObjectColumns, o: int) -> bool:
-    """Whether an object that is not seen would be nearer than anything can be."""
+    """Whether an unseen object would by now be nearer than is possible."""
     return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
 
 
 def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Settings) -> bool:
-    """Whether an object that left the image at its side may still be met."""
+    """Whether an object that left the image may still be met."""
     patience_s = outside_s(objects, o, around)
     return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < patience_s and objects.middle[o] > 0
 
 
 def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
-    """For how long an object is remembered that left the image at its side: longer if it moves towards the path."""
+    """Returns for how long an object is kept that left the image, s: longer if it moves towards the path."""
     comes_mps = objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]
     return COMING_S if comes_mps > SLOW_MPS else OUTSIDE_S
 
 
 def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether an object was lost that is near a vehicle that stands: where it goes to cannot be said."""
+    """Whether an object was lost near a stationary vehicle; its motion is then unknown."""
     return objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < SLOW_MPS and objects.range[o] < NEAR_M
 
 
 def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
-    """Whether what stands is seen in the middle of the box of an object that is lost."""
+    """Whether stationary edges are seen in the middle of the box of a lost object."""
     through = 0
     for i in range(edges.count):
         if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S:
@@ -230,9 +230,9 @@ def belongs(
     around: Situation,
     settings: Settings,
 ) -> bool:
-    """Whether a circle is a part of an object: near its box, and moving alike.
+    """Whether a circle is a part of an object: near its box, with the same motion.
 
-    What lies farther apart must move the more alike: a large thing may have few corners.
+    A large object may have few corners, so a wider gap is allowed if the motions agree closely.
     """
     width, tall = max(objects.width[o], circles.width[c]), max(objects.height[o], circles.height[c])
     extent = max(width, tall)
@@ -255,7 +255,7 @@ def moves_alike(
     around: Situation,
     settings: Settings,
 ) -> bool:
-    """Whether a circle moves as that part of the object would, within what both are unsure of."""
+    """Whether a circle moves as that part of the object would, within the uncertainty of both."""
     weight = parts.weight[c]
     x, y = parts.x[c] / weight, parts.y[c] / weight
     vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
@@ -286,7 +286,7 @@ def measure_circles(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """How the edges of each rebel circle move, its patches, and the pieces that show it."""
+    """Measure the motion of each rebel circle from its edges, patches and image pieces."""
     for c in range(circles.capacity):
         group_motion.clear(parts, c)
     for j in range(verdicts.count):
@@ -304,7 +304,7 @@ def measure_circles(
 def keep_members(
     objects: ObjectColumns, squares: Squares, circles: CircleColumns, around: Situation, settings: Settings
 ) -> None:
-    """Circles that end, or go their own way, leave their object."""
+    """Detach circles that have ended, or no longer move as their object does."""
     for c in range(circles.capacity):
         o = circles.square[c]
         if o < 0:
@@ -321,7 +321,7 @@ def keep_members(
 
 
 def object_in_turmoil(objects: ObjectColumns, circles: CircleColumns, c: int) -> int:
-    """The object that is where a circle in turmoil is, the nearest; -1: none."""
+    """Returns the nearest object that overlaps a circle in turmoil, -1: none."""
     nearest = -1
     least = INFINITY
     for o in range(objects.capacity):
@@ -337,7 +337,7 @@ def object_in_turmoil(objects: ObjectColumns, circles: CircleColumns, c: int) ->
 def nearest_object(
     objects: ObjectColumns, squares: Squares, circles: CircleColumns, c: int, around: Situation, settings: Settings
 ) -> int:
-    """The object that a circle is a part of, -1: none."""
+    """Returns the nearest object that a circle is a part of, -1: none."""
     nearest = -1
     least = INFINITY
     for o in range(objects.capacity):
@@ -349,7 +349,7 @@ def nearest_object(
 
 
 def free_row(objects: ObjectColumns) -> int:
-    """The first row that is not in use, -1: none."""
+    """Returns the first unused row, -1: none."""
     for o in range(objects.capacity):
         if not objects.active[o]:
             return o
@@ -357,7 +357,7 @@ def free_row(objects: ObjectColumns) -> int:
 
 
 def least_row(objects: ObjectColumns) -> int:
-    """Row of the object that is trusted least."""
+    """Returns the row of the least trusted object."""
     least = 0
     for o in range(objects.capacity):
         if objects.trust[o] < objects.trust[least]:
@@ -366,7 +366,7 @@ def least_row(objects: ObjectColumns) -> int:
 
 
 def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> None:
-    """A new object. It is not told in its first frames: its numbers would be those of a few edges."""
+    """Initialise a new object. It is not reported in its first frames, in which few edges would determine it."""
     objects.active[o] = 1
     objects.usual[o] = 0.0
     objects.id[o] = shared.new_id(ids)
@@ -388,7 +388,7 @@ def found(
     settings: Settings,
     ids: Ids,
 ) -> None:
-    """A new object from a circle."""
+    """Create a new object from a circle."""
     give_birth(objects, o, settings, ids)
     left, right = squares.parts.left[c], squares.parts.right[c]
     top, bottom = squares.parts.top[c], squares.parts.bottom[c]
@@ -403,14 +403,14 @@ def found(
 def found_in_turmoil(
     objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings, ids: Ids
 ) -> None:
-    """A new object from a circle in turmoil."""
+    """Create a new object from a circle in turmoil."""
     give_birth(objects, o, settings, ids)
     circles.square[c] = o
     take_place(objects, o, circles, c, around)
 
 
 def take_place(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation) -> None:
-    """Of an object in turmoil only the place is known."""
+    """Set an object to a circle in turmoil: its box is known, its motion and range are not."""
     objects.x[o], objects.y[o] = circles.x[c], circles.y[c]
     objects.width[o], objects.height[o] = circles.width[c], circles.height[c]
     objects.middle[o] = objects.middle_sigma[o] = objects.foot[o] = NAN
@@ -420,7 +420,7 @@ def take_place(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, a
 
 
 def forget_motion(objects: ObjectColumns, o: int) -> None:
-    """Nothing is known of how an object moves."""
+    """Reset an object's motion to unknown."""
     objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
     objects.mm[o] = objects.qq[o] = INFINITY
     objects.reference[o] = NAN
@@ -435,7 +435,7 @@ def gather(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """Circles without an object join one, or found a new one; return how many found no place."""
+    """Assign each circle without an object to one, or create a new one; returns how many objects were evicted."""
     evicted = 0
     for c in range(circles.capacity):
         in_turmoil = turmoil.is_shown_by(circles, c)
@@ -464,14 +464,14 @@ def gather(
 
 
 def leave(circles: CircleColumns, o: int, to: int) -> None:
-    """The circles of an object go to another one; -1: to none."""
+    """Reassign the circles of an object to another one; -1: to none."""
     for c in range(circles.capacity):
         if circles.square[c] == o:
             circles.square[c] = to
 
 
 def hand_over(edges: EdgeColumns, o: int, to: int) -> None:
-    """The edges of an object go to another one; -1: to none."""
+    """Reassign the edges of an object to another one; -1: to none."""
     for i in range(edges.count):
         if edges.square[i] == o:
             edges.square[i] = to
@@ -486,7 +486,7 @@ def belong_together(
     around: Situation,
     settings: Settings,
 ) -> bool:
-    """Whether all that is seen of one object could be a part of the other, and the other way round."""
+    """Whether every measured circle of one object could be a part of the other, and vice versa."""
     for c in range(circles.capacity):
         if squares.parts.count[c] < MIN_EDGES:
             continue
@@ -505,7 +505,7 @@ def unite(
     around: Situation,
     settings: Settings,
 ) -> None:
-    """Objects that turn out to be one: the younger goes into the older."""
+    """Merge objects that turn out to be one, the younger into the older."""
     for a in range(objects.capacity):
         for b in range(objects.capacity):
             if a == b or not objects.active[a] or not objects.active[b]:
@@ -520,16 +520,16 @@ def unite(
                 objects.active[b] = 0
 
 
-# What is seen of an object
+# Measurement
 
 
 def update_rate(
     objects: ObjectColumns, o: int, h_m: float, h_q: float, value: float, variance: float, speed_mps: float
 ) -> None:
-    """A measurement of h_m·m + h_q·q, by the equations of Kalman; an outlier counts as little as it deserves.
+    """Kalman update by a measurement of h_m·m + h_q·q; outliers are down-weighted.
 
-    ``speed_mps``: V at which it was made. m is linear in V: the mean of what is measured belongs to the mean of V. Of
-    an object of which nothing is known m is told first (1, 0), then q with it (across, 1).
+    ``speed_mps``: V at which it was made. m is linear in V, so its mean belongs to the mean of V. A new object must be
+    given a measurement of m first (1, 0), then one of q (across, 1).
     """
     if not math.isfinite(objects.mm[o]):
         objects.looming[o], objects.mm[o], objects.reference[o] = value, variance, speed_mps
@@ -554,10 +554,10 @@ def update_rate(
 
 
 def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
-    """m and q from the motion of all edges of an object, brought from the middle of their window to now.
+    """Update m and q from the motion of all edges of an object, propagated from the middle of their window to now.
 
-    m stays that of the mean speed over the window. Windows of successive frames overlap: each tells only what is new
-    in it.
+    m remains that at the mean speed over the window. Windows of successive frames overlap, so each measurement is
+    given less weight.
     """
     weight = wholes.weight[o]
     fx = around.pinhole.fx
@@ -571,7 +571,7 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
     rate, variance = wholes.expansion, 1 / wholes.spread
     below = y - focus_y
     if math.fabs(below) > 1:
-        # what moves on the ground moves about the horizon
+        # motion on the ground expands about the horizon
         vertical = wholes.vy[o] / weight / below
         vertical_var = (1 / weight + common * common) / (below * below)
         rate = (rate * vertical_var + vertical * variance) / (vertical_var + variance)
@@ -586,7 +586,7 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
 
 
 def show(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
-    """The box around all edges of an object."""
+    """Update an object's box from all of its edges."""
     left, right = wholes.left[o] - EDGE_PX, wholes.right[o] + EDGE_PX
     fit(objects, o, left, right, wholes.top[o] - EDGE_PX, wholes.bottom[o] + EDGE_PX, around)
 
@@ -594,7 +594,7 @@ def show(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) 
 def fit(
     objects: ObjectColumns, o: int, left: float, right: float, top: float, bottom: float, around: Situation
 ) -> None:
-    """The box of an object, on its way to what is seen of it: it grows soon, and shrinks slowly."""
+    """Move an object's box towards the given sides: it grows fast and shrinks slowly."""
     half_width, half_height = 0.5 * objects.width[o], 0.5 * objects.height[o]
     left = follow(objects.x[o] - half_width, left, -1.0, around)
     right = follow(objects.x[o] + half_width, right, 1.0, around)
@@ -605,16 +605,16 @@ def fit(
 
 
 def follow(side: float, shown: float, outwards: float, around: Situation) -> float:
-    """A side of a box, px, on its way to where the edges show it. ``outwards``: 1 or -1."""
+    """Returns a side of a box, px, low-pass filtered towards ``shown``. ``outwards``: 1 or -1."""
     time_s = GROWS_S if (shown - side) * outwards > 0 else SHRINKS_S
     return side + (1 - math.exp(-around.dt_s / time_s)) * (shown - side)
 
 
-# What is believed of it
+# Belief
 
 
 def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation) -> None:
-    """What an object shows, in angles."""
+    """Set the evidence of an object, in angles, and update its foot."""
     fx, fy = around.pinhole.fx, around.pinhole.fy
     evidence.looming, evidence.sideways = objects.looming[o], objects.sideways[o]
     whole = lengths.of(BODY_SHARE * evidence.looming, BODY_HZ)
@@ -650,7 +650,7 @@ def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: 
 
 
 def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, around: Situation) -> None:
-    """The object's numbers from what is believed."""
+    """Set the object's range, motion, risk and class from the belief."""
     objects.log_odds[o] = belief.log_odds
     objects.middle[o], objects.middle_sigma[o] = belief.middle, belief.middle_sigma
     objects.range[o], objects.range_sigma[o] = belief.mean[range_belief.RANGE], belief.sigma[range_belief.RANGE]
@@ -668,7 +668,7 @@ def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, 
 
 
 def set_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:
-    """Time to contact from its inverse, 1/s; none where the looming is not above its noise."""
+    """Set the time to contact from its inverse, 1/s; none where the looming is not above its noise."""
     if rate > RATE_SIGMAS * sigma and rate * range_belief.MAX_HORIZONS * around.horizon_s > 1:
         objects.ttc[o], objects.ttc_sigma[o] = 1 / rate, sigma / (rate * rate)
     else:
@@ -676,7 +676,7 @@ def set_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, aroun
 
 
 def class_of(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence) -> int:
-    """What an object does, over ground."""
+    """Returns the class of an object by its motion over ground."""
     if belief.stands > EVEN:
         return STANDING
     forward, right = objects.forward[o], objects.right[o]
@@ -693,14 +693,14 @@ def class_of(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence)
 
 
 def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether neither an object nor the vehicle moves: then nothing new is seen of where it is."""
+    """Whether neither an object nor the vehicle moves; the image then holds no new information about its range."""
     if not math.fabs(around.speed_mps) < RESTS_MPS or objects.log_odds[o] < 0 or not objects.range[o] > 0:
         return False
     return math.fabs(objects.looming[o]) < STILL_HZ and math.fabs(objects.sideways[o]) < STILL_HZ
 
 
 def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """What is not seen goes on as it went: all follows from its place and its velocity, which become unsure."""
+    """Derive an object's numbers from its last position and velocity; unseen, they become more uncertain."""
     drift_mps = UNSEEN_MPS * math.sqrt(around.dt_s) if objects.unseen_s[o] > 0 else 0.0
     objects.forward_sigma[o] = lengths.of(objects.forward_sigma[o], drift_mps)
     objects.right_sigma[o] = lengths.of(objects.right_sigma[o], drift_mps)
@@ -730,7 +730,7 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
 
 
 def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """The vehicle's speed is not known: the image alone tells when, and the foot where."""
+    """Set an object's numbers without the vehicle's speed: time to contact from looming, range from the foot."""
     objects.middle[o] = objects.middle_sigma[o] = objects.range[o] = objects.range_sigma[o] = NAN
     objects.lateral[o] = objects.lateral_sigma[o] = NAN
     objects.forward[o] = objects.forward_sigma[o] = objects.right[o] = objects.right_sigma[o] = NAN
@@ -755,11 +755,11 @@ def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, ar
     objects.probability[o] = beside * soon
 
 
-# Life
+# Lifetime
 
 
 def is_behind(objects: ObjectColumns, o: int) -> bool:
-    """Whether an object's middle lies behind a nearer one."""
+    """Whether a nearer, seen object overlaps this one in the image."""
     for other in range(objects.capacity):
         if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
             continue
@@ -772,11 +772,11 @@ def is_behind(objects: ObjectColumns, o: int) -> bool:
 
 
 def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, around: Situation) -> bool:
-    """Whether so few of the edges are left that lately showed an object that they do not tell how it moves.
+    """Whether too few of a near object's recent edges are left to measure its motion.
 
-    What is very near loses its corners, and the last ones may lie on a limb, or on something else: its range would
-    seem to grow while it comes closer. What is about to leave the image loses them by that, and still tells; what
-    rests before a vehicle that does shows few.
+    A very near object loses its corners, and the last ones may lie on a limb, or on something else: its range would
+    seem to grow while it comes closer. Not if it is about to leave the image, which explains the loss, nor before a
+    vehicle at rest, where few edges are expected.
     """
     if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.usual[o]:
         return False
@@ -787,17 +787,17 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
 
 
 def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
-    """For how long an object is remembered that was lost near: until the vehicle is there."""
+    """Returns for how long an object lost nearby is kept, s: until the vehicle is there."""
     return min(max(objects.range[o] / max(math.fabs(around.speed_mps), SLOW_MPS), NEAR_S), LINGERS_S)
 
 
 def go_on(
     objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
 ) -> None:
-    """An object that no edge shows in this frame is hidden, or coasts; in the end it is lost.
+    """Keep an object without edges in this frame as hidden or coasting; in the end, delete it.
 
-    What stands shows nothing to a vehicle that does, what is very near may show no corner, and what left the image
-    at its side cannot.
+    It is kept for longer where missing edges are expected: stationary before a stationary vehicle, very near, or out
+    of view.
     """
     objects.unseen_s[o] += around.dt_s
     hidden = is_behind(objects, o)
@@ -820,10 +820,10 @@ def go_on(
 def go_on_in_turmoil(
     objects: ObjectColumns, o: int, circles: CircleColumns, around: Situation, settings: Settings
 ) -> bool:
-    """An object of which a circle in turmoil tells that it is still there, and no edge more; False: none does.
+    """Update an object without edges from its circle in turmoil; returns whether it has one.
 
-    It goes on as it moved when edges still showed it, until it would be met: what is there then moves otherwise, and
-    a looming has no bound.
+    It keeps the motion that its edges last showed until contact would occur: beyond that the looming is unbounded, and
+    what is seen there must move differently.
     """
     for c in range(circles.capacity):
         if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
@@ -849,7 +849,7 @@ def obeys(
     share: float,
     around: Situation,
 ) -> bool:
-    """Whether an edge moves as its place on the object would, within a share of its speed, and noise."""
+    """Whether an edge moves as its position on the object would, within noise and a share of its speed."""
     i = verdicts.row[j]
     elapsed_s = baselines.elapsed_s[verdicts.slot[j]]
     speed_mps = baselines.depth_m[verdicts.slot[j]] / elapsed_s
@@ -863,7 +863,7 @@ def obeys(
 
 
 def set_reach(bounds: MotionSums, wholes: MotionSums, o: int) -> None:
-    """Where edges may join an object."""
+    """Set the bounds within which edges may join an object."""
     bounds.count[o] = wholes.count[o]
     if wholes.count[o] < MIN_EDGES:
         return
@@ -874,14 +874,14 @@ def set_reach(bounds: MotionSums, wholes: MotionSums, o: int) -> None:
 
 
 def is_in_reach(bounds: MotionSums, o: int, x: float, y: float) -> bool:
-    """Whether a place is inside the bounds of an object."""
+    """Whether a point is inside the bounds of an object."""
     if bounds.count[o] < MIN_EDGES or x < bounds.left[o] or x > bounds.right[o]:
         return False
     return y >= bounds.top[o] and y <= bounds.bottom[o]
 
 
 def still_px(verdicts: Verdicts, j: int) -> float:
-    """By how much an edge moved otherwise than what stands still at whatever depth, px."""
+    """Returns by how much an edge's motion deviates from that of a stationary point at any depth, px."""
     return max(math.fabs(verdicts.drift[j]), verdicts.short[j], verdicts.over[j])
 
 
@@ -893,10 +893,10 @@ def take_others(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """Edges that are no rebels join the object that they are near to and move with.
+    """Let edges that are no rebels join the object that they are near to and move with.
 
-    As feet on the ground do, that hardly break the flow. Those that move otherwise than what stands still become its
-    own; so do those that rest inside what rests.
+    Feet on the ground, for instance, hardly break the flow. Those that do not move as stationary points become members
+    of the object; the others, only inside the box of its members, count for this frame.
     """
     shown = 0
     for o in range(objects.capacity):
@@ -921,9 +921,9 @@ def take_others(
 
 
 def square_of(objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
-    """The object that an edge belongs to, by its circle, or as it did before; -1: none.
+    """Returns the object that an edge belongs to, by its circle or as before; -1: none.
 
-    The object goes on without an edge that is left behind, on what it hid.
+    An edge far outside the object's box was left behind, on the background, and no longer belongs to it.
     """
     if edges.rebel[i] and edges.circle[i] >= 0 and circles.square[edges.circle[i]] >= 0:
         return circles.square[edges.circle[i]]
@@ -943,7 +943,7 @@ def count_members(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """The edges of each object; ``ALL`` where most of them move otherwise than was thought."""
+    """Count the edges of each object; ``ALL`` where most of them contradict its predicted motion."""
     for o in range(objects.capacity):
         group_motion.clear(squares.wholes, o)
         squares.members[o] = squares.resting[o] = 0
@@ -973,7 +973,7 @@ def take_members(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """The motion of each object, by its edges. Those that move otherwise than most of them are no longer its own."""
+    """Measure each object's motion from its edges, and drop those that move differently from most."""
     count_members(objects, squares, circles, verdicts, edges, baselines, around)
     for j in range(verdicts.count):
         i = verdicts.row[j]
@@ -987,11 +987,11 @@ def take_members(
     for c in range(circles.capacity):
         o = circles.square[c]
         if o >= 0 and circles.active[c] and squares.wholes.count[o] < MIN_EDGES:
-            group_motion.add(squares.wholes, o, squares.parts, c)  # patches and pieces tell where edges do not
+            group_motion.add(squares.wholes, o, squares.parts, c)  # patches and pieces replace missing edges
 
 
 def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation, settings: Settings) -> float:
-    """By how much the trust of an object changes that edges show: few make it sure slowly, the ground is none."""
+    """Returns the change of trust of an object seen by its edges: slow with few, negative if it moves as the ground."""
     if group_motion.is_ground(wholes, o, around):
         return -1.0
     return 1.0 if wholes.count[o] >= SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
@@ -1000,7 +1000,7 @@ def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situat
 def renew_numbers(
     objects: ObjectColumns, o: int, squares: Squares, unmeasured: bool, plane: ImagePlane, around: Situation
 ) -> None:
-    """The numbers of an object: from its evidence, or, where nothing new is seen of its motion, as it went."""
+    """Update the numbers of an object from its evidence; if its motion was not measured, by coasting."""
     collect_evidence(squares.evidence, objects, o, plane, around)
     if unmeasured and math.isfinite(objects.forward[o]):
         coast(objects, o, squares.evidence, around)
@@ -1026,7 +1026,7 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> int:
-    """S from C_r; return evictions."""
+    """Update S from C_r; returns evictions."""
     for i in range(edges.count):
         if edges.square[i] >= 0 and not objects.active[edges.square[i]]:
             edges.square[i] = -1  # before its row is used again
