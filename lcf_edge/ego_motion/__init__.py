@@ -2,5 +2,5 @@
 
 ``estimator`` does all of it. It uses ``sample_ring`` (the samples of the last seconds), ``gyro_bias`` (and
 ``axis_bias``, its filter) and ``inertial_speed``; ``image_rotation`` measures the rotation in the images where the
-gyro does not give it well, and ``stillness`` tells from images whether the vehicle stands.
+gyro does not give it well, and ``stillness`` detects in images that the vehicle is stationary.
 """

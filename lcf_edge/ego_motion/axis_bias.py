@@ -11,8 +11,8 @@ MIN_VARIANCE = 1e-12
 
 
 class AxisBias:
-    """``bias``, ``flow``, ``noise``: b, s and w, with their covariance. ``error``: by how much the gyro is mistaken
-    over the present interval, b + w.
+    """``bias``, ``flow``, ``noise``: b, s and w, with their covariance. ``error``: the gyro's error over the present
+    interval, b + w.
 
     ``flow_radps``: σ_s.
     """
@@ -32,7 +32,7 @@ class AxisBias:
         return math.sqrt(self.bias_bias)
 
     def error(self) -> float:
-        """By how much the gyro is mistaken."""
+        """The gyro's error over the present interval."""
         return self.measured * self.bias + self.noise
 
     def error_sigma(self) -> float:

@@ -1,6 +1,6 @@
 """Ego-motion: how the camera turned and how fast the vehicle drove between two exposures.
 
-Camera axes: x right, y down, z forward (taken for the vehicle's forward). With body rates ω the camera's
+Camera axes: x right, y down, z forward (assumed to be the vehicle's forward). With body rates ω the camera's
 orientation follows Ṙ = R·[ω]×, so a fixed direction turns by exp(-[ω]× dt) in the camera's axes.
 No clock, no I/O; memory is two fixed rings of samples.
 """
@@ -33,36 +33,36 @@ MIN_DT_S = 5e-3  # of a first frame, or of two with one stamp
 _MAX_GYRO_RADPS = 40.0
 _MAX_ACCEL_MPS2 = 200.0
 
-_GAP_S = 0.05  # or five sample intervals: longer without a sample is a gap
+_GAP_S = 0.05  # or five sample intervals, if longer; more without a sample is a gap
 _FRESH_S = 0.5  # older odometry is stale
 
-# Standing still, for this long.
+# At rest, for this long.
 _REST_NS = 500_000_000
-_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # when only a quiet IMU shows it
-_REST_GYRO_RADPS = 0.1  # then the largest bias that is believed
-_SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # when odometry or the image shows it: motors shake it
+_REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # where only a quiet IMU indicates rest,
+_REST_GYRO_RADPS = 0.1  # and the largest bias that is accepted then
+_SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # where odometry or the image indicates it: motors vibrate
 _REST_GRAVITY_ERROR_MPS2 = 0.8
 _REST_SPEED_MPS = 0.02
 _REST_YAW_RADPS = 0.02
 _REST_TURN_RADPS = 0.02  # largest difference of the mean rate within the rest, and from a known bias
-_REST_SIGMA_RADPS = 1e-3  # 1 sigma of how still a rest is
+_REST_SIGMA_RADPS = 1e-3  # 1 sigma of the true rate at rest
 
 # Rotation, 1 sigma of the rate where nothing measures it.
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
 _SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
-_SIGMA_SATURATED_RADPS = 1.0  # how far beyond the end of its range the gyro turns
-_GUESS_TIME_S = 0.5  # over which the sigma of a guess is averaged
+_SIGMA_SATURATED_RADPS = 1.0  # of the rate beyond the gyro's full scale
+_GUESS_TIME_S = 0.5  # averaging time of the sigma of a guess
 _GUESS_MIN_RADPS, _GUESS_MAX_RADPS = 0.04, 2.0
-_STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value for so long and so often, is stuck
+_STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value this long and this often, is stuck
 _NOISY_SHARE = 0.5  # largest share of repeated samples of a gyro with noise
 _MIN_BIAS_SHARE = 0.5  # of the image's uncertainty: a rotation known better than that gains nothing from it
-_LAG_SHARE = 0.5  # of the correction by the flow that may stem from before: tracks lag
+_LAG_SHARE = 0.5  # of the correction by the flow that may belong to earlier intervals: tracks lag
 _TURN_SHARE = 0.05  # of the rate: error by the gyro's scale and time, and a shaken focus
 _ROLL_SHARE = 0.5  # roll moves the image's edge by this share of what yaw does
 
-_DRIVES_S = 0.5  # what comes close to a vehicle that stands may flow as well, but not for so long
+_DRIVES_S = 0.5  # an object that comes close to a stationary vehicle may cause flow too, but not for this long
 
-_SHAKE_S = 0.4  # a yaw rate that does not last this long is the camera shaking, not the vehicle turning
+_SHAKE_S = 0.4  # a shorter yaw rate is the camera shaking, not the vehicle turning
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,7 +85,7 @@ class EgoMotion:
 
 @dataclass(slots=True)
 class _Interval:
-    """What is measured over the interval between two exposures."""
+    """Measurements over the interval between two exposures."""
 
     span: Span
     rates: Track  # of the gyro, or of odometry in its place, in the first columns
@@ -152,14 +152,14 @@ class EgoMotionEstimator:
             self._odometry.add(sample.stamp_ns, (sample.speed_mps, sample.yaw_rate_radps))
 
     def advance(self, stamp_ns: int, still: bool | None = None) -> EgoMotion:
-        """The motion over (previous stamp, ``stamp_ns``], from the samples taken so far.
+        """Return the motion over (previous stamp, ``stamp_ns``], from the samples so far.
 
-        ``still``: whether the image has stood still for half a second, None: unknown. The first frame has
+        ``still``: whether the image has been stationary for half a second, None: unknown. The first frame has
         no interval; neither has one whose stamp goes back, which is counted.
 
-        ``rotation_sigma_rad``: the bias's sigma · dt, at least gyro noise · dt; besides, gyro noise · √(dt · sample
-        interval) (white noise), and stated rates over what was held, missed or saturated. Without a gyro: by how much
-        guessed rates were lately wrong.
+        ``rotation_sigma_rad`` combines the bias's sigma · dt, at least gyro noise · dt; white noise,
+        gyro noise · √(dt · sample interval); and fixed rates over times held, missing or saturated. Without a gyro: the
+        recent error of guessed rates.
         """
         notes: list[str] = []
         if self._stamp_ns is None:
@@ -237,7 +237,7 @@ class EgoMotionEstimator:
         self._guessed.hold(interval.span.dt_s, interval.mean_radps)
 
     def needs_image_rotation(self, sigma_rad: float) -> bool:
-        """Whether an image that gives the rotation to ``sigma_rad`` would help in the present interval."""
+        """Whether the rotation from the images, with ``sigma_rad``, would help in the present interval."""
         interval = self._interval
         if not interval.measured or interval.span.dt_s == 0:
             return True
@@ -246,9 +246,8 @@ class EgoMotionEstimator:
     def add_image_rotation(self, turn_rad: Floats, sigma_rad: Floats) -> EgoMotion:
         """Return the motion of the present interval, using the rotation of the whole image as well.
 
-        A working gyro with a known bias is believed more than an image that contradicts it; any other source of the
-        rotation is not. ``turn_rad``: rotation vector (3,) of directions, as in
-        ``EgoMotion.rotation``; ``sigma_rad``: (3,).
+        A working gyro with a known bias prevails over an image that contradicts it; any other source of the rotation
+        does not. ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
         """
         interval, bias = self._interval, self.bias
         dt_s = interval.span.dt_s
@@ -263,16 +262,16 @@ class EgoMotionEstimator:
         return self._answer(self._rotation())
 
     def _less_rates(self, turn_rad: Floats) -> list[float]:
-        """Return the error of the rates, (3,) rad/s, if the image's rotation of the present interval is true."""
+        """Return the rates less those of the image over the present interval, (3,) rad/s."""
         interval = self._interval
         both = zip(interval.mean_radps, turn_rad.tolist(), strict=True)
         return [mean + turned / interval.span.dt_s for mean, turned in both]
 
     def correct(self, turn_rad: Floats, sigma_rad: Floats, expansion_hz: float = 0.0) -> None:
-        """Take the rotation that the flow corrected in the present interval: the bias learns from it.
+        """Take the correction of the present interval's rotation by the flow, from which the bias is learnt.
 
         ``turn_rad``: rotation vector (3,) of directions, as in ``EgoMotion.rotation``; ``sigma_rad``: (3,).
-        ``expansion_hz``: mean V/Z of what is seen.
+        ``expansion_hz``: mean V/Z of the scene.
         """
         interval = self._interval
         dt_s = interval.span.dt_s
@@ -293,9 +292,9 @@ class EgoMotionEstimator:
                 self._guess_variance[k] = min(max(variance, _GUESS_MIN_RADPS**2), _GUESS_MAX_RADPS**2)
 
     def see_ground(self, ground: GroundSpeed) -> None:
-        """Take the speed that the ground shows in the present interval, where nothing measures it.
+        """Take the speed from the flow of the ground in the present interval, where nothing else measures it.
 
-        Windows overlap, so each counts only with its new part.
+        Windows overlap, so only the new part of each counts.
         """
         interval = self._interval
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
@@ -308,8 +307,8 @@ class EgoMotionEstimator:
     def see_driving(self, drives: bool) -> None:
         """Take whether the flow of the present image shows that the vehicle drives.
 
-        A quiet IMU is no rest then: on a smooth floor, at a steady speed, it is as quiet. Nor does it know the speed of
-        a vehicle that it took to be standing.
+        A quiet IMU does not indicate rest then: at a steady speed on a smooth floor it is as quiet. Nor is the inertial
+        speed known if the vehicle was assumed to be at rest.
         """
         if not drives:
             self._driven_s = 0.0
@@ -342,7 +341,7 @@ class EgoMotionEstimator:
         )
 
     def _follow_path(self, error_radps: Sequence[float]) -> float:
-        """The camera's yaw rate if the rates are mistaken by ``error_radps``; the path's follows it."""
+        """Return the camera's yaw rate, given the error of the rates; the path's yaw rate follows it."""
         interval = self._interval
         yaw_rate_radps = error_radps[1] - interval.mean_radps[1]
         if isfinite(interval.odometry_yaw_radps):
@@ -366,14 +365,14 @@ class EgoMotionEstimator:
         return not (may_rest and imu.repeats(window, 3, 6) == pairs and self._near_bias(imu.newest(window)))
 
     def _near_bias(self, rate_radps: Sequence[float]) -> bool:
-        """Whether a rate at rest, in the first three, may be this."""
+        """Whether a mean rate, the first three values, agrees with the bias."""
         known = zip(rate_radps, self.bias.means(), self.bias.sigmas(), strict=False)
         return all(abs(rate - mean) <= _REST_TURN_RADPS + 3 * sigma for rate, mean, sigma in known)
 
     def _learn_rest(
         self, span: Span, gap_limit_s: float, odometry_mps: float, still: bool | None
     ) -> list[float] | None:
-        """The mean specific force (3,), which is up, if the vehicle stands still; the gyro's mean is its bias then."""
+        """If the vehicle is at rest, learn the bias from the gyro's mean; return the mean specific force (3,), up."""
         stands = self._stands(span.end_ns, odometry_mps, still)
         if stands is False or not self._imu.find_latest(self._window, span.end_ns, _REST_NS, gap_limit_s):
             return None
@@ -405,7 +404,7 @@ class EgoMotionEstimator:
         return at[3:6] if level else None
 
     def _stands(self, stamp_ns: int, odometry_mps: float, still: bool | None) -> bool | None:
-        """Whether image or odometry shows that it stands; None: undecided."""
+        """Whether image or odometry shows that the vehicle is stationary; None: undecided."""
         if still:
             return True
         if isfinite(odometry_mps):
@@ -419,7 +418,7 @@ class EgoMotionEstimator:
             )
         drove = self._drove_ns is not None and stamp_ns - self._drove_ns < _REST_NS
         if drove or (still is False and not self.bias.known):
-            return False  # what moves may be others, but nothing else shows rest
+            return False  # others may move, but nothing else indicates rest
         return None if self._inertial.may_stand() else False
 
     def _choose_speed(self, span: Span, odometry_mps: float, notes: list[str]) -> float:

@@ -1,16 +1,16 @@
-"""Forward speed as the ground in the image shows it, where nothing measures it. No clock, no I/O."""
+"""Forward speed from the flow of the ground, where nothing else measures it. No clock, no I/O."""
 
 from math import hypot, inf, nan, sqrt
 
 from lcf_edge.filter.ground_speed import GroundSpeed
 
-_ACCEL_MPS2 = 1.0  # 1 sigma of what a small vehicle does unseen
+_ACCEL_MPS2 = 1.0  # 1 sigma of a small vehicle's acceleration between measurements
 _SIGMA_LIMIT_MPS = 0.6  # beyond, the speed is unknown: half a second without ground
 _SIGMA_STILL_MPS = 0.02
 
 
 class GroundBelief:
-    """The speed by the ground of the last images; its uncertainty grows until it is unknown."""
+    """The speed from the ground in the last images; its uncertainty grows until it is unknown."""
 
     def __init__(self) -> None:
         self.speed_mps = nan
@@ -23,11 +23,11 @@ class GroundBelief:
             self.speed_mps, self.sigma_mps = nan, inf
 
     def stand(self) -> None:
-        """The image stands still, and so does the vehicle."""
+        """Set the speed to zero: the image is stationary."""
         self.speed_mps, self.sigma_mps = 0.0, _SIGMA_STILL_MPS
 
     def see(self, ground: GroundSpeed, dt_s: float) -> None:
-        """Take what the ground shows over its window, of which ``dt_s`` is new."""
+        """Update by the ground's speed over its window, of which ``dt_s`` is new."""
         sigma_mps = hypot(ground.sigma_mps, _ACCEL_MPS2 * ground.elapsed_s / 2)
         if not self.sigma_mps < inf:
             self.speed_mps, self.sigma_mps = ground.speed_mps, sigma_mps

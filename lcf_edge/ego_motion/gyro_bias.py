@@ -1,14 +1,14 @@
-"""The gyro's bias: unknown until learnt, from rest and from the rotation that the images show.
+"""The gyro's bias: unknown until learnt, at rest and from the rotation in the images.
 
-A Kalman filter, each axis by itself, with the states, all rad/s,
+One Kalman filter per axis, with the states, all rad/s,
 
 - b: the bias, a random walk (temperature);
 - s: the flow's error of the rate, slowly changing (O and lens are not known exactly);
 - w: the gyro's other error over the present interval, forgotten after it.
 
-The gyro's mean rate over an interval is ω + b + w. Whatever else gives the rate ω of that interval is an observation
-of the difference: b + w for corners of the whole image, b + w + s for the flow, and b alone, over a longer time, at
-rest. No clock, no I/O.
+The gyro's mean rate over an interval is ω + b + w. Any other measurement of ω over that interval observes the
+difference: b + w by the shift of the whole image, b + w + s by the flow, and b alone, over a longer time, at rest. No
+clock, no I/O.
 """
 
 from collections.abc import Iterable, Sequence
@@ -89,12 +89,12 @@ class GyroBias:
             axis.advance(dt_s, noise, measured)
 
     def doubt(self) -> None:
-        """Allow any error of the gyro over the present interval."""
+        """Let the gyro's error over the present interval be unknown."""
         for axis in self._axes:
             axis.set_noise(_ANY_RADPS)
 
     def see_rest(self, rate_radps: Three, sigma_radps: float) -> bool:
-        """Take the gyro's mean rate (3,), rad/s, while the vehicle stands. Return False for an outlier, not used."""
+        """Take the gyro's mean rate (3,), rad/s, at rest. Return False for an outlier, not used."""
         axes = zip(self._axes, rate_radps, strict=True)
         return self._learn([axis.compare(1.0, 0.0, 0.0, rate, sigma_radps) for axis, rate in axes])
 
@@ -106,7 +106,7 @@ class GyroBias:
     def see_flow(self, error_radps: Three, sigma_radps: Three, expansion_hz: float) -> bool:
         """Take the gyro's rate less the flow's, (3,), with its sigmas. Return False for an outlier, not used.
 
-        ``expansion_hz``: mean V/Z of what is seen; by this factor an error of O becomes one of the rate.
+        ``expansion_hz``: mean V/Z of the scene, the factor by which an error of O becomes one of the rate.
         """
         for axis in self._axes:
             axis.set_flow(max(_FLOW_RADPS, _FOCUS_RAD * expansion_hz))
@@ -114,7 +114,7 @@ class GyroBias:
         return self._learn([axis.compare(self._measured, 1.0, 1.0, error, sigma) for axis, error, sigma in axes])
 
     def _learn(self, fits: Iterable[bool]) -> bool:
-        """Let all axes learn, or none."""
+        """Update all axes, or none."""
         if not all(fits):
             self._against_s += self._dt_s
             if self._against_s > _REFUTED_S:

@@ -1,8 +1,8 @@
-"""By how much the camera turned between two images, from the images alone.
+"""Rotation of the camera between two images, from the images alone.
 
-Phase correlation of small images with levelled brightness finds the shift that most of the image shares, however large.
-Near and moving things shift differently, and do not agree with the rest. Accurate to a few pixels, which is enough to
-match corners; no clock, no I/O.
+Phase correlation of downscaled, high-pass filtered images finds the shift that most of the image shares, however large.
+Near and moving objects shift differently from the rest, and not alike. Accurate to a few pixels, which is enough to
+match corners. No clock, no I/O.
 """
 
 from dataclasses import dataclass
@@ -18,10 +18,10 @@ from lcf_edge.small_image import SmallImage
 Grey = npt.NDArray[np.uint8]
 Floats = npt.NDArray[np.float64]
 
-_LEVEL_PX = 9  # over which brightness is levelled
-_MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a small image: a plain one shows no shift
+_LEVEL_PX = 9  # width of the high-pass filter
+_MIN_CONTRAST = 1.0  # grey levels, 1 sigma of a downscaled image: a plain one shows no shift
 _MIN_RESPONSE = 0.3  # share of the correlation in its peak
-_SIGMA_PX = 0.35  # 1 sigma of the shift of small images
+_SIGMA_PX = 0.35  # 1 sigma of the shift of downscaled images
 _SIGMA_SHARE = 0.03  # 1 sigma as a share of the shift: roll, and the image's corners
 _ROLL_SIGMA_RAD = pi  # unknown
 _STEP_RAD = 1e-3
@@ -48,11 +48,11 @@ class ImageRotation:
         self.sigma_rad = _SIGMA_PX / float(self._px_per_rad.min())
 
     def forget(self) -> None:
-        """The next image does not follow the last one."""
+        """Forget the last image: the next one does not follow it."""
         self._before = None
 
     def turn(self, small: Grey) -> Turn | None:
-        """Return the turn from the last image to this one, in small; None: they do not show it."""
+        """Return the rotation from the last image to this downscaled one; None: they do not show it."""
         before, self._before = self._before, _levelled(small)
         if before is None or self._before is None:
             return None
@@ -68,7 +68,7 @@ class ImageRotation:
 
 
 def _levelled(small: Grey) -> npt.NDArray[np.float32] | None:
-    """Return a small image without slow changes of brightness; None: it is plain."""
+    """Return a high-pass filtered image; None: it is plain."""
     level = small.astype(np.float32)
     level -= cv2.blur(level, (_LEVEL_PX, _LEVEL_PX))
     return level if cv2.norm(level) > _MIN_CONTRAST * level.size**0.5 else None

@@ -1,4 +1,4 @@
-"""Forward speed and pitch by the accelerometer alone, from one rest to the next. No clock, no I/O."""
+"""Forward speed and pitch from the accelerometer alone, from one rest to the next. No clock, no I/O."""
 
 from collections import deque
 from collections.abc import Sequence
@@ -12,17 +12,17 @@ Floats = npt.NDArray[np.float64]
 
 GRAVITY_MPS2 = 9.81
 MAX_SPEED_MPS = 70.0  # no small vehicle is faster
-_LEVEL_TIME_S = 30.0  # time constant of the accelerometer's pull on the gravity direction
-_LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # largest difference from gravity at which it pulls
+_LEVEL_TIME_S = 30.0  # time constant with which the gravity direction follows the accelerometer,
+_LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # if the force differs from gravity by no more than this
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
 _SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes, or saturated ones
 _SIGMA_ODOMETRY_MPS = 0.05
-_LATE_S = 0.3  # by which the end of a rest is noticed too late
+_LATE_S = 0.3  # delay with which the end of a rest is noticed
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
 
 
 class _Moment(NamedTuple):
-    """What was measured in one frame at rest, and gravity as known before."""
+    """Measurements of one frame at rest, and gravity as known before."""
 
     dt_s: float
     accel_mps2: Sequence[float]
@@ -32,12 +32,12 @@ class _Moment(NamedTuple):
 
 
 class InertialSpeed:
-    """Forward speed by the accelerometer, from the last rest on; its uncertainty grows until it is unknown.
+    """Forward speed from the accelerometer since the last rest; its uncertainty grows until it is unknown.
 
-    The gravity direction is learnt at rest and turned along by the gyro, with a slow pull towards the
-    accelerometer. The force along the camera's forward axis, projected into the horizontal plane, is then
-    acceleration: f · h, h = (z - (z·up) up) / |…|, free of gravity. The end of a rest is noticed late: measurements of
-    its last moments are kept and then integrated, with gravity from before them.
+    The gravity direction is learnt at rest, propagated by the gyro, and slowly corrected by the accelerometer. The
+    force along the camera's forward axis, projected into the horizontal plane, is then acceleration: f · h, h = (z -
+    (z·up) up) / |…|, free of gravity. The end of a rest is noticed late: measurements of its last moments are kept and
+    then integrated, with gravity from before them.
     """
 
     def __init__(self, gyro_noise_radps: float) -> None:
@@ -51,7 +51,7 @@ class InertialSpeed:
         self._late: deque[_Moment] = deque()
 
     def may_stand(self) -> bool:
-        """Whether the vehicle may stand still, within the uncertainty; true while the speed is unknown."""
+        """Whether the vehicle may be stationary, within the uncertainty; true while the speed is unknown."""
         return not self.sigma_mps <= _SIGMA_LIMIT_MPS or abs(self._speed_mps) <= 2 * self.sigma_mps
 
     def rest(self, mean_mps2: Sequence[float], dt_s: float, accel_mps2: Sequence[float], rotation: Floats) -> None:
@@ -72,7 +72,7 @@ class InertialSpeed:
         self.sigma_mps = min(self.sigma_mps, _SIGMA_ODOMETRY_MPS)
 
     def see_ground(self, error_mps: float, sigma_mps: float) -> None:
-        """Take by how much the speed is too low according to the ground, m/s, with 1 sigma."""
+        """Correct the speed by the ground's: by how much it is too low, m/s, with 1 sigma."""
         if self._up is None or not self.sigma_mps < inf:
             return
         variance = self.sigma_mps**2

@@ -1,4 +1,4 @@
-"""The latest samples of a sensor, and what they say about the interval between two exposures. No clock, no I/O."""
+"""The latest samples of a sensor, and their values over the interval between two exposures. No clock, no I/O."""
 
 import math
 from collections import Counter
@@ -32,7 +32,7 @@ class Span:
 
 
 class Track:
-    """Samples over a span, joined by straight lines; ``count`` rows are in use.
+    """Samples over a span, interpolated linearly; ``count`` rows are in use.
 
     ``times_s``: (rows,), the first 0 and the last dt; ``values``: (rows, columns).
     """
@@ -44,7 +44,7 @@ class Track:
         self.values = doubles(rows, columns)
 
     def mean(self) -> list[float]:
-        """Mean over time of each column."""
+        """Return the mean over time of each column."""
         last = self.count - 1
         whole_s = self.times_s[last]
         means = []
@@ -57,7 +57,7 @@ class Track:
         return means
 
     def turn(self, error_x: float, error_y: float, error_z: float, rotation: Doubles) -> None:
-        """Write the rotation (3, 3) of directions by the rates, rad/s, in the first three columns.
+        """Integrate the rates, rad/s, in the first three columns to a rotation (3, 3) of directions.
 
         The errors are subtracted from the rates. Ṙ = R·[ω]× for the camera's orientation, so a fixed direction turns by
         exp(-[ω]× dt) in the camera's axes; from sample to sample ω is the mean of both. Multiplied as quaternions.
@@ -89,7 +89,7 @@ class Track:
         rotation[2, 2] = 1 - scale * (x * x + y * y)
 
     def hold(self, dt_s: float, values: Sequence[float]) -> None:
-        """Hold the same values for so long."""
+        """Hold constant values for ``dt_s``."""
         self.count = 2
         self.times_s[0], self.times_s[1] = 0.0, dt_s
         for k in range(self.columns):
@@ -221,7 +221,7 @@ class Ring:
         return gap_ns * 1e-9
 
     def between(self, span: Span, track: Track) -> None:
-        """Samples over ``span``, interpolated at both its ends, held where there is none beyond them."""
+        """Write the samples over ``span``, interpolated at both its ends, or held where none lies beyond."""
         first = self.after(span.start_ns)
         last = max(first, self.after(span.end_ns - 1))
         track.count = last - first + 2
@@ -235,7 +235,7 @@ class Ring:
         self.interpolate(span.end_ns, last, track, track.count - 1)
 
     def interpolate(self, stamp_ns: int, i: int, track: Track, row: int) -> None:
-        """A row of a track: the value between the rows ``i`` - 1 and ``i``, or at the end that is there."""
+        """Set a row of a track by interpolation between the rows ``i`` - 1 and ``i``, or to the only one of them."""
         if i in (0, self.count):
             for k in range(self.columns):
                 track.values[row, k] = self.values[max(0, i - 1), k]
@@ -246,7 +246,7 @@ class Ring:
             track.values[row, k] = (1 - share) * self.values[i - 1, k] + share * self.values[i, k]
 
     def find_latest(self, window: Window, now_ns: int, length_ns: int, gap_limit_s: float) -> bool:
-        """Let a window hold the last ``length_ns``; False if the samples do not reach back or have gaps."""
+        """Set a window to the last ``length_ns``; return False if the samples do not reach back or have gaps."""
         start_ns = now_ns - length_ns
         window.first, window.last = max(0, self.after(start_ns) - 1), self.after(now_ns)
         if window.last - window.first < MIN_ROWS or self.stamps_ns[window.first] > start_ns:
@@ -257,7 +257,7 @@ class Ring:
         return True
 
     def repeats(self, window: Window, begin: int, end: int) -> int:
-        """How many rows of a window repeat the columns ``begin`` to before ``end`` of the row before."""
+        """Return how many rows of a window repeat the columns ``begin`` to before ``end`` of the row before."""
         count = 0
         for i in range(window.first + 1, window.last):
             k = begin
@@ -267,14 +267,14 @@ class Ring:
         return count
 
     def largest(self, window: Window, column: int) -> float:
-        """Largest size of a column in a window."""
+        """Return the largest magnitude in a column of a window."""
         most = 0.0
         for i in range(window.first, window.last):
             most = max(most, math.fabs(self.values[i, column]))
         return most
 
     def average(self, first: int, last: int) -> list[float]:
-        """Mean of each column over the rows ``first`` to before ``last``."""
+        """Return the mean of each column over the rows ``first`` to before ``last``."""
         means = []
         for k in range(self.columns):
             total = 0.0
@@ -284,7 +284,7 @@ class Ring:
         return means
 
     def deviation(self, window: Window, means: Sequence[float]) -> list[float]:
-        """1 sigma of each column over a window."""
+        """Return the standard deviation of each column over a window."""
         found = []
         for k in range(self.columns):
             mean, total = float(means[k]), 0.0
@@ -294,5 +294,5 @@ class Ring:
         return found
 
     def newest(self, window: Window) -> list[float]:
-        """The last row of a window."""
+        """Return the last row of a window."""
         return [float(self.values[window.last - 1, k]) for k in range(self.columns)]

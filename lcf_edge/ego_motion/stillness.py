@@ -1,4 +1,4 @@
-"""Whether the image stands still: corners are where they were half a second ago. No clock, no I/O."""
+"""Whether the image is stationary: corners are where they were half a second ago. No clock, no I/O."""
 
 import numpy as np
 import numpy.typing as npt
@@ -9,16 +9,16 @@ Pixels = npt.NDArray[np.int32]
 
 APART_NS = 500_000_000
 MIN_CORNERS = 40  # fewer do not decide
-NEAR_PX = 1  # motors shake corners by as much
+NEAR_PX = 1  # amplitude of a camera shaken by motors
 CELL_PX = 2
-SHARE = 0.7  # of the corners; others flicker, or are on moving things
+SHARE = 0.7  # of the corners; others flicker, or are on moving objects
 
 
 class Stillness:
     """For images of one size. Keeps where corners were, half a second to a second ago, in cells of 2 px.
 
-    ``then``, ``latest``: uint8, row after row of ``columns`` cells, 1 where a corner was near; with their stamps.
-    ``marks``: how many of both have been made; of one alone ``latest``.
+    ``then``, ``latest``: uint8, row-major, ``columns`` cells a row, 1 where a corner was near; with their stamps.
+    ``marks``: how many of both are valid; if one, ``latest``.
     """
 
     def __init__(self, width: int, height: int) -> None:
@@ -28,7 +28,7 @@ class Stillness:
         self.then_ns = self.latest_ns = self.marks = 0
 
     def look(self, stamp_ns: int, pixel: Pixels) -> bool | None:
-        """Take the corners of a frame, (n, 2) px. Return whether they stand still, None: undecided."""
+        """Take the corners of a frame, (n, 2) px. Return whether they are stationary, None: undecided."""
         corners = pixel.shape[0]
         if corners < MIN_CORNERS or (self.marks > 0 and stamp_ns < self.latest_ns):
             self.marks = 0
@@ -54,7 +54,7 @@ def mark(near: Bytes, columns: int, pixel: Pixels) -> None:
 
 
 def count_near(near: Bytes, columns: int, pixel: Pixels) -> int:
-    """How many corners, (n, 2) px, lie in marked cells."""
+    """Return how many corners, (n, 2) px, lie in marked cells."""
     number = 0
     for i in range(pixel.shape[0]):
         number += near[(pixel[i, 1] + NEAR_PX) // CELL_PX * columns + (pixel[i, 0] + NEAR_PX) // CELL_PX]
