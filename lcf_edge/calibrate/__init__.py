@@ -1,4 +1,4 @@
-"""``lcf-edge calibrate``: measures what the configuration must know of this camera and this IMU.
+"""``lcf-edge calibrate``: measures the parameters of this camera and this IMU for the configuration.
 
 ``camera`` finds the lens from views of a ``target``; ``rest`` the gyro's bias and noise; ``motions`` the IMU's axes
 from motions by hand; ``alignment`` those axes and the clocks' offset (``time_offset``) from the gyro against

@@ -1,8 +1,8 @@
-"""The gyro against the camera's own rotation: their axes and their clocks, found together.
+"""Aligns the gyro with the camera's rotation: axes and clock offset, estimated together.
 
 For an offset τ the gyro's mean rates g over the camera's intervals, both less their means (so that a constant bias does
-not matter), are turned onto the camera's rates c by the best rotation R. Their correlation Σ cᵀ R g / √(Σ cᵀc Σ gᵀg) is
-largest at the true τ.
+not matter), are rotated onto the camera's rates c by the best rotation R. Their correlation Σ cᵀ R g / √(Σ cᵀc Σ gᵀg)
+is largest at the true τ.
 """
 
 from collections.abc import Sequence
@@ -27,7 +27,7 @@ _FINE_S = 0.002
 _FINE_REACH_S = 0.02
 _RIVAL_FROM_S = 0.1  # from the best offset; nearer, the correlation has not fallen yet
 _ITERATIONS = 3
-_MAX_SIGMA_RADPS = 0.5  # 1 sigma of an interval's rate; beyond, its corners showed nothing
+_MAX_SIGMA_RADPS = 0.5  # 1 sigma of an interval's rate; beyond, its corners determine nothing
 _MIN_CORRELATION = 0.8
 _MIN_RATE_RADPS = 0.1  # root mean square
 _OUTLIER = 3.0  # times the median error
@@ -37,7 +37,7 @@ _MAX_SATURATED = 0.01  # of the samples
 
 @dataclass(frozen=True)
 class Alignment:
-    """What makes the gyro agree with the camera.
+    """The rotation and clock offset by which gyro and camera agree.
 
     ``offset_s``: camera time less IMU time. ``axes``: (3, 3), IMU's axes to the camera's. ``camera``, ``gyro``: (n, 3)
     rates of each interval in camera axes, rad/s, the gyro's turned and without its bias. ``weights``: (n,), of the
@@ -64,7 +64,7 @@ class Alignment:
 
     @cached_property
     def axes_sigma_rad(self) -> float:
-        """1 sigma of the rotation about its least known axis, rad; inf: it turned about one axis only."""
+        """1 sigma of the rotation about its worst axis, rad; inf: the motion was about one axis only."""
         squares = self.gyro**2
         information = (
             np.diag(self.weights @ squares.sum(axis=1, keepdims=True) * np.ones(3))
@@ -81,7 +81,7 @@ class Alignment:
 
 
 class _Gyro:
-    """Mean rates over any interval: samples are joined by straight lines and integrated."""
+    """Mean rates over any interval: samples are interpolated linearly and integrated."""
 
     def __init__(self, samples: Sequence[ImuSample], origin_ns: int) -> None:
         self._times_s = np.array([sample.stamp_ns - origin_ns for sample in samples]) * 1e-9
@@ -101,7 +101,7 @@ class _Gyro:
 
 
 class _Comparison:
-    """Camera and gyro at any offset between their clocks, with the weights of the robust fit."""
+    """Compares camera and gyro at any offset between their clocks, with the weights of the robust fit."""
 
     def __init__(self, turns: Sequence[Turn], samples: Sequence[ImuSample], around_s: float) -> None:
         origin_ns = turns[0].start_ns
@@ -139,7 +139,7 @@ class _Comparison:
         return bias, (rates - bias) @ rotation.T
 
     def weigh(self, offset_s: float) -> None:
-        """Give less weight to intervals that do not fit."""
+        """Down-weight intervals that do not fit."""
         _, gyro = self.turned(offset_s, self.fit(offset_s)[1])
         errors = np.sqrt(((self.camera - gyro) ** 2).sum(axis=1))
         self.weights = 1 / (1 + (errors / (_OUTLIER * max(float(np.median(errors)), 1e-6))) ** 2)

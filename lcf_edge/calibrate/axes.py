@@ -1,4 +1,4 @@
-"""The IMU's axes in the camera's: what is written, and whether they are exact ones."""
+"""The IMU's axes in camera axes: the value to write, snapped to exact ones where they are close."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The IMU's axes from its gyro against the camera's own rotation."""
+"""The IMU's axes from comparing its gyro with the camera's rotation."""
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from lcf_edge.calibrate.time_offset import guessed, painter
 from lcf_edge.config import Config
 
 _MAX_SIGMA_RAD = np.radians(1.0)
-_MAX_LAG_S = 0.01  # that the configuration does not know of
+_MAX_LAG_S = 0.01  # largest clock offset beyond the configured one
 
 
 def calibrate_by_camera(

@@ -1,4 +1,4 @@
-"""The lens, from views of a board (Zhang 2000, as OpenCV has it)."""
+"""The lens, from views of a board (Zhang 2000, with OpenCV's models)."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Camera and IMU watched together: the turns and samples they give, for ``by_camera`` and ``time_offset``."""
+"""Simultaneous rotations of the camera and samples of the IMU, for ``by_camera`` and ``time_offset``."""
 
 from dataclasses import dataclass, field
 

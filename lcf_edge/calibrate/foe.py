@@ -1,9 +1,9 @@
-"""How the camera is mounted: where a straight drive's focus of expansion lies, once rotation is taken out.
+"""The camera's mounting, from the focus of expansion of a straight drive, with rotation removed.
 
-Each interval between images has a rotation of its own, all have one direction of travel t in common. A corner's ray
-x, after x', then obeys x' · (t × R x) = 0. The distance from that line is made small over all intervals together:
-for each t the rotations are those that fit best, so only t's two slopes remain (variable projection, Gauss-Newton,
-Cauchy weights). No gyro is needed: its bias would move the focus by degrees.
+Each interval between images has its own rotation R; the direction of travel t is common to all. The ray x of a corner,
+and x' after the interval, then satisfy the epipolar constraint x' · (t × R x) = 0. The distance from that line is
+minimised over all intervals: for each t the rotations are the best-fitting ones, so only t's two slopes remain
+(variable projection, Gauss-Newton, Cauchy weights). No gyro is used: its bias would shift the focus by degrees.
 """
 
 from collections.abc import Callable, Sequence
@@ -35,7 +35,7 @@ LIVE_S = 20.0
 _MIN_MOTION_PX = 4.0
 _MAX_FRAMES = 5
 _MIN_INTERVALS = 12
-_MIN_PARALLAX_RAD = 0.004  # median flow that rotation does not explain; below, the vehicle stands
+_MIN_PARALLAX_RAD = 0.004  # median flow that rotation does not explain; below, the vehicle is stationary
 _STRAIGHT_RADPS = 0.06  # mean over _STRAIGHT_S
 _STRAIGHT_S = 1.0
 _MIN_STRAIGHT = 0.6  # of the intervals
@@ -50,7 +50,7 @@ _SETTLED = 1e-6
 
 @dataclass(frozen=True)
 class Focus:
-    """The direction of travel, x/z and y/z of the camera, with 1 sigma of each, and what it was found from."""
+    """The direction of travel, x/z and y/z of the camera, with 1 sigma of each, and the data behind it."""
 
     slope: Floats  # (2,)
     sigma: Floats  # (2,)

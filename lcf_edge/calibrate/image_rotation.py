@@ -1,8 +1,8 @@
-"""How the camera turned between two images, from the images.
+"""Rotation of the camera between two images, from tracked corners.
 
 With small rotations δ a ray (x, y, 1) moves by B δ, B = [[-xy, 1 + x², -y], [-(1 + y²), xy, x]] (Longuet-Higgins &
-Prazdny 1980). Driving moves it too, along the line through the focus of expansion. So errors along that line and across
-it are weighted separately and robustly: near corners count only across it, far ones both ways.
+Prazdny 1980). Translation moves it too, along the line through the focus of expansion. So errors along that line and
+across it are weighted separately and robustly: near corners count only across it, far ones in both directions.
 """
 
 from dataclasses import dataclass
@@ -23,7 +23,7 @@ _MIN_SCALE = 2e-4  # of x/z: about 0.1 px
 
 @dataclass(frozen=True)
 class Turn:
-    """Mean rate of the camera over an interval, rad/s in its axes, (3,), and 1 sigma of its weakest direction."""
+    """Mean rate of the camera over an interval, rad/s in its axes, (3,), and 1 sigma about its worst axis."""
 
     start_ns: int
     end_ns: int

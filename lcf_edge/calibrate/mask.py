@@ -1,8 +1,8 @@
-"""The vehicle's own parts in view: what never moves in the image while the vehicle drives and turns.
+"""The vehicle's own parts in view: regions that never move in the image while the vehicle drives and turns.
 
-The grey gradient of every pixel is averaged over the drive. Where something stands still in the image, the mean is as
-long as the root mean square of the gradients; where the world passes, they change and point anywhere. A plain surface
-has no gradients: it belongs to the vehicle when it reaches the border of the image and its rim stands still.
+The grey gradient of every pixel is averaged over the drive. Where the image is constant, the mean is as long as the
+root mean square of the gradients; where the world passes, they change and point anywhere. A plain surface has no
+gradients: it belongs to the vehicle if it reaches the border of the image and its rim is constant.
 """
 
 from collections.abc import Callable, Sequence
@@ -29,13 +29,13 @@ Polygon = list[list[float]]
 
 LIVE_S = 30.0
 
-_APART_S = 0.2  # images closer together show the same
+_APART_S = 0.2  # images closer together are too similar
 _MIN_FRAMES = 20
 _SMOOTH_PX = 1.0
 _STILL = 0.8  # least ratio of the mean gradient to the root mean square
 _TEXTURED = 6.0  # root mean square of the gradients; by Sobel's weights, 8 are one grey level a px
-_PASSES = 0.5  # least share of the textured pixels that must move, else the vehicle stood
-_WALLED = 0.7  # least share of a plain surface's rim that must stand still
+_PASSES = 0.5  # least share of the textured pixels that must move, else the vehicle was stationary
+_WALLED = 0.7  # least share of a plain surface's rim that must be constant
 _CLOSED_SHARE = 0.02  # of the image's width: gaps that are closed
 _MIN_SHARE = 0.001  # of the image
 _MAX_SHARE = 0.6
@@ -71,7 +71,7 @@ class Stillness:
 
 
 def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, guide: Guide) -> Result:
-    """``camera.mask`` by what never moves. Raises ``CalibrationError``."""
+    """``camera.mask`` of the parts that never move. Raises ``CalibrationError``."""
     if source.live:
         seconds = seconds or LIVE_S
         guide.say(f"Drive around for {seconds:g} s, past things, with turns to both sides.")
@@ -107,7 +107,7 @@ def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon]
 
 
 def own_parts(stillness: Stillness) -> Marked:
-    """What stands still, and the plain surfaces that it encloses. Raises ``CalibrationError``."""
+    """Parts that never move, with the plain surfaces that they enclose. Raises ``CalibrationError``."""
     if stillness.frames < _MIN_FRAMES:
         raise CalibrationError(
             f"camera: {stillness.frames} images {_APART_S:g} s apart, {_MIN_FRAMES} are needed; drive longer"
@@ -127,7 +127,7 @@ def own_parts(stillness: Stillness) -> Marked:
 
 
 def _enclosed(still: Marked, plain: Marked) -> Marked:
-    """Plain surfaces at the border of the image whose rim stands still."""
+    """Plain surfaces at the border of the image whose rim is constant."""
     count, label = cv2.connectedComponents(plain.astype(np.uint8), connectivity=4)
     rim = np.zeros(still.shape, np.bool_)
     around = cv2.dilate(label.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
@@ -141,7 +141,7 @@ def _enclosed(still: Marked, plain: Marked) -> Marked:
 
 
 def _solid(marked: Marked) -> Marked:
-    """Remove gaps, specks, and what does not reach the border of the image: it is no part of the vehicle."""
+    """Remove gaps, specks, and regions that do not reach the image's border: they are not part of the vehicle."""
     height, width = marked.shape
     reach = 2 * round(_CLOSED_SHARE * width / 2) + 1
     round_brush = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (reach, reach))
@@ -156,7 +156,7 @@ def _solid(marked: Marked) -> Marked:
 
 
 def outlines(own: Marked) -> list[Polygon]:
-    """Polygons around each part, the largest first, whole px."""
+    """Polygons around each part, the largest first, integer px."""
     grown = cv2.dilate(own.astype(np.uint8), np.ones((2 * _GROWN_PX + 1,) * 2, np.uint8))
     found, _ = cv2.findContours(grown, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
     simple = [cv2.approxPolyDP(each, _SMOOTHED_PX, True)[:, 0] for each in sorted(found, key=cv2.contourArea)[::-1]]

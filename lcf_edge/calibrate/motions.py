@@ -1,7 +1,7 @@
-"""The IMU's axes from motions by hand: gravity gives up, and each motion turns about a known axis of the vehicle.
+"""The IMU's axes from motions by hand: gravity shows which way is up, and each motion is about a known vehicle axis.
 
-The user is led through the steps; each ends when the vehicle stands still again. A hand is accurate to some 10°, so an
-IMU that sits square is recognised as such. Vehicle axes: x right, y down, z ahead.
+The user is guided through the steps; each ends when the vehicle is at rest again. Hand motions are accurate to some
+10°, enough to recognise an IMU that is mounted square. Vehicle axes: x right, y down, z ahead.
 """
 
 from collections.abc import Callable, Sequence
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 Floats = npt.NDArray[np.float64]
 
-_WINDOW_S = 0.6  # for which it must stand still at the end of a step
+_WINDOW_S = 0.6  # of rest, at the end of a step
 _REST_S = 4.0  # the same before the first step
 _EVERY_S = 0.1
 _STILL_GYRO_RADPS = 0.06
@@ -41,7 +41,7 @@ _UP_WEIGHT = 4.0  # weight of gravity, which is known better than a hand's axis
 
 @dataclass(frozen=True)
 class Step:
-    """A motion: what to do, least angle, axis of the vehicle (None: back to level), whether it tilts."""
+    """A motion: instruction, least angle, axis of the vehicle (None: back to level), whether it tilts."""
 
     prompt: str
     name: str

@@ -43,7 +43,7 @@ def save_figure(figure: "Figure", path: Path) -> None:
 
 
 def plain(axes: "Axes", title: str) -> None:
-    """Give a plot of curves the look that all of them share."""
+    """Apply the common style to a plot of curves."""
     axes.set_title(title, loc="left")
     axes.grid(alpha=0.25)
     axes.spines[["top", "right"]].set_visible(False)

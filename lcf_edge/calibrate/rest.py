@@ -27,7 +27,7 @@ GRAVITY_MPS2 = 9.81
 _MIN_S = 3.0
 _MIN_SAMPLES = 100
 _PIECE_S = 0.5
-_MOVED_RADPS = 0.02  # by which the mean of a piece may differ from that of all
+_MOVED_RADPS = 0.02  # largest difference of the mean of a part from that of the whole
 _MOVED_MPS2 = 0.2
 _QUIET_RADPS = 0.05  # 1 sigma of a sample; more is motion, not noise
 _QUIET_MPS2 = 0.5
@@ -39,7 +39,7 @@ _FRAME_NS = 50_000_000
 
 @dataclass(frozen=True)
 class Rest:
-    """What samples at rest show, in the IMU's axes.
+    """Statistics of samples at rest, in the IMU's axes.
 
     ``bias_radps``, ``noise_radps`` (1 sigma of a sample), ``wander_radps`` (of means over half a second),
     ``force_mps2`` (specific, so it points up), ``shake_mps2`` (1 sigma): (3,) each.
@@ -55,7 +55,7 @@ class Rest:
 
     @property
     def gravity_mps2(self) -> float:
-        """Length of gravity as this accelerometer measures it, m/s²."""
+        """Magnitude of gravity as this accelerometer measures it, m/s²."""
         return float(np.linalg.norm(self.force_mps2))
 
     @property

@@ -39,7 +39,7 @@ def calibrate_time(source: SensorSource, config: Config, seconds: float | None, 
 
 
 def beside(alignment: Alignment, by_s: float = 0.05) -> float:
-    """Return the correlation beside the peak, which says how sharp the peak is."""
+    """Return the correlation beside the peak, a measure of its sharpness."""
     both = [alignment.offset_s - by_s, alignment.offset_s + by_s]
     return float(np.interp(both, alignment.offsets_s, alignment.correlations).max())
 

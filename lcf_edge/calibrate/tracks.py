@@ -1,4 +1,4 @@
-"""Corners followed from image to image (Shi & Tomasi; pyramidal Lucas-Kanade, there and back again)."""
+"""Corners tracked from image to image (Shi & Tomasi; pyramidal Lucas-Kanade, forward and backward)."""
 
 from collections import Counter
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ _MAX_S = 0.5  # between two images
 
 @dataclass(frozen=True)
 class Tracks:
-    """Where corners were and are: x/z, y/z of the ideal pinhole, (n, 2) each."""
+    """Corners before and now: x/z, y/z of the ideal pinhole, (n, 2) each."""
 
     start_ns: int
     end_ns: int
@@ -38,7 +38,7 @@ class Tracks:
 
 
 class Tracker:
-    """Follows corners; ``left_out`` counts unusable intervals by reason.
+    """Tracks corners; ``left_out`` counts unusable intervals by reason.
 
     The next interval begins when the median corner has moved ``min_motion_px``, after ``max_frames`` images at
     the latest.
@@ -54,7 +54,7 @@ class Tracker:
         self._frames = 0
 
     def add(self, frame: Frame) -> Tracks | None:
-        """Follow into ``frame``. Return the interval that ends here, if one does."""
+        """Track into ``frame``. Return the interval that ends here, if one does."""
         last, self._last = self._last, frame
         if self._first is None or last is None:
             self._begin(frame)

@@ -16,8 +16,8 @@ CELLS = (8, 6)  # across and down, of the coverage
 
 _MAX_EDGE_PX = 5.0
 _MAX_MOTION_PX = 1.0  # between two images of a film
-_MAX_INTERVAL_S = 1.0  # a small computer takes most of that to find a board
-_MIN_CORNER_SHIFT = 0.08  # of the image's width, that the board's corners are from where they were in any other view
+_MAX_INTERVAL_S = 1.0  # a small computer takes nearly that long to find a board
+_MIN_CORNER_SHIFT = 0.08  # of the image's width: least shift of the board's corners from any other view
 _MIN_CORNER_SHIFT_OF_IMAGES = 0.01  # the same among single images, which the user chose
 _SIDES = (("upper", "middle", "lower"), ("left", "middle", "right"))
 _TILTED = 1.12  # least ratio of opposite sides of a tilted board
@@ -99,7 +99,7 @@ class Views:
 
 
 def _stands(sighting: Sighting, before: tuple[int, Sighting] | None, stamp_ns: int) -> bool:
-    """Whether the corners are where they were in the image before."""
+    """Whether the corners are where they were in the previous image."""
     if before is None or stamp_ns - before[0] > _MAX_INTERVAL_S * 1e9:
         return False
     _, now, then = np.intersect1d(sighting.numbers, before[1].numbers, return_indices=True)
