@@ -10,7 +10,7 @@ Item = TypeVar("Item")
 class Backlog(Generic[Item]):
     """Holds items in order. ``bytes``: what they take; ``dropped``: how many items did not fit.
 
-    Anything fits into an empty one.
+    An empty backlog accepts an item of any size.
     """
 
     def __init__(self, limit_bytes: int) -> None:

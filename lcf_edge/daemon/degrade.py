@@ -27,7 +27,7 @@ _WORDS_OF_A_RECORDING = {  # without mentioning a cable
 
 
 class Degradation:
-    """Follows the scenes; ``notes``: what is wrong at present, the worst first."""
+    """Watches the scenes; ``notes``: what is wrong at present, the worst first."""
 
     def __init__(self, config: Config) -> None:
         self.notes: tuple[str, ...] = ()
@@ -57,7 +57,7 @@ class Degradation:
         yield from (self._words[note] for note in scene.notes if note in self._words)
 
     def _too_slow(self, scene: PipelineScene, interval_s: float) -> Iterator[str]:
-        """Something still at depth ``filter.scene_depth_m`` and the image's edge moves by x V dt / Z in a frame."""
+        """Check the scene's motion per frame, x V dt / Z, at the image's edge and at ``filter.scene_depth_m``."""
         moved_px = scene.image_width / 2 * abs(scene.vehicle_speed) * interval_s / self._depth_m
         if moved_px > self._leap_px:  # false for NaN
             yield (

@@ -1,4 +1,4 @@
-"""File descriptors in reserve, so that strangers who use up all others cannot keep devices and files from opening."""
+"""File descriptors in reserve, so that devices and files can be opened even if peers use up all others."""
 
 import os
 import threading

@@ -1,4 +1,4 @@
-"""The thread that waits for the disk, so that no other must: messages go from the backlog to files."""
+"""The thread that writes messages from the backlog to files, so that no other thread waits for the disk."""
 
 import errno
 import threading
@@ -30,7 +30,7 @@ class EndOfFile:
 
 
 class DiskWriter(threading.Thread):
-    """Writes what comes out of ``backlog``, until that is closed and empty. A disk that fails costs only messages.
+    """Writes the messages of ``backlog``, until that is closed and empty. If the disk fails, only messages are lost.
 
     For others to read: ``trouble`` (why nothing is written; None: all is well), ``file``, ``counts``,
     ``written_bytes``.

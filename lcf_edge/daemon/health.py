@@ -1,4 +1,4 @@
-"""How each part of the daemon is, for the diagnostics and for systemd's status line."""
+"""The state of each part of the daemon, for the diagnostics and for systemd's status line."""
 
 import math
 import time

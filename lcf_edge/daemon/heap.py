@@ -1,4 +1,4 @@
-"""Keeps resident memory small: one heap for all threads, and nothing that only the start needed."""
+"""Keeps resident memory small: one heap for all threads, and nothing that only startup needed."""
 
 import ctypes
 import re
@@ -30,7 +30,7 @@ def trim() -> None:
 
 
 def leave_start(smaps: Path = Path("/proc/self/smaps")) -> None:
-    """Release free memory, and code and constants of libraries; what is used of these is loaded again."""
+    """Release free memory, and code and constants of libraries; pages in use are loaded again on demand."""
     trim()
     advise = ctypes.CDLL(None).madvise
     for start, length in as_in_files(smaps.read_text("utf-8", "replace")):

@@ -1,4 +1,4 @@
-"""What the daemon needs from its link to the outside."""
+"""The interface that the daemon needs of its link to the outside."""
 
 from collections import Counter
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ class Link(Protocol):
         ...
 
     def put_diagnostics(self, status: Sequence[DeviceStatus], stamp_ns: int) -> None:
-        """Publish how each part is."""
+        """Publish the status of each part."""
         ...
 
     def has_preview_subscriber(self) -> bool:
@@ -68,5 +68,5 @@ class Link(Protocol):
         ...
 
     def close(self) -> None:
-        """Close it, in bounded time."""
+        """Close the link, in bounded time."""
         ...

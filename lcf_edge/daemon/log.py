@@ -1,4 +1,4 @@
-"""Logs: one line an event on standard error, for journald or a terminal, never a flood."""
+"""Logs: one line per event on standard error, for journald or a terminal, rate-limited."""
 
 import faulthandler
 import logging

@@ -1,4 +1,4 @@
-"""What is passed between two threads: the newest item, or a fixed ring of samples. Every loss is counted."""
+"""Queues between two threads: the newest item, or a fixed ring of samples. Every loss is counted."""
 
 import threading
 from collections import deque
@@ -30,14 +30,14 @@ class Newest(Generic[Item]):
         self._arrived = threading.Condition()
 
     def put(self, item: Item) -> None:
-        """Hold ``item`` in place of what was there."""
+        """Hold ``item`` in place of the previous one."""
         with self._arrived:
             self.overtaken += self._item is not None
             self._item = item
             self._arrived.notify()
 
     def take(self, timeout_s: float) -> Item | None:
-        """Wait for the item and return it; None: none came in time."""
+        """Wait for an item and return it; None: timeout."""
         with self._arrived:
             self._arrived.wait_for(lambda: self._item is not None or self._closed, timeout_s)
             item, self._item = self._item, None
@@ -61,7 +61,7 @@ class SampleRing(Generic[Sample]):
         self._arrived = threading.Condition()
 
     def put(self, samples: Sequence[Sample]) -> None:
-        """Append samples, oldest first; the oldest make room."""
+        """Append samples, oldest first; the oldest ones are dropped to make room."""
         with self._arrived:
             self.overtaken += max(len(self._samples) + len(samples) - self._capacity, 0)
             self._samples.extend(samples)
@@ -69,7 +69,7 @@ class SampleRing(Generic[Sample]):
             self._arrived.notify()
 
     def wait_until(self, stamp_ns: int, timeout_s: float, silent_ns: int) -> bool:
-        """Wait for a sample of ``stamp_ns`` or later; False: it did not come in time.
+        """Wait for a sample of ``stamp_ns`` or later; False: timeout.
 
         Does not wait when the newest is more than ``silent_ns`` older: the sensor is silent.
         """

@@ -1,4 +1,4 @@
-"""The memory budget of the whole process: checked at the start, watched, and kept by shedding."""
+"""The memory budget of the whole process: checked at startup, monitored, and enforced by shedding."""
 
 import os
 import weakref
@@ -40,7 +40,7 @@ class ResidentMemory:
 
 
 def needs_mib(config: Config) -> dict[str, float]:
-    """Return what each part needs, MiB, without the preview, which is given up first. Raises ``ConfigError``."""
+    """Return the need of each part, MiB, without the preview, which is given up first. Raises ``ConfigError``."""
     camera = config.camera
     pixels = camera.width * camera.height
     table_bytes = sum(Pipeline(config, Lens.from_config(camera, camera.width, camera.height)).table_bytes().values())
@@ -102,7 +102,7 @@ class MemoryWatch:
         self.shed: list[str] = []
 
     def check(self) -> None:
-        """Measure, and give up the next thing if it is too much; one a call, so that it can take effect."""
+        """Measure, and give up the next item if it is too much; one a call, so that it can take effect."""
         self.resident_mib = self._measure_mib()
         if self.resident_mib <= self._mark_mib or not self._order:
             return

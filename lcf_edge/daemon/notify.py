@@ -24,7 +24,7 @@ class Notifier:
         self.watchdog_s = int(microseconds) / 1e6 if mine and microseconds.isdecimal() else None
 
     def ready(self) -> None:
-        """Say that the start, or a reload, is over."""
+        """Report that the start, or a reload, is complete."""
         self._send("READY=1")
 
     def status(self, text: str) -> None:
@@ -37,11 +37,11 @@ class Notifier:
             self._send("WATCHDOG=1")
 
     def reloading(self) -> None:
-        """Say that a reload begins; ``ready`` ends it."""
+        """Report that a reload begins; ``ready`` ends it."""
         self._send(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}")
 
     def stopping(self) -> None:
-        """Say that the daemon is ending."""
+        """Report that the daemon is stopping."""
         self._send("STOPPING=1")
 
     def close(self) -> None:

@@ -27,7 +27,7 @@ class Outputs:
             sink.start()
 
     def put(self, frame: Frame, scene: PipelineScene, view: Callable[[], View]) -> int:
-        """Pass a frame and its scene to each. Return when the first had it, monotonic ns."""
+        """Pass a frame and its scene to each sink. Return when the first had received it, monotonic ns."""
         first_ns: int | None = None
         for sink in self._working:
             try:
@@ -39,7 +39,7 @@ class Outputs:
         return first_ns or time.monotonic_ns()
 
     def put_sample(self, sample: ImuSample | SpeedSample) -> None:
-        """Pass a sample to each."""
+        """Pass a sample to each sink."""
         for sink in self._working:
             sink.put_sample(sample)
 
@@ -60,7 +60,7 @@ class Outputs:
         return [*(status for status in working if status is not None), *failed]
 
     def sheddings(self) -> list[Shedding]:
-        """Return what the sinks can give up when memory is short, in order."""
+        """Return, in order, what the sinks can release when memory is short."""
         return [Shedding(sink.sheds, sink.shed) for sink in self._sinks if sink.sheds]
 
     def close(self) -> None:

@@ -1,8 +1,8 @@
-"""Memory that peers make the daemon keep: given back before anything of its own is given up.
+"""Memory that peers make the daemon hold: reclaimed before anything of its own is given up.
 
-Zenoh has no limit for what peers declare. So above the mark, peers are dealt with first: free memory is returned to
-the system; the connections that are charged with much growth are cut; and if that does not help, because something
-stays behind when a peer goes, the session is reopened.
+Zenoh has no limit for what peers declare. So above the threshold, peers are dealt with first: free memory is returned
+to the system; the connections that are charged with much growth are cut; and if that does not help, because something
+remains when a peer disconnects, the session is reopened.
 """
 
 import time
@@ -14,10 +14,10 @@ from lcf_edge.daemon.log import LOGGER
 from lcf_edge.daemon.memory import SHED_AT
 
 CHECK_S = 0.05
-LOOK_S = 0.25  # between looks at connections, which take longer than measuring memory
-LOOK_AT_MIB = 1.0  # growth of memory after which it looks at once
+LOOK_S = 0.25  # between checks of the connections, which take longer than measuring memory
+LOOK_AT_MIB = 1.0  # growth of memory after which they are checked at once
 CUT_AT_MIB = 1.0  # charged to one connection
-EFFECT_S = 0.5  # that a cut or a renewal takes to have an effect
+EFFECT_S = 0.5  # delay until a cut or a renewal takes effect
 RENEW_AT_MIB = 4.0  # charged to all since the last renewal
 RENEW_EACH_S = 10.0
 
@@ -43,7 +43,7 @@ class PeersMemory:
 
     @property
     def blamed(self) -> bool:
-        """Whether peers are charged with much, or the effect of acting on them is still awaited."""
+        """Whether peers are charged with much growth, or the effect of acting on them is still pending."""
         return self._acted or self._laid_to_peers_mib > RENEW_AT_MIB
 
     def check(self, budget_mib: float) -> None:
@@ -66,7 +66,7 @@ class PeersMemory:
             self._act()
 
     def _act(self) -> None:
-        """Act on peers, if they are charged with much."""
+        """Act on peers, if they are charged with much growth."""
         now_s = self._now_s()
         exceeded = now_s >= self._within_s + EFFECT_S  # in spite of cuts
         much = self._laid_to_peers_mib > RENEW_AT_MIB
@@ -95,5 +95,5 @@ class PeersMemory:
 
     @property
     def _laid_to_peers_mib(self) -> float:
-        """Charged to peers since the last renewal."""
+        """MiB charged to peers since the last renewal."""
         return self._link.charged_mib - self._charged_before_mib

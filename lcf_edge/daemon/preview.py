@@ -1,4 +1,4 @@
-"""The preview: the overlay drawn beside the pipeline, one at a time, while somebody subscribes."""
+"""The preview: the overlay, drawn in parallel to the pipeline, one at a time, while somebody subscribes."""
 
 import threading
 from collections.abc import Callable
@@ -52,13 +52,13 @@ class Previewer(Sink):
         self._off = True
 
     def close(self) -> None:
-        """Draw nothing more; what is being drawn may still be sent."""
+        """Draw no more images; one in progress may still be sent."""
         self._closing = True
         self._next.close()
         self.join(_ENDS_WITHIN_S)
 
     def join(self, timeout_s: float) -> bool:
-        """Wait until nothing is being drawn; False: something still is."""
+        """Wait until no image is being drawn; False: timeout."""
         if self._thread.ident is not None:
             self._thread.join(timeout_s)
         return not self._thread.is_alive()

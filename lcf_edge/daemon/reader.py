@@ -1,4 +1,4 @@
-"""One thread a device: keeps it open, passes on what it delivers, and knows its state."""
+"""One thread per device: keeps it open, passes on its data, and tracks its state."""
 
 import threading
 from collections import Counter

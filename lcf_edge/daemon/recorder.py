@@ -1,7 +1,7 @@
-"""The recorder: what the pipeline took and made, encoded in one thread and written in another.
+"""The recorder: input and output of the pipeline, encoded in one thread and written in another.
 
-Whoever gives it something never waits: that goes into an inbox of fixed size, then, encoded, into a backlog of fixed
-size or the ring of the last seconds. What does not fit is dropped and counted, images first.
+Callers never wait: records go into an inbox of fixed size, then, encoded, into a backlog of fixed size or the ring of
+the last seconds. Records that do not fit are dropped and counted, images first.
 """
 
 import threading
@@ -73,11 +73,11 @@ class Recorder(Sink):
         self._inbox.put(sample, _SAMPLE_BYTES)
 
     def put_diagnostics(self, stamp_ns: int, statuses: Sequence[DeviceStatus]) -> None:
-        """Record how each part of the daemon is."""
+        """Record the status of each part of the daemon."""
         self._inbox.put(Statuses(stamp_ns, statuses), _STATUSES_BYTES)
 
     def show_config(self, config: Config) -> None:
-        """Take the configuration that is now in effect; it is attached to the file."""
+        """Take the configuration now in effect; it is attached to the file."""
         self._encoder.config = self._disk.config = config
         self._backlog.limit_bytes = self._buffer_bytes
 
@@ -91,11 +91,11 @@ class Recorder(Sink):
         self._disk.start()
 
     def close(self) -> None:
-        """Take nothing more; what was taken is still written."""
+        """Accept nothing more; what was accepted is still written."""
         self._inbox.close()
 
     def join(self, timeout_s: float) -> bool:
-        """Wait until all is written and the file closed; False: it did not happen in time."""
+        """Wait until all is written and the file closed; False: timeout."""
         deadline_s = time.monotonic() + timeout_s
         for thread in (self._encoding, self._disk):
             if thread.ident is not None:
@@ -104,12 +104,12 @@ class Recorder(Sink):
 
     @property
     def dropped(self) -> int:
-        """Records and messages that did not fit, or that the disk did not take."""
+        """Number of records and messages that did not fit, or that the disk refused."""
         return self._inbox.dropped + self._backlog.dropped + self._disk.counts["lost"]
 
     @property
     def frames(self) -> int:
-        """Frames that were written."""
+        """Number of frames written."""
         return self._disk.counts["pictures"]
 
     def status(self) -> DeviceStatus:
@@ -191,7 +191,7 @@ def _stamp_ns(record: FrameAndScene | Statuses) -> int:
 
 
 def _threatens(scene: PipelineScene, ttc_s: float) -> bool:
-    """Whether an object will probably be met within ``ttc_s``, or a rebel circle that belongs to none."""
+    """Whether ``ttc_s`` is undercut by an object with probable contact, or by a rebel circle without an object."""
     circles, objects = scene.circles, scene.objects
     alone = (circles["kind"] == Kind.REBEL) & (scene.circle_objects == 0)
     met = objects["probability"] >= _PROBABLE

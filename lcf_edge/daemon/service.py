@@ -1,4 +1,4 @@
-"""The main thread: starts the others, does what is due once a second, obeys signals, and ends all in order."""
+"""The main thread: starts the others, runs periodic tasks once a second, handles signals, and shuts down in order."""
 
 import gc
 import math

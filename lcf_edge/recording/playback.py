@@ -1,8 +1,8 @@
-"""A recording as camera, IMU and odometry: its frames and samples are delivered at the pace of the recording.
+"""A recording as camera, IMU and odometry: its frames and samples are delivered at the recording's own rate.
 
 All devices opened on one recording with one clock share a ``Playback``: they start together, from whichever thread they
-are opened, and stay aligned to the nanosecond. At its end a recording begins again, one average frame interval later,
-with stamps and numbers that go on. Once all devices are closed, it starts anew.
+are opened, and stay aligned to the nanosecond. At its end a recording loops, one average frame interval later, with
+stamps and sequence numbers that continue. Once all devices are closed, it starts from the beginning.
 """
 
 import random
@@ -126,7 +126,7 @@ class Playback:
 class _Recorded(Generic[Record]):
     """One kind of a recording's records as a device, from the moment at which it is opened.
 
-    ``counts``: ``dropped`` by the fault of that name; of a camera also ``overtaken``, as a real one counts it.
+    ``counts``: ``dropped`` by the fault of that name; of a camera also ``overtaken``, counted as by a real one.
     """
 
     kind: type[Record]
@@ -178,7 +178,7 @@ class _Recorded(Generic[Record]):
         return list(records)
 
     def close(self) -> None:
-        """Let the recording go."""
+        """Release the recording."""
         if self._playback is not None:
             self._playback.leave()
             self._playback = None

@@ -1,4 +1,4 @@
-"""The overlay: two panels that show what the filter made of a frame.
+"""The overlay: two panels that show the filter's results for a frame.
 
 Left, the Line expert: corners (yellow dots), those omitted by ψ (red dots), estimated normal edges (blue
 squares), λ groups (green lines from each edge to the group's centre), ψ (yellow circles and rectangles).

@@ -1,4 +1,4 @@
-"""A recording of the replay: images, samples and what was found in them, as ``lcf-edge record`` writes it."""
+"""A recording of the replay: images, samples and results, as ``lcf-edge record`` writes it."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -18,7 +18,7 @@ _TRANSFORM_EVERY_NS = 1_000_000_000
 
 
 class RecordingSink(Sink):
-    """A new MCAP file with the stamps of the recording that is replayed, and ``config`` attached.
+    """A new MCAP file with the stamps of the replayed recording, and ``config`` attached.
 
     Raises ``UsageError`` for a name that exists or does not end in ``.mcap``, ``SinkError`` when the file cannot be
     written, ``CdrError`` for stamps that ROS cannot hold.

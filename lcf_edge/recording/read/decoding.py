@@ -1,4 +1,4 @@
-"""From encoded bytes to luminance; the size is checked before memory is taken for it."""
+"""From encoded bytes to luminance; the size is checked before memory is allocated for it."""
 
 import os
 import re
@@ -131,7 +131,7 @@ def _checked(data: bytes) -> tuple[tuple[int, int], bytes]:
 
 
 def _png(data: bytes) -> tuple[tuple[int, int], bytes]:
-    """Check every chunk, because the decoder would make up what is missing.
+    """Check every chunk, because the decoder would invent what is missing.
 
     Only chunks of the image itself are passed on: texts and profiles unpack to megabytes, an animation has images of
     other sizes.

@@ -147,7 +147,7 @@ class _Channels:
     topics: dict[int, McapTopic] = field(default_factory=dict)
 
     def take(self, record: _Record) -> McapMessage | None:
-        """Learn from a record. Return the message, if it is one."""
+        """Take a record of any kind. Return the message, if it is one."""
         if record.opcode == Opcode.SCHEMA:
             schema = _parse(mcap.records.Schema.read, record)
             self.schemas[schema.id] = _named(record, schema.name)

@@ -1,4 +1,4 @@
-"""What every kind of recording has in common: delivery order, one image size, counted skips."""
+"""Base of every kind of recording: delivery order, one image size, counted skips."""
 
 import bisect
 import heapq

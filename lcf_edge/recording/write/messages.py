@@ -1,6 +1,6 @@
 """From records to messages: what is recorded of each, on which topic.
 
-A message waits with a stamp of the monotonic clock, which the file replaces by one of the system clock.
+A message is queued with a stamp of the monotonic clock, which the file replaces by one of the system clock.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Sequence

@@ -1,4 +1,4 @@
-"""How ``ros2 bag play`` is to publish a topic: what rosbag2 finds in the channel as ``offered_qos_profiles`` (YAML)."""
+"""How ``ros2 bag play`` is to publish a topic: rosbag2's ``offered_qos_profiles`` (YAML) in the channel."""
 
 from lcf_edge.recording.write.messages import RecordedTopic
 

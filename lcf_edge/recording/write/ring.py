@@ -1,4 +1,4 @@
-"""The last seconds, kept in memory until something makes them worth saving."""
+"""The last seconds, kept in memory until an event makes them worth saving."""
 
 from collections import deque
 
