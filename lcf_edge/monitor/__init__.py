@@ -1,4 +1,4 @@
-"""Views of a running daemon: ``live`` follows it, ``terminal`` and ``web`` show it.
+"""Views of a running daemon: ``live`` receives its data, ``terminal`` and ``web`` show them.
 
 ``replay`` plays a recording in place of the daemon.
 

@@ -1,5 +1,5 @@
-"""What viewers know of a running daemon: subscribed over Zenoh, in memory of fixed size.
+"""State of a running daemon for viewers: subscribed over Zenoh, in memory of fixed size.
 
-``daemon_address`` says which daemon; ``monitor`` holds the newest of everything and whether the daemon is there;
+``daemon_address`` identifies the daemon; ``monitor`` holds the latest data and whether the daemon is present;
 ``history`` the last seconds as they were sent, ``traces`` the figures of the last minutes; ``lines`` a scene as JSON.
 """

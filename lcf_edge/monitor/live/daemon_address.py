@@ -1,4 +1,4 @@
-"""Which daemon."""
+"""The address of a daemon."""
 
 from dataclasses import dataclass
 

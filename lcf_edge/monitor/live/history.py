@@ -1,4 +1,4 @@
-"""The last seconds of what was received, as it was sent."""
+"""The messages of the last seconds, as they were sent."""
 
 import threading
 from collections import deque
@@ -30,7 +30,7 @@ class History:
         self._lock = threading.Lock()
 
     def add(self, message: ReceivedMessage) -> None:
-        """Keep a message; the oldest of its topic make room."""
+        """Keep a message; the oldest of its topic are dropped to make room."""
         topic = message.topic
         with self._lock:
             self._kept[topic].append(message)

@@ -1,4 +1,4 @@
-"""The newest of everything that a daemon publishes, and whether it is there."""
+"""The latest of everything that a daemon publishes, and whether it is present."""
 
 import math
 import threading
@@ -45,7 +45,7 @@ _PAUSE_NS = 1_000_000_000  # without scenes; then the rate begins anew
 
 
 class Presence(Enum):
-    """Whether a daemon is there, by its liveliness token."""
+    """Whether a daemon is present, by its liveliness token."""
 
     SOUGHT = "sought"  # not found yet
     THERE = "there"
@@ -54,7 +54,7 @@ class Presence(Enum):
 
 @dataclass(frozen=True, slots=True)
 class Preview:
-    """A preview, and the scene of the same frame if that came too."""
+    """A preview, and the scene of the same frame if that was received too."""
 
     image: CompressedImage
     received_ns: int
@@ -63,7 +63,7 @@ class Preview:
 
 @dataclass(frozen=True, slots=True)
 class Ahead:
-    """The part of the way ahead that a vehicle takes up, by its configuration."""
+    """The space ahead that a vehicle will sweep, by its configuration."""
 
     half_width_m: float
     horizon_s: float
@@ -71,7 +71,7 @@ class Ahead:
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """Where a recording is, which is shown in place of a daemon; seconds after its first image."""
+    """Playback position of a recording shown in place of a daemon; seconds after its first image."""
 
     position_s: float
     length_s: float  # as far as it is known
@@ -84,7 +84,7 @@ class Replay:
 
 @dataclass(frozen=True, slots=True)
 class Snapshot:
-    """All that is known at one moment; times are of this machine's system clock, ns."""
+    """The state at one moment; times are of this machine's system clock, ns."""
 
     version: int  # counts what came
     presence: Presence
@@ -102,16 +102,16 @@ class Snapshot:
     ahead: Ahead | None = None  # None: not known
 
     def scene_age_s(self, now_ns: int) -> float:
-        """Time since the newest scene came, s; infinite: none yet."""
+        """Time since the latest scene was received, s; infinite: none yet."""
         return math.inf if self.scene is None else max(now_ns - self.scene_received_ns, 0) / 1e9
 
 
 class Monitor:
     """Subscribes to the daemon of ``address`` in Zenoh's threads, now or once it is there, and again after a loss.
 
-    Previews come only while they are wanted (``switch_preview``); otherwise none are drawn. ``changed`` is called in
-    those threads whenever something came; it must be quick. ``history`` keeps what came. Raises ``PublishError`` for
-    an invalid address.
+    Previews are received only while they are wanted (``switch_preview``); otherwise none are drawn. ``changed`` is
+    called in those threads after each message; it must be quick. ``history`` keeps the messages. Raises
+    ``PublishError`` for an invalid address.
     """
 
     def __init__(
@@ -147,7 +147,7 @@ class Monitor:
             raise PublishError(f"{address.prefix}: {reason(error)}; name another prefix") from error
 
     def snapshot(self) -> Snapshot:
-        """The newest of everything."""
+        """Return the current state."""
         with self._lock:
             return Snapshot(
                 self._version,
@@ -166,7 +166,7 @@ class Monitor:
             )
 
     def switch_preview(self, on: bool) -> None:
-        """Subscribe to previews, or no longer."""
+        """Subscribe to previews, or unsubscribe."""
         with self._wanting:
             if on and self._preview_subscriber is None:
                 self._preview_subscriber = self._subscribe(PREVIEW, self._take_preview)

@@ -27,7 +27,7 @@ TABLES = (
 
 
 class Point(msgspec.Struct, frozen=True):
-    """What was known at one moment; None: unknown."""
+    """Figures at one moment; None: unknown."""
 
     at_ns: int  # system clock of this machine
     rate_hz: float | None
@@ -102,7 +102,7 @@ class Traces:
         self._lock = threading.Lock()
 
     def add(self, point: Point) -> None:
-        """Keep a point; the oldest makes room; points that are later, because the clock was set back, are removed."""
+        """Keep a point, dropping the oldest if full, and any later ones if the clock was set back."""
         with self._lock:
             while self._points and self._points[-1].at_ns >= point.at_ns:
                 self._points.pop()

@@ -1,4 +1,4 @@
-"""Where in a recording something comes to be met: the whole of it is filtered once, beside what is played."""
+"""Where in a recording a contact becomes probable: all of it is filtered once, in parallel to playback."""
 
 import math
 import threading
@@ -12,7 +12,7 @@ from lcf_edge.recording.pace import Pace
 from lcf_edge.recording.read import open_recording
 
 PROBABLY = 0.5  # least probability of being met for an alarm
-_APART_S = 0.5  # an alarm sooner after another counts as the same
+_APART_S = 0.5  # an alarm sooner after another one counts as the same
 
 
 def met(scene: Scene) -> set[int]:

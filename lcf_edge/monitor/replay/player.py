@@ -1,4 +1,4 @@
-"""Plays a recording through the pipeline, at a pace, and can pause, seek and step."""
+"""Plays a recording through the pipeline, at a given pace; can pause, seek and step."""
 
 import math
 import threading
@@ -82,7 +82,7 @@ class Player:
             self._thread.join()
 
     def play(self, playing: bool) -> None:
-        """Play, at the end from the beginning; or pause."""
+        """Play, from the beginning if at the end; or pause."""
         with self._changing():
             if not playing:
                 self._preview = None  # the last drawn may be an earlier one
@@ -146,7 +146,7 @@ class Player:
             )
 
     def switch_preview(self, on: bool) -> None:
-        """Draw previews, or no longer."""
+        """Start or stop drawing previews."""
         with self._condition:
             self._preview_on = on
             self._condition.notify()

@@ -1,4 +1,4 @@
-"""Which recording is shown, and what a viewer can ask of it."""
+"""The recording that is shown, and the commands that a viewer can give."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -36,7 +36,7 @@ class Command(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     value: float = 0.0
 
     def give(self, player: "Player") -> None:
-        """Carry it out."""
+        """Execute it."""
         match self.do:
             case "play" | "pause":
                 player.play(self.do == "play")

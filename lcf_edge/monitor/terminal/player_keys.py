@@ -1,4 +1,4 @@
-"""What the keys of ``lcf-edge watch RECORDING`` do."""
+"""The keys of ``lcf-edge watch RECORDING``."""
 
 from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
@@ -11,7 +11,7 @@ SEEK_S = 5.0
 
 
 class PlayerKeys:
-    """Space: play or pause; s: step; arrows: 5 s to and fro; p, n: previous and next alarm; + and -: speed."""
+    """Space: play or pause; s: step; arrows: 5 s back and forward; p, n: previous and next alarm; + and -: speed."""
 
     def __init__(self, player: "Player") -> None:
         self._player = player
@@ -27,7 +27,7 @@ class PlayerKeys:
         }
 
     def obey(self, keys: bytes) -> None:
-        """Carry out each key in turn; ignore others."""
+        """Execute the command of each key in turn; ignore other keys."""
         while keys:
             key = next((key for key in self._keys if keys.startswith(key)), keys[:1])
             if key in self._keys:

@@ -1,4 +1,4 @@
-"""What the terminal shows: as much of it as fits, the most urgent first."""
+"""The terminal's contents: as much as fits, the most urgent first."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -207,7 +207,7 @@ class Screen:
         width: int,
         lines: int,
     ) -> Sequence[Text]:
-        """How many there are, and below it as many as fit; what has no room is counted."""
+        """Their number, and below it as many as fit; the others are counted."""
         shown = rows[: max(lines - _TABLE_HEAD, 0)]
         hidden = f", {len(rows) - len(shown)} not shown" if len(shown) < len(rows) else ""
         head = Text.assemble(*count, hidden, no_wrap=True, overflow="ellipsis")
@@ -223,7 +223,7 @@ class Screen:
         return [head, *table] if lines > _TABLE_HEAD else [head]
 
     def _devices(self) -> tuple[list[Text], list[Text]]:
-        """A line for each that is not well, the worst first; one for all that are."""
+        """A line for each device with a problem, the worst first; one for all others."""
         diagnostics = self.snapshot.diagnostics
         if diagnostics is None:
             return [], []

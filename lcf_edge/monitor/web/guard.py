@@ -1,4 +1,4 @@
-"""Who may look: only this machine, or whoever knows the token.
+"""Access control: only this machine, or whoever knows the token.
 
 On loopback every request must name a loopback host, so that no web page can point a name of its own here (DNS
 rebinding). Opened to the network, a request must bring the token instead, which no such page knows. In both cases the

@@ -39,7 +39,7 @@ class _Outflow:
 
 
 def mcap_parts(messages: Sequence[ReceivedMessage], prefix: str) -> Iterator[bytes]:
-    """The file of ``messages``, which are in the order of their arrival, in parts of about ``CHUNK_BYTES``."""
+    """Yield the file of ``messages``, given in order of arrival, in parts of about ``CHUNK_BYTES``."""
     outflow = _Outflow()
     writer = Writer(outflow, CHUNK_BYTES, CompressionType.LZ4)  # type: ignore[arg-type]
     writer.start("ros2", f"lcf-edge {__version__}")

@@ -1,4 +1,4 @@
-"""What the page receives: the newest of everything as JSON, and an image behind it when there is a new one."""
+"""Updates for the page: the current state as JSON, followed by an image when there is a new one."""
 
 import math
 import time
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 @dataclass(slots=True)
 class Audience:
-    """What one browser has received already."""
+    """What one browser has already received."""
 
     sent_version: int = -1
     diagnostics_ns: int = -1
