@@ -19,7 +19,7 @@ class Kind(IntEnum):
 
 
 class Cause(IntEnum):
-    """Why a rebel circle is one."""
+    """Why a circle is a rebel."""
 
     NONE = 0
     CROSSING = 1  # drifts off its flow line
@@ -28,7 +28,7 @@ class Cause(IntEnum):
 
 
 class ObjectClass(IntEnum):
-    """What an object does, over ground. Other numbers, of newer or faulty senders, are ``UNKNOWN``."""
+    """An object's motion over ground. Other numbers, of newer or faulty senders, are ``UNKNOWN``."""
 
     UNKNOWN = 0
     STANDING = 1
@@ -147,7 +147,7 @@ class Sizes:
 
 @dataclass(frozen=True, slots=True)
 class Timing:
-    """Where the time of one frame went, µs."""
+    """Processing times of one frame, µs."""
 
     detect: int = 0
     filter: int = 0

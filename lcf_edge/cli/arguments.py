@@ -1,4 +1,4 @@
-"""What can be typed: commands and their options, with help that ``--help`` shows."""
+"""Commands and their options, with the help that ``--help`` shows."""
 
 import argparse
 import math
@@ -26,7 +26,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 def parser() -> argparse.ArgumentParser:
-    """Of the whole program; the result has ``command``, for calibrate also ``what``."""
+    """Return the parser of the whole program; its result has ``command``, for calibrate also ``what``."""
     program = _Parser(
         prog="lcf-edge",
         allow_abbrev=False,

@@ -1,7 +1,7 @@
-"""``lcf-edge bench``: how fast the filter is on this computer, on a drive that it renders itself.
+"""``lcf-edge bench``: the filter's speed on this computer, on a drive that it renders itself.
 
-Half of the time as fast as it can, half at the rate of a camera, where caches go cold and the processor's governor may
-slow down between two frames. No camera, no Zenoh: only ``Pipeline.process`` is measured.
+Half of the time frames follow without pauses, half at the rate of a camera, where caches go cold and the processor's
+governor may slow down between two frames. No camera, no Zenoh: only ``Pipeline.process`` is measured.
 """
 
 import os
@@ -37,7 +37,7 @@ Event = Frame | ImuSample | SpeedSample
 
 @dataclass(frozen=True, slots=True)
 class Measured:
-    """Frames of one way to run: stages in ms, (n, 3) of detect, filter, whole; CPU time of all that, s a frame."""
+    """Measurements at one frame rate: stages in ms, (n, 3) of detect, filter, whole; CPU time, s a frame."""
 
     stages_ms: npt.NDArray[np.float64]
     cpu_s: float
@@ -65,7 +65,7 @@ def bench(seconds: float, say: Say) -> None:
 
 
 class Drive:
-    """A rendered drive, held in memory, that can be taken again and again."""
+    """A rendered drive, held in memory, that can be repeated."""
 
     def __init__(self) -> None:
         drive = scenes.make(KIND, SEED, seconds=DRIVE_S)
@@ -103,7 +103,7 @@ def _step(pipeline: Pipeline, samples: Sequence[ImuSample | SpeedSample], frame:
 
 
 def measure(drive: Drive, seconds: float, rate_hz: float | None) -> Measured:
-    """Run for so long, until one frame counts at least; ``rate_hz``: of the camera, None: without pauses."""
+    """Measure for ``seconds``, but at least one frame; ``rate_hz``: of the camera, None: without pauses."""
     stages_us: list[tuple[int, int, int]] = []
     corners: list[int] = []
     cpu_s: list[float] = []

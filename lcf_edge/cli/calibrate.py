@@ -26,7 +26,7 @@ SNAP_BY_HAND_DEG = 15.0  # a motion by hand is no more accurate
 
 @dataclass(frozen=True)
 class Task:
-    """What all calibrations share: where data come from and go to. ``file``: configuration; None: the usual one."""
+    """Options common to all calibrations: source and destination. ``file``: configuration; None: the usual one."""
 
     config: Config
     file: Path | None

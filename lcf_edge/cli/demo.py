@@ -205,7 +205,7 @@ def _finish(subscriber: subprocess.Popen[str], sent: int) -> Received:
 
 
 def _draw(recording: Recording, config: Config, folder: Path, drawn: list[int], video: VideoSink | None) -> None:
-    """Draw by a second run: the same input gives the same output."""
+    """Draw in a second run: the same input gives the same output."""
     with video or nullcontext():
         for frame, outcome in run(recording, config):
             panels = draw(frame.image, outcome.scene, outcome.view())

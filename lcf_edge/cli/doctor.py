@@ -1,4 +1,4 @@
-"""``lcf-edge doctor``: what a vehicle's computer, devices and configuration lack, and how to fix it."""
+"""``lcf-edge doctor``: problems of a vehicle's computer, devices and configuration, and how to fix them."""
 
 import os
 import sys

@@ -1,4 +1,4 @@
-"""Which of a rendered drive's threats the filter found, and how soon."""
+"""The threats of a rendered drive that the filter found, and how soon."""
 
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence

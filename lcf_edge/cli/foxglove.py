@@ -1,4 +1,4 @@
-"""``lcf-edge foxglove``: what a running daemon sees, for the Foxglove app."""
+"""``lcf-edge foxglove``: the output of a running daemon, for the Foxglove app."""
 # ruff: noqa: PLC0415
 
 import signal

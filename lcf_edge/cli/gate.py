@@ -15,7 +15,7 @@ DAEMON_PORT = 7448
 
 
 def gate(tls: Path | None, host: str | None, port: int, to: str | None, write_line: Callable[[str], None]) -> None:
-    """Let parties through to the daemon on this machine until a signal ends it. Raises ``LcfError``."""
+    """Pass authorised parties through to the daemon on this machine until a signal ends it. Raises ``LcfError``."""
     import asyncio
     import socket
 

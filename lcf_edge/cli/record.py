@@ -12,7 +12,7 @@ from lcf_edge.sinks import cannot_write, check_output, refuse_existing
 
 
 def record(file: Path, seconds: float | None, path: Path | None, settings: Sequence[str]) -> str:
-    """Record until a signal ends it, or for so long from the first image on. Return the summary.
+    """Record until a signal ends it, or for a time from the first image on. Return the summary.
 
     ``file``: a name that ends in ``.mcap`` is a file's, one without an ending a folder's. Raises ``UsageError`` for a
     name that exists or cannot be used, ``SinkError`` for one that cannot be written, ``LcfError`` when no image was

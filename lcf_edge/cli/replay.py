@@ -1,4 +1,4 @@
-"""``lcf-edge replay``: the pipeline over a recording, and the outputs that the user asks for."""
+"""``lcf-edge replay``: runs the pipeline over a recording, with the requested outputs."""
 
 import math
 import os
@@ -33,7 +33,7 @@ _SLOWEST_VIDEO, _FASTEST_VIDEO = 2.0, 120.0  # frames/s
 
 @dataclass(frozen=True, slots=True)
 class Outputs:
-    """What a replay writes."""
+    """The outputs of a replay."""
 
     results: str | None = None  # a file, "-": standard output
     video: Path | None = None
@@ -45,7 +45,7 @@ class Outputs:
 def replay(path: Path, config: Config, outputs: Outputs, pace: Pace, warn: Say) -> list[str]:
     """Run the pipeline over a recording. Return the summary, line by line.
 
-    ``outputs.recording`` is a new MCAP file, with images, samples and what was found. ``warn`` gets the recording's
+    ``outputs.recording`` is a new MCAP file, with images, samples and results. ``warn`` gets the recording's
     warnings, also when the replay fails. Raises ``RecordingError`` for a recording without a usable frame,
     ``SinkError`` for an output that cannot be written, ``CdrError``, ``PublishError``, ``UsageError``.
     """
@@ -117,7 +117,7 @@ def frame_rate(recording: Recording, config: Config) -> float:
 
 
 def _paced(recording: Recording, config: Config, pace: Pace, sinks: Sequence[Sink]) -> Iterator[tuple[Frame, Outcome]]:
-    """Yield each frame with its outcome, when it is due; in a loop lap after lap, each with an empty filter.
+    """Yield each frame with its outcome, when it is due; if looped, each lap starts with an empty filter.
 
     ``sinks`` get each sample.
     """

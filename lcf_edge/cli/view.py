@@ -1,4 +1,4 @@
-"""``lcf-edge view``: a page for a browser, of what a running daemon sees or a recording shows."""
+"""``lcf-edge view``: a page for a browser that shows a running daemon, or a recording."""
 # ruff: noqa: PLC0415
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""``lcf-edge watch``: what a running daemon sees, or a recording shows, in a terminal or line by line."""
+"""``lcf-edge watch``: shows a running daemon, or a recording, in a terminal or line by line."""
 # ruff: noqa: PLC0415
 
 import time

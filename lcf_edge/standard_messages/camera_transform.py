@@ -1,4 +1,4 @@
-"""``tf2_msgs/msg/TFMessage``: where the camera sits on the vehicle, for ``/tf_static``."""
+"""``tf2_msgs/msg/TFMessage``: the camera's pose on the vehicle, for ``/tf_static``."""
 
 from lcf_edge.cdr import Writer
 from lcf_edge.standard_messages.positions import Setup, quaternion

@@ -1,4 +1,4 @@
-"""``vision_msgs/msg/Detection2DArray`` and ``Detection3DArray`` (version 4: from Humble on): what each object is."""
+"""``vision_msgs/msg/Detection2DArray`` and ``Detection3DArray`` (version 4: from Humble on): objects as detections."""
 
 import numpy as np
 
@@ -42,7 +42,7 @@ def encode_detections_3d(scene: Scene, setup: Setup) -> bytes:
 
 
 def _hypothesis(writer: Writer, thing: np.void, max_trust: float, middle: Floats, covariance: Floats) -> None:
-    """The only one."""
+    """The only hypothesis."""
     writer.scalars("I", 1)
     writer.string(class_name(thing))
     writer.scalars("d", min(max(float(thing["trust"]) / max_trust, 0.0), 1.0))

@@ -1,8 +1,8 @@
-"""``sensor_msgs/msg/PointCloud2``: what will probably be met, as a source for Nav2's obstacle layer.
+"""``sensor_msgs/msg/PointCloud2``: objects with probable contact, as a source for Nav2's obstacle layer.
 
 The points of an object lie across its box, so close that no cell of a costmap between them stays empty. Behind them,
 ``CLEAR_M`` ahead, is a row of points over the whole width of the image, level with the camera: an obstacle layer marks
-nothing that far, but clears the way up to them, so that what is gone leaves the map.
+nothing that far, but clears the space up to them, so that objects that are gone leave the map.
 """
 
 import numpy as np

@@ -17,7 +17,7 @@ _OPTICAL_FROM_BODY = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.
 
 @dataclass(frozen=True)
 class Setup:
-    """What the messages say besides the scene: lens and frames, where the camera sits over ``base_frame``, bounds."""
+    """What the messages need besides the scene: lens, frames, the camera's pose over ``base_frame``, and limits."""
 
     lens: Lens
     frame_id: str = "camera"

@@ -1,4 +1,4 @@
-"""How fast the vehicle may go for what it will meet: ``geometry_msgs/msg/TwistStamped``, and Nav2's own message."""
+"""The speed limit that expected contacts impose: ``geometry_msgs/msg/TwistStamped``, and Nav2's own message."""
 
 import math
 

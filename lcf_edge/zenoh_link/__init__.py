@@ -3,8 +3,8 @@
 ``session`` opens and closes it; ``admission`` says what a daemon takes in; ``publisher`` puts messages, ``scene``,
 ``preview`` and ``diagnostics`` those of one key each; ``ros2`` shows them to nodes under rmw_zenoh; ``speed_input`` and
 ``queryables`` listen; ``subscription`` is the other end; ``own_gate`` starts the process before the daemon's loopback
-port; ``link`` is all of it for the daemon. A process never goes on in a fork while a session is open: others are
-programs started anew.
+port; ``link`` combines them for the daemon. No process forks while a session is open: others are started as new
+programs.
 """
 
 from lcf_edge.zenoh_link.publisher import ATTACHMENT

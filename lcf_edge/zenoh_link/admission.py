@@ -1,4 +1,4 @@
-"""What a daemon that listens only on this machine accepts from others: what it needs, and nothing else.
+"""Access rules of a daemon that listens only on this machine: it accepts what it needs, and nothing else.
 
 Every local process can connect. It may read all that the daemon publishes, query it, and send the speed; it cannot send
 scenes, answers or tokens to others through the daemon, nor fill its memory with large messages.
@@ -17,7 +17,7 @@ MAX_MESSAGE_BYTES = 2**14
 def settings(options: Zenoh, publish: Publish) -> dict[str, str]:
     """Return settings of Zenoh, as JSON by key, to be used unless the user's file has others.
 
-    A daemon that connects to routers, is one, or speaks to ROS 2 routes for others as well, by keys that it cannot
+    A daemon that connects to routers, is one, or speaks to ROS 2, also routes for others, with keys that it cannot
     know: there are no rules then.
     """
     chosen = {"transport/link/rx/max_message_size": str(MAX_MESSAGE_BYTES)}

@@ -1,9 +1,9 @@
-"""Who is connected, and how much of the daemon's memory each is charged with.
+"""Open connections, and how much of the daemon's memory each is charged with.
 
-Zenoh keeps what peers declare, has no limit for it, and does not say who declared what. So whenever the memory of the
-process has grown, the connections that have brought something meanwhile are charged with it, each by its share, but
-with no more than its bytes can have caused. TCP counts bytes, and so does a gate; other Unix sockets do not: what is
-left unexplained is charged to all of them alike.
+Zenoh keeps what peers declare, has no limit for it, and does not report who declared what. So whenever the memory of
+the process has grown, the connections that have sent data meanwhile are charged with it, each by its share, but with no
+more than its bytes can have caused. TCP counts bytes, and so does a gate; other Unix sockets do not: the unexplained
+rest is charged to all of them equally.
 """
 
 import os
@@ -38,7 +38,7 @@ class Connections:
         self._charges_mib: dict[Connection, float] = {}
 
     def charge(self, grown_mib: float) -> None:
-        """Charge connections by what each has brought since the last call, while memory grew by that much (0: not)."""
+        """Charge connections for growth of memory since the last call, in proportion to their bytes (0: no growth)."""
         try:
             received = {number: self._bytes_received(one) for number, one in _accepted()}
         except OSError:  # no descriptor is left to look with: the next look counts this one's
@@ -68,7 +68,7 @@ class Connections:
         self._charges_mib[number] += charge_mib
 
     def cut(self, charge_mib: float) -> int:
-        """Shut down those that are charged with that much or more. Return how many."""
+        """Shut down connections that are charged with that much or more. Return how many."""
         guilty = {number for number, charge in self._charges_mib.items() if charge >= charge_mib}
         cut = 0
         with suppress(OSError):  # no descriptor is left to look with

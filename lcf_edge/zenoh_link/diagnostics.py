@@ -1,4 +1,4 @@
-"""Diagnostics: how each device and the pipeline are."""
+"""Diagnostics: the status of each device and of the pipeline."""
 
 from collections.abc import Sequence
 
@@ -15,7 +15,7 @@ DIAGNOSTICS = ZenohTopic("diagnostics", "diagnostic_msgs/msg/DiagnosticArray", z
 
 
 class DiagnosticsPublisher:
-    """Puts what is known of every device on ``<prefix>/diagnostics``."""
+    """Puts the status of every device on ``<prefix>/diagnostics``."""
 
     def __init__(self, session: zenoh.Session, publish: config.Publish, ros2: Ros2Node | None = None) -> None:
         self._robot = publish.robot
@@ -23,5 +23,5 @@ class DiagnosticsPublisher:
         self.counts = self._publisher.counts
 
     def put(self, status: Sequence[DeviceStatus], stamp_ns: int) -> None:
-        """Send one status a device, as of ``stamp_ns`` of the system clock."""
+        """Send one status per device, as of ``stamp_ns`` of the system clock."""
         self._publisher.put(encode_diagnostics(stamp_ns, self._robot, status))

@@ -1,4 +1,4 @@
-"""Everything that goes over Zenoh for one daemon."""
+"""All Zenoh traffic of one daemon."""
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
@@ -68,7 +68,7 @@ class Link:
 
     @property
     def counts(self) -> Counter[str]:
-        """What happened so far, by part: ``scene sent``, ``speed stale``, ``query answered``, …"""
+        """Counts so far, by part: ``scene sent``, ``speed stale``, ``query answered``, …"""
         parts = self._parts
         received = Counter({"bytes received": self._connections.received_bytes})
         gate = Counter[str]() if self._gate is None else self._gate.counts
@@ -86,7 +86,7 @@ class Link:
 
     @property
     def charged_mib(self) -> float:
-        """What was charged to peers so far, MiB."""
+        """Memory charged to peers so far, MiB."""
         return self._connections.charged_mib
 
     def cut(self, charge_mib: float) -> int:

@@ -1,7 +1,7 @@
-"""The daemon's own gate: a process before its plain TCP ports on loopback, which any local program can reach.
+"""The daemon's own gate: a process in front of its plain TCP ports on loopback, which any local program can reach.
 
 Zenoh has no limits for the keys that others declare: two of them end the daemon. So the session listens on a Unix
-socket that only this user can reach, and the gate lets others through to it.
+socket that only this user can reach, and the gate admits others to it.
 """
 
 import ipaddress
@@ -36,7 +36,7 @@ _TCP = re.compile(r"tcp/\[?(?P<host>[^\]#?/]+)\]?:(?P<port>\d+)")
 def gated(options: Zenoh, publish: Publish) -> list[str]:
     """Return the endpoints that get a gate.
 
-    None for a daemon that connects to others or is to be found by them: they say more than a gate lets through.
+    None for a daemon that connects to others or is to be discovered by them: a gate would block part of that traffic.
     """
     simple = options.mode == "peer" and not options.connect and not options.gossip and not publish.ros2
     return [endpoint for endpoint in options.listen if options.gate and simple and _address(endpoint)]
@@ -63,8 +63,8 @@ def _address(endpoint: str) -> tuple[str, int] | None:
 class OwnGate:
     """Listens at ``endpoints``, and leads to ``endpoint``, in a folder of its own.
 
-    A gate that ends is started again; meanwhile the ports stay, and those who come wait. ``report``: what an operator
-    should know. Raises ``PublishError`` for a port that cannot be listened on.
+    A gate that ends is started again; meanwhile the ports stay, and clients wait. ``report`` gets messages for an
+    operator. Raises ``PublishError`` for a port that cannot be listened on.
     """
 
     def __init__(self, endpoints: Sequence[str], prefix: str, report: Callable[[str], object]) -> None:

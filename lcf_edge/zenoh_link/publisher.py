@@ -1,4 +1,4 @@
-"""Puts the messages of one topic, and with ROS 2 on, the same samples where rmw_zenoh looks for them."""
+"""Puts the messages of one topic, and with ROS 2 on, the same samples under rmw_zenoh's key."""
 
 import struct
 import threading

@@ -16,7 +16,7 @@ Answer = Callable[[], tuple[bytes, str] | str]
 
 
 class Queryables:
-    """Answers queries for each name in a thread of its own: a client that asks and does not listen delays no other.
+    """Answers queries for each name in a thread of its own, so that a client that does not listen delays no other.
 
     ``counts``: ``answered``, ``refused`` (there was no answer yet), ``failed``, ``overtaken`` (by newer ones while
     they waited), ``unknown`` (no name was meant).
@@ -64,7 +64,7 @@ class Queryables:
             del query  # else it would end only with the next one
 
     def _answer(self, query: zenoh.Query) -> None:
-        """Its end, with that of the last name for it, tells the client that no more answers come."""
+        """Answer a query. When it is dropped by the last name, the client learns that no more answers follow."""
         meant = {key: answer for key, answer in self._answers.items() if query.key_expr.intersects(key)}
         for key, answer in meant.items():
             self.counts[_reply(query, key, answer())] += 1

@@ -1,4 +1,4 @@
-"""What makes a Zenoh session a ROS 2 node for those that speak rmw_zenoh: keys, and liveliness tokens.
+"""Makes a Zenoh session a ROS 2 node for rmw_zenoh: keys, and liveliness tokens.
 
 As in the design document of ros2/rmw_zenoh: samples of a topic go to ``<domain>/<topic>/<type>/<hash>``; each node
 and each of its publishers and subscriptions is announced by a token under ``@ros2_lv``.
@@ -38,14 +38,14 @@ EndpointKind = Literal["MP", "MS"]
 
 
 class Endpoint(NamedTuple):
-    """Where the samples of a publisher go, or those for a subscription come from, and its 16 bytes of identity."""
+    """Key of a publisher's or subscription's samples, and its 16 bytes of identity."""
 
     key: str
     gid: bytes
 
 
 def gid_of(name: str) -> bytes:
-    """As rmw_zenoh makes it of an entity's token: XXH3 of 128 bits, little-endian."""
+    """Return the identity that rmw_zenoh derives from an entity's token: XXH3 of 128 bits, little-endian."""
     return xxhash.xxh3_128_digest(name.encode())[::-1]
 
 

@@ -1,4 +1,4 @@
-"""Scenes: every frame, ahead of everything else."""
+"""Scenes: one per frame, at the highest priority."""
 
 import zenoh
 
@@ -16,14 +16,14 @@ SCENE_ENCODING = SCENE.encoding
 
 
 def scene_key(prefix: str) -> str:
-    """Key under which scenes go out."""
+    """The key of scenes."""
     return SCENE.key(prefix)
 
 
 class ScenePublisher:
     """Puts each scene on ``<prefix>/scene``, and with ``publish.ros2`` on its ROS 2 topic.
 
-    A liveliness token ``<prefix>/@alive/<robot>`` shows that it is there. It lives as long as its session. ``ros2``:
+    A liveliness token ``<prefix>/@alive/<robot>`` shows its presence. It lives as long as its session. ``ros2``:
     the node to which the topic belongs; None with ``publish.ros2`` on: its own. ``latest``: the last payload. Raises
     ``PublishError`` when ``publish.prefix`` or ``publish.robot`` is no valid key.
     """

@@ -1,4 +1,4 @@
-"""The vehicle's own odometry, as it arrives on ``<prefix>/speed``: checked, or refused and counted.
+"""The vehicle's own odometry from ``<prefix>/speed``: samples are checked, and refused ones counted.
 
 A sample is a ``nav_msgs/msg/Odometry`` or a ``geometry_msgs/msg/TwistStamped``; the speed is the twist's linear x,
 the yaw rate its angular z. The sender's clock must agree with ours to within ``MAX_AHEAD_S``.

@@ -1,6 +1,6 @@
-"""Messages that other programs know, beside the scene: each has a key of ``publish``, made while somebody subscribes.
+"""Standard messages besides the scene: each has a key of ``publish``, and is made while somebody subscribes.
 
-The camera's place goes out once a second, so that late subscribers get it too.
+The camera's pose is sent once a second, so that late subscribers get it too.
 """
 
 from collections import Counter
@@ -95,7 +95,7 @@ class StandardMessages:
                 publisher.put(encode(scene, self._setup_for(scene.image_width, scene.image_height)))
 
     def put_transform(self, stamp_ns: int) -> None:
-        """Send where the camera sits, as of ``stamp_ns`` of the system clock. Raises ``CdrError``."""
+        """Send the camera's pose, as of ``stamp_ns`` of the system clock. Raises ``CdrError``."""
         if self._transform is not None and self._transform.matched:
             camera = self.config.camera
             setup = Setup.from_config(self.config, lens_by_config(self.config, camera.width, camera.height))

@@ -1,4 +1,4 @@
-"""The subscriber's end: scenes as they arrive."""
+"""The subscriber's side: scenes as they arrive."""
 
 import weakref
 from collections.abc import Iterator
@@ -16,8 +16,8 @@ from lcf_edge.zenoh_link.session import close_session, open_session, reason
 def reading_from(endpoint: str, config_file: str = "") -> config.Zenoh:
     """Return the options of a session that only reads: it waits for a daemon or a router at ``endpoint``.
 
-    It is of mode "router", a leaf since it listens nowhere: a router hands a peer nothing from other peers, and a
-    client cannot wait.
+    Its mode is "router", a leaf since it listens nowhere: a router passes a peer nothing from other peers, and a client
+    cannot wait.
     """
     return config.Zenoh(mode="router", connect=[endpoint], listen=[], config_file=config_file)
 

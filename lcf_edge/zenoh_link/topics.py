@@ -1,4 +1,4 @@
-"""What is published under which name, and how."""
+"""The published topics: names, types and settings."""
 
 from dataclasses import dataclass
 
@@ -17,7 +17,7 @@ from lcf_edge.standard_messages import (
 
 @dataclass(frozen=True, slots=True)
 class ZenohTopic:
-    """What is published under a prefix, and how."""
+    """A published topic."""
 
     name: str  # "scene"
     message: str  # "lcf_msgs/msg/Scene"

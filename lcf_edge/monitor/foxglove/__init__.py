@@ -1,1 +1,1 @@
-"""``lcf-edge foxglove``: what a running daemon sees, for the Foxglove app (``relay``)."""
+"""``lcf-edge foxglove``: the output of a running daemon, for the Foxglove app (``relay``)."""
