@@ -1,8 +1,8 @@
-"""``python -m benchmarks.budgets``: what each process may take of a core and of memory, and what it takes here.
+"""``python -m benchmarks.budgets``: budgets of CPU and memory for each process, and its measured use.
 
-The daemon drives a rendered drive again and again, in place of a camera of 30 frames a second and a 200 Hz IMU. The
-other processes come to it one after the other, each with somebody who uses it, and are measured for as long as asked.
-Shares are of one core of this computer, with whatever else runs on it.
+The daemon replays a rendered drive in a loop, in place of a 30 Hz camera and a 200 Hz IMU. The other processes connect
+to it one after the other, each with a client, and are measured for the given time. Shares are of one core of this
+computer, with whatever else runs on it.
 """
 
 import argparse
@@ -39,7 +39,7 @@ PATIENCE_S = 30.0
 
 @dataclass(frozen=True, slots=True)
 class Budget:
-    """What one process may take: of a core of the computer in ``results/budgets.md``, and of memory at its peak."""
+    """The budget of one process: share of a core of the computer in ``results/budgets.md``, and peak memory."""
 
     core_share: float
     memory_mib: float
@@ -59,7 +59,7 @@ BUDGETS = {
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """What a process took. ``daemon_share``: of a core, of the daemon meanwhile; None: it is the daemon."""
+    """The use of one process. ``daemon_share``: of a core, by the daemon meanwhile; None: it is the daemon."""
 
     core_share: float
     peak_mib: float
@@ -68,7 +68,7 @@ class Use:
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where the daemon is: its folder, and the ports for those on this machine and for the gate."""
+    """The daemon's folder, and its ports for local clients and for the gate."""
 
     folder: Path
     local: str
@@ -80,7 +80,7 @@ User = Callable[[Place], AbstractContextManager[int]]
 
 
 def measure(seconds: float, *, drive_s: float = 10.0) -> dict[str, Use]:
-    """Measure every process for so long. Raises ``LcfError`` where one does not begin, or openssl is missing."""
+    """Measure every process for ``seconds``. Raises ``LcfError`` if one does not start, or openssl is missing."""
     with tempfile.TemporaryDirectory() as name:
         place = Place(Path(name), f"tcp/127.0.0.1:{free_port()}", free_port())
         drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=FRAMES_HZ)
@@ -112,7 +112,7 @@ def _use(process: int, seconds: float, daemon: int | None = None) -> Use:
 
 @contextmanager
 def _daemon(place: Place, *command: str) -> Iterator[int]:
-    """It and a subscriber in this process."""
+    """The daemon, with a subscriber in this process."""
     program = (sys.executable, "-m", "benchmarks.session_daemon", str(place.folder), *command)
     with _started((*program, "-c", str(place.folder / "config.toml"))) as daemon, _subscribed(place.local):
         yield daemon.pid
@@ -157,7 +157,7 @@ def _watch(place: Place) -> Iterator[int]:
 
 
 def _read_away(descriptor: int) -> None:
-    """Take what is written until nobody can write any more."""
+    """Read and discard until the other end is closed."""
     with open(descriptor, "rb", buffering=0) as terminal:  # of a descriptor
         try:
             while terminal.read(2**16):
@@ -207,7 +207,7 @@ def _foxglove(place: Place) -> Iterator[int]:
 def _served(
     place: Place, command: str, scheme: str, look: Callable[[str, threading.Event], Coroutine[Any, Any, None]]
 ) -> Iterator[int]:
-    """A command that serves, and who looks at it in a thread of this process."""
+    """A command that serves, with a client in a thread of this process."""
     with _started((*_LCF_EDGE, command, "--connect", place.local, "--port", "0")) as process:
         assert process.stdout
         address = next(word for word in process.stdout.readline().decode().split() if word.startswith(scheme))

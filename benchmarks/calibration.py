@@ -1,8 +1,8 @@
-"""``python -m benchmarks.calibration``: whether the numbers of objects are right, and their sigmas honest.
+"""``python -m benchmarks.calibration``: accuracy of objects' numbers, and whether their sigmas are consistent.
 
-The planner with the truth drives through worlds of the closed loop and the pipeline looks on; or rendered drives are
-played. Every object is compared with the body that it lies on: the one with whose box in the image its own overlaps
-most, its middle being inside (grown by a quarter and 8 px).
+The planner with ground truth drives through worlds of the closed loop while the pipeline observes; or rendered drives
+are played. Every object is compared with the body that it lies on: the one whose box in the image overlaps its own
+most and contains its centre (grown by a quarter and 8 px).
 """
 
 import argparse
@@ -31,10 +31,10 @@ from lcf_edge.rendered import scenes
 from lcf_edge.rendered.projection import Stage
 
 _GROWN_SHARE, _GROWN_PX = 0.25, 8.0
-_NEAR_S = 4.0  # contact below which the goals hold
-_GRACE_S = 0.3  # in sight for so long before it counts
-_HIDDEN_S = 0.5  # through which an id is kept
-_SPAN_S = 1.0  # shorter ones say nothing about ids
+_NEAR_S = 4.0  # time to contact below which the goals apply
+_GRACE_S = 0.3  # time in sight before it counts
+_HIDDEN_S = 0.5  # time out of sight over which an id must be kept
+_SPAN_S = 1.0  # shorter appearances do not count for ids
 _ASIDE_M, _ASIDE_MPS = 0.3, 0.3  # beside the half width, and outwards: somebody who leaves
 _IMMINENT_S, _IMMINENT_M = 2.0, 0.2
 _BANDS_M = (0.0, 3.0, 6.0, 12.0, math.inf)
@@ -80,7 +80,7 @@ class Pair:
         return math.isfinite(float(getattr(self.body, _QUANTITIES[quantity][0])))
 
     def sigmas_off(self, quantity: str) -> float:
-        """Its error in its own standard deviations; NaN: not known."""
+        """Error divided by its own sigma; NaN: not known."""
         true = float(getattr(self.body, _QUANTITIES[quantity][0]))
         sigma = self.sigmas[quantity]
         return (self.values[quantity] - true) / sigma if sigma > 0 else math.nan
@@ -88,7 +88,7 @@ class Pair:
 
 @dataclass
 class _Sight:
-    """A walker as long as he is in sight."""
+    """A walker while he is in sight."""
 
     first_s: float
     last_s: float
@@ -97,7 +97,7 @@ class _Sight:
 
 @dataclass
 class Calibration:
-    """What was seen so far; ``see`` takes one frame after the other of each drive."""
+    """Statistics so far; ``see`` takes one frame after the other of each drive."""
 
     pairs: list[Pair] = field(default_factory=list)
     objects_of_walkers: list[int] = field(default_factory=list)  # how many lay on a walker in sight, a frame each
@@ -160,7 +160,7 @@ class Calibration:
 
 
 def match(objects: Objects, known: Sequence[Exact]) -> list[Exact | None]:
-    """Of each object the body that it lies on."""
+    """Return for each object the body that it lies on."""
     found: list[Exact | None] = []
     for thing in objects:
         x, y, width, height = (float(thing[name]) for name in ("x", "y", "width", "height"))
@@ -288,7 +288,7 @@ def _errors(found: Calibration, by: str) -> Table:
 
 
 def _sigmas(found: Calibration) -> Table:
-    """Shares of the truths inside; the median of error over sigma shows a bias."""
+    """Shares of the true values within so many sigmas; the median of error over sigma shows a bias."""
     rows = []
     for quantity in _QUANTITIES:
         off = np.array([pair.sigmas_off(quantity) for pair in found.pairs if pair.known(quantity)])
@@ -335,7 +335,7 @@ def _chances(found: Calibration) -> Table:
 
 
 class _Onlooker:
-    """The planner with the truth drives, the pipeline looks on."""
+    """The planner with ground truth drives, the pipeline observes."""
 
     def __init__(self, world: World, found: Calibration, of: str) -> None:
         self._reported = reported_objects(world, of)
@@ -354,7 +354,7 @@ class _Onlooker:
 
 
 def look_on(seeds: Iterable[int], found: Calibration, of: str = OBJECTS) -> Iterator[str]:
-    """Worlds of the closed loop; yields the name of each that is done."""
+    """Run worlds of the closed loop; yields the name of each that is done."""
     for seed in seeds:
         world = worlds.make(seed)
         drive(world, _Onlooker(world, found, of))
@@ -362,7 +362,7 @@ def look_on(seeds: Iterable[int], found: Calibration, of: str = OBJECTS) -> Iter
 
 
 def play(kinds: Iterable[str], seeds: Sequence[int], found: Calibration, of: str = OBJECTS) -> Iterator[str]:
-    """Rendered drives; yields the name of each that is done."""
+    """Play rendered drives; yields the name of each that is done."""
     for kind in kinds:
         for seed in seeds:
             spec = scenes.make(kind, seed)

@@ -1,8 +1,8 @@
-"""``python -m benchmarks.closed_loop``: who drives best through the same worlds, with the same planner.
+"""``python -m benchmarks.closed_loop``: compares methods by driving the same worlds with the same planner.
 
-Every driver drives through every world. The planner with the truth in hand, of what is in sight, shows what could be
-had, a blind vehicle what was at stake. Prints the tables and writes them to ``benchmarks/results/drive.md``; writes a
-video of the worst drive.
+Every driver drives through every world. The planner with the ground truth of everything in sight is the upper bound, a
+blind vehicle the lower one. Prints the tables and writes them to ``benchmarks/results/drive.md``; writes a video of the
+worst drive.
 """
 
 import argparse
@@ -28,7 +28,7 @@ _SIGHTED = (TRUTH, BLIND)  # they need no images
 
 
 class _Judged:
-    """A driver, and beside him the planner with the truth, who is asked but does not drive."""
+    """A driver, with the planner with ground truth, which is asked but does not drive."""
 
     def __init__(self, world: World, name: str) -> None:
         self._driver, self._truth = driver(world, name), TruthDriver(world)
@@ -52,7 +52,7 @@ class Result:
 
 
 def contest(seed: int, names: Sequence[str]) -> Result:
-    """Let drivers drive through the world of a seed."""
+    """Run drivers through the world of a seed."""
     cv2.setNumThreads(1)
     world = worlds.make(seed)
     result = Result(seed, world.cruise_mps, world.condition, world.events)
@@ -68,7 +68,7 @@ def contest(seed: int, names: Sequence[str]) -> Result:
 
 
 def tables(results: Sequence[Result], names: Sequence[str]) -> list[Table]:
-    """All worlds; by cruise speed; by what is wrong with sensors and light; what was hit."""
+    """All worlds; by cruise speed; by fault of sensors or light; by what was hit."""
     found = [_table("All worlds", results, names)]
     for low, high in worlds.CRUISES_MPS:
         some = [result for result in results if low <= result.cruise_mps < high]
@@ -123,7 +123,7 @@ def _hits(results: Sequence[Result], names: Sequence[str]) -> Table:
 
 
 def worst(results: Sequence[Result], name: str) -> Result:
-    """The world in which a driver did worst: collisions, then brakings for nothing, then speed."""
+    """Return the world in which a driver did worst: collisions, then false brakings, then speed."""
 
     def badness(result: Result) -> tuple[float, ...]:
         outcome = result.outcomes[name]
@@ -141,7 +141,7 @@ def _run(seeds: Sequence[int], names: Sequence[str], jobs: int) -> Iterator[Resu
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what is asked for; returns the exit status."""
+    """Run the requested worlds; returns the exit status."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.closed_loop", description=__doc__)
     parser.add_argument("--worlds", type=int, default=12, help="how many (default 12)")
     parser.add_argument("--seed", type=int, default=0, help="of the first (default 0)")

@@ -1,8 +1,9 @@
-"""``python -m benchmarks.cost``: instructions and cache misses of a frame, and what they make on a vehicle's computer.
+"""``python -m benchmarks.cost``: instructions and cache misses per frame, and the time that they take on a vehicle.
 
-A virtual machine has no counters, and the vehicle's computer is not here. So valgrind counts on x86-64, with the caches
-of the vehicle's processors simulated, and with ``--wheel FILE``, as root, qemu counts the instructions on 64-bit Arm. A
-frame is the difference between a run of few and a run of many frames, divided by the frames between.
+A virtual machine has no hardware counters, and the vehicle's computer is not at hand. So valgrind counts on x86-64,
+with the caches of the vehicle's processors simulated, and with ``--wheel FILE``, as root, qemu counts the instructions
+on 64-bit Arm. The cost of a frame is the difference between a short and a long run, divided by the difference in
+frames.
 """
 
 import argparse
@@ -27,7 +28,7 @@ HERE = Path(__file__).parent
 
 @dataclass(frozen=True, slots=True)
 class Core:
-    """A processor core and what is assumed of it.
+    """A processor core and its assumed properties.
 
     Caches: bytes, ways; the first one is two, of instructions and of data. ``ipc``: instructions a cycle while no cache
     misses. ``near_ns``: a miss of the first cache that the last one serves; ``far_ns``: one that memory serves.
@@ -90,7 +91,7 @@ def frames_run(drive: Path, part: str, frames: int) -> tuple[str, ...]:
 
 
 def by_valgrind(drive: Path, core: Core) -> Callable[[str, int], Cost]:
-    """Count on this processor with the caches of that core."""
+    """Count on this processor with the caches of the given core."""
 
     def count(part: str, frames: int) -> Cost:
         options = ["--tool=cachegrind", "--cache-sim=yes", "--cachegrind-out-file=/dev/null", *core.options()]
@@ -101,7 +102,7 @@ def by_valgrind(drive: Path, core: Core) -> Callable[[str, int], Cost]:
 
 
 def read_cachegrind(output: str) -> Cost:
-    """What cachegrind says at the end. Raises ``LcfError`` where it did not come to that."""
+    """Parse cachegrind's summary. Raises ``LcfError`` if there is none."""
     found = dict(re.findall(r"^==\d+== (\S+) +(?:refs|misses): +([\d,]+)", output, re.MULTILINE))
     try:
         counts = {name: float(number.replace(",", "")) for name, number in found.items()}

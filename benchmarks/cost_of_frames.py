@@ -1,4 +1,4 @@
-"""``python cost_of_frames.py FOLDER PART FRAMES``: what ``benchmarks.cost`` counts; runs so many frames, says nothing.
+"""``python cost_of_frames.py FOLDER PART FRAMES``: the program that ``benchmarks.cost`` measures; runs FRAMES frames.
 
 PART is ``detect`` (corners alone) or ``whole`` (the pipeline). All frames of FOLDER are read whatever their number, so
 that two runs differ in nothing else.

@@ -1,4 +1,4 @@
-"""A drive as a video: what the camera sees, what the planner is given, and what it makes of it."""
+"""A drive as a video: the camera's image, the planner's input, and its decision."""
 
 from pathlib import Path
 
@@ -49,7 +49,7 @@ class _Filmed:
 
 
 def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps: float) -> Image:
-    """One image (height, width, 3): threats by the truth (red below them), what the planner is given, speeds."""
+    """One image (height, width, 3): threats by ground truth (red below them), the planner's input, speeds."""
     assert moment.frame is not None
     image = np.asarray(cv2.cvtColor(moment.frame.image, cv2.COLOR_GRAY2BGR), dtype=np.uint8)
     for body in moment.known:

@@ -1,4 +1,4 @@
-"""Who drives in the closed loop: the same planner with the truth, objects or circles in hand, or nobody."""
+"""Drivers of the closed loop: the same planner with ground truth, objects or circles as input, or none."""
 
 import math
 from collections.abc import Callable
@@ -22,7 +22,7 @@ TRUTH, OBJECTS, CIRCLES, BLIND = "truth", "objects", "circles", "blind"
 NAMES = (TRUTH, OBJECTS, CIRCLES, *PEERS, BLIND)
 
 _MIN_TRUST = 3.0
-_SIGMA_M, _SIGMA_SHARE = 0.2, 0.15  # of what circles say
+_SIGMA_M, _SIGMA_SHARE = 0.2, 0.15  # of the numbers of circles
 _FARTHEST_M = 30.0
 _FORWARD_MPS, _RIGHT_MPS = (-2.0, 4.0), (-2.5, 2.5)  # nothing is faster
 
@@ -30,20 +30,20 @@ Reported = Callable[[Scene], npt.NDArray[np.void]]
 
 
 def planner_of(world: World) -> Planner:
-    """The planner as the vehicle's user would set it."""
+    """Return the planner as the vehicle's user would configure it."""
     build = world.build
     return Planner(Vehicle(build.half_width_m, build.length_m, world.lens.focal_px))
 
 
 def method_of(world: World, name: str) -> Method:
-    """A method of the benchmark, configured as the vehicle's user would."""
+    """Return a method of the benchmark, configured as the vehicle's user would."""
     drive = world.drawn()
     config: Config = config_of(drive)
     return make(name, config, Lens.from_config(config.camera, drive.lens.width, drive.lens.height))
 
 
 class TruthDriver:
-    """The planner with the truth in hand, of what is in sight."""
+    """The planner with the ground truth of everything in sight."""
 
     def __init__(self, world: World) -> None:
         self._planner, self._memory, self._dt_s = planner_of(world), Memory(), 1 / world.fps
@@ -55,7 +55,7 @@ class TruthDriver:
 
 
 class BlindDriver:
-    """Brakes for nothing."""
+    """Never brakes."""
 
     def decide(self, moment: Moment) -> float:
         """The speed to drive at now, m/s."""
@@ -63,7 +63,7 @@ class BlindDriver:
 
 
 class SceneDriver:
-    """The planner on what a method finds; ``reported``: what of it the planner is given."""
+    """The planner on the results of a method; ``reported``: which of them it is given."""
 
     def __init__(self, world: World, name: str, reported: Reported) -> None:
         self._planner, self._dt_s = planner_of(world), 1 / world.fps
@@ -78,7 +78,7 @@ class SceneDriver:
         assert moment.frame is not None
         self.scene = self._method.process(moment.frame)
         speed = self.scene.vehicle_speed
-        if not math.isfinite(speed):  # nobody measures it: it is what was wanted
+        if not math.isfinite(speed):  # not measured: assume the wanted speed
             speed = self._target_mps
         self._target_mps = self._planner.target_mps(
             self.reported(self.scene), speed, moment.cruise_mps, self._dt_s, moment.curvature
@@ -96,17 +96,17 @@ def driver(world: World, name: str) -> Driver:
 
 
 def reported_objects(world: World, name: str) -> Reported:
-    """What a planner is given of the scenes of a driver's method."""
+    """Return the part of a scene that the planner of a driver is given."""
     if name == OBJECTS:
         return lambda scene: scene.objects
     return lambda scene: objects_of_circles(scene, world.drawn())
 
 
 def objects_of_circles(scene: Scene, drive: Drive) -> npt.NDArray[np.void]:
-    """An object for each trusted rebel circle: what it says, and what follows from it.
+    """Return an object for each trusted rebel circle: its numbers, and those that follow from them.
 
-    Peers tell the range and the miss of what stands only. Of what moves, its foot on the ground tells the range, and
-    its motion in the image the miss.
+    Peers report range and lateral miss of stationary objects only. For movers, the range follows from the foot on the
+    ground, and the miss from the motion in the image.
     """
     circles = scene.circles[(scene.circles["kind"] == Kind.REBEL) & (scene.circles["trust"] >= _MIN_TRUST)]
     objects = np.zeros(len(circles), OBJECT)

@@ -22,7 +22,7 @@ NOTHING = "nothing"
 NAMES = (FILTER, *PEERS)
 """The methods that find circles."""
 
-_CALIBRATED_RADPS = 1e-3  # 1 sigma of a bias that has been taken out
+_CALIBRATED_RADPS = 1e-3  # 1 sigma of a calibrated bias
 
 
 class Method(Protocol):
@@ -94,7 +94,7 @@ class PeerMethod:
 
 
 class _Nothing:
-    """What every method needs: images and ego-motion."""
+    """The input that every method needs: images and ego-motion."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
         del config, lens

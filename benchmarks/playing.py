@@ -1,4 +1,4 @@
-"""Drives and recordings, as a stream that every method is fed with."""
+"""Drives and recordings, as a stream that is fed to every method."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ Sample = ImuSample | SpeedSample
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """One frame, what each method says, and the truth (None: unknown)."""
+    """One frame, the result of each method, and the ground truth (None: unknown)."""
 
     frame: Frame
     scenes: dict[str, Scene]

@@ -37,7 +37,7 @@ class Size:
 
 @dataclass(frozen=True, slots=True)
 class Quality:
-    """What was scored: by kind of drive, and one score a seed."""
+    """Scores by kind of drive, one per seed."""
 
     scores: dict[str, dict[str, list[Score]]] = field(default_factory=dict)  # kind, method, one a seed
     sizes: dict[str, list[Size]] = field(default_factory=dict)  # kind, one a seed
@@ -84,7 +84,7 @@ def as_numbers(each: Score) -> dict[str, float]:
 
 
 def summary(quality: Quality) -> dict[str, dict[str, float]]:
-    """Over all kinds, of each method: what the goals are about."""
+    """The figures that have goals, of each method, over all kinds."""
     answer = {}
     for name in NAMES:
         kinds = {kind: pool(methods[name]) for kind, methods in quality.scores.items()}

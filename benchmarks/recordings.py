@@ -1,7 +1,7 @@
-"""Real recordings: what each method says of them, and images to look at.
+"""Real recordings: the results of each method, and images to inspect.
 
-A recording is a folder that the replay reads, with a file ``settings`` in it, and ``truth.jsonl`` where somebody has
-marked what is to be seen: the corpus, the truth and the score are those of ``lcf-edge evaluate`` (docs/evaluate.md).
+A recording is a folder that the replay reads, with a file ``settings`` in it, and ``truth.jsonl`` if it is annotated:
+the corpus, the truth and the score are those of ``lcf-edge evaluate`` (docs/evaluate.md).
 """
 
 from collections.abc import Callable, Iterable, Sequence
@@ -30,7 +30,7 @@ _WHITE = (255, 255, 255)
 
 @dataclass(slots=True)
 class Result:
-    """One recording, scored for each method. ``images``: some of it, with what the filter found."""
+    """One recording, scored for each method. ``images``: samples, with the filter's results."""
 
     name: str
     scores: dict[str, Score]
@@ -98,7 +98,7 @@ def as_numbers(result: Result) -> dict[str, dict[str, float]]:
 
 
 def _drawn(moment: Moment, known: Sequence[Known]) -> Colours:
-    """A small image with what is there and the filter's rebels."""
+    """A small image with annotations and the filter's rebels."""
     line = line_of(moment.frame, rebels(moment.scenes[FILTER].circles))
     return draw(moment.frame.image, known, line.rebels, str(line.seq))
 

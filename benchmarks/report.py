@@ -1,4 +1,4 @@
-"""Tables as Markdown, and what they were measured on."""
+"""Tables as Markdown, with the conditions of the measurement."""
 
 import math
 import os

@@ -22,7 +22,7 @@ _QUICK_KINDS = ("passing", "ahead", "crossing", "turn")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run what is asked for. Return the exit status."""
+    """Run the requested measurements. Return the exit status."""
     options = _parser().parse_args(arguments)
     cv2.setNumThreads(1)
     try:

@@ -23,7 +23,7 @@ _SAMPLES = (np.arange(32) + 0.5) / 32  # of a box, per axis
 
 @dataclass(frozen=True, slots=True)
 class Score:
-    """Counts over the frames of one or more drives; a ratio is NaN where there is nothing to divide by."""
+    """Counts over the frames of one or more drives; a ratio is NaN if its denominator is 0."""
 
     frames: int = 0
     hits: int = 0  # counted targets with a circle, one a frame
@@ -166,7 +166,7 @@ def _rebels(scene: Scene | None, min_trust: float) -> npt.NDArray[np.void]:
 
 
 def _on(circles: npt.NDArray[np.void], thing: ObjectTruth) -> npt.NDArray[np.bool_]:
-    """Which circles' centres lie in the grown box."""
+    """Return which circles' centres lie in the grown box."""
     x, y, width, height = thing.box
     across, along = _GROWN_SHARE * width + _GROWN_PX, _GROWN_SHARE * height + _GROWN_PX
     inside: npt.NDArray[np.bool_] = (

@@ -1,7 +1,7 @@
 """The daemon in a session: a camera of 30 frames a second, a 200 Hz IMU, and a subscriber in another process.
 
-The subscriber is this process, over Zenoh on loopback. What comes before the image can be read, exposure and
-transfer, is not in the times; nor is the stand-ins' own reading in the share of a core.
+The subscriber is this process, over Zenoh on loopback. The times do not include exposure and transfer of the image,
+nor does the share of a core include the stand-ins' own reading.
 """
 
 import json
@@ -37,7 +37,7 @@ _CPU_CLOCK = 2  # CPUCLOCK_SCHED, of the clock that clock_getcpuclockid(3) gives
 
 @dataclass(frozen=True, slots=True)
 class Session:
-    """What was measured. ``latency_ms``: from an image's stamp to its scene at the subscriber."""
+    """Measurements. ``latency_ms``: from an image's stamp to its scene at the subscriber."""
 
     frame_count: int
     received: int
@@ -49,7 +49,7 @@ class Session:
 
 
 def measure(seconds: float, *, drive_s: float = 10.0) -> Session:
-    """Let the daemon run for so long on a drive that begins again and again. Raises ``LcfError``."""
+    """Run the daemon for ``seconds`` on a looped drive. Raises ``LcfError``."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         drive = replace(scenes.make("two_crossing", 1, seconds=drive_s), fps=FRAMES_HZ)

@@ -26,7 +26,7 @@ MAX_WAIT_S = 0.25
 
 
 class Drive:
-    """The drive, driven again and again; all devices share its time. ``read_s``: processor time of reading images."""
+    """The drive in a loop; all devices share its time. ``read_s``: processor time of reading images."""
 
     def __init__(self, folder: Path) -> None:
         size = json.loads((folder / "size.json").read_text("utf-8"))

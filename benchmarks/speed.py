@@ -1,6 +1,6 @@
 """Speed and memory: the filter and its peers on the same frames in turn, one thread, for several corner counts.
 
-Taken in turn, a noisy machine disturbs all methods alike; what counts is the ratio on each frame.
+Since they take turns, a noisy machine disturbs all methods alike; what counts is the ratio on each frame.
 """
 
 import tempfile
@@ -52,7 +52,7 @@ class Row:
 
 @dataclass(slots=True)
 class Speed:
-    """What was measured."""
+    """All measurements."""
 
     rows: list[Row] = field(default_factory=list)
     filter_steps: list[stages.Stage] = field(default_factory=list)
@@ -83,13 +83,13 @@ def measure(into: Speed, *, quick: bool = False) -> Iterable[str]:
 
 
 def config_for(drive: Drive, corners: int) -> Config:
-    """A configuration that finds about so many corners, and whose tables hold them."""
+    """Return a configuration that finds about ``corners`` corners, with tables that hold them."""
     edges = max(corners, _MIN_EDGES)
     return config_of(drive, Filter(corners_target=corners), Memory(corners=corners, edges_normal=edges))
 
 
 def _busy(drive: Drive) -> Drive:
-    """The same drive among finer, stronger textures, so that there are corners enough."""
+    """Return the drive with finer, stronger textures, so that there are enough corners."""
 
     def finer(paint: Paint) -> Paint:
         return replace(paint, feature_m=0.4 * paint.feature_m, contrast=1.5 * paint.contrast)

@@ -1,4 +1,4 @@
-"""Where the time goes on one drive, each step timed by itself: of the filter, and of a whole frame of the daemon."""
+"""Profile of one drive: time of each step of the filter, and of each part of a frame in the daemon."""
 
 import time
 from collections.abc import Callable
@@ -104,7 +104,7 @@ def _stages(spent: dict[str, list[float]]) -> list[Stage]:
 
 
 def _timed(owner: object, name: str) -> list[float]:
-    """Let a method of an object note how long each call takes, µs."""
+    """Make a method of an object record the time of each call, µs."""
     method: Callable[..., Any] = getattr(owner, name)
     times_us: list[float] = []
     setattr(owner, name, lambda *arguments: _note(times_us, method, *arguments))
@@ -112,7 +112,7 @@ def _timed(owner: object, name: str) -> list[float]:
 
 
 def _note(times_us: list[float], function: Callable[..., Any], *arguments: Any) -> Any:
-    """Call, and note how long it took."""
+    """Call, and record the time."""
     started = time.perf_counter_ns()
     result = function(*arguments)
     times_us.append((time.perf_counter_ns() - started) / 1000)

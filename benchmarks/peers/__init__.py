@@ -1,16 +1,16 @@
-"""Other ways to find what the filter finds, each tuned as if it were to win.
+"""Other methods for the filter's task, each tuned to do as well as it can.
 
-Each peer is a class with ``process(image, motion)`` that returns rebel circles. They differ in how they
-find out what moves where in the image, and share all that follows:
+Each peer is a class with ``process(image, motion)`` that returns rebel circles. They differ in how they measure motion
+in the image, and share all that follows:
 
-``peer``             what a peer is given and what it returns
-``ego``              how the camera turned and drove since each of the last images; where it is heading
-``residual``         which points break the flow of what stands still, and which will be met
-``clustering``       points that go together become circles with trust
-``backdrop``         an earlier image, moved as the ground and what is far away move
+``peer``             the interface of a peer
+``ego``              rotation and displacement of the camera since each of the last images; its heading
+``residual``         points that break the flow of the static scene, and points on a collision course
+``clustering``       groups points into circles with trust
+``backdrop``         an earlier image, warped as the ground and distant points move
 ``lucas_kanade``     FAST corners and pyramidal Lucas-Kanade
 ``orb``              ORB features matched with those of earlier images
-``frame_difference`` images laid over each other by rotation and ground plane
+``frame_difference`` differences of images registered by rotation and ground plane
 ``dense_flow``       DIS optical flow
 ``landmark_map``     the paper's own comparison: a map of all FAST-9 landmarks; for sizes only
 """

@@ -1,4 +1,4 @@
-"""An earlier image, laid over this one as if there were nothing but the ground and what is far away."""
+"""An earlier image, registered to this one as if the scene were only ground and distant points."""
 
 import cv2
 import numpy as np
@@ -9,10 +9,10 @@ from lcf_edge.config import Config
 
 
 class Backdrop:
-    """Above the horizon the earlier image is turned as the camera turned, below it is moved as the ground moves.
+    """Warps the earlier image: above the horizon by the camera's rotation, below it by the motion of the ground.
 
-    Images are ``shrink`` times smaller than the camera's. ``pixels``: (n, 2) where each pixel of an image is,
-    row by row, px of the pinhole.
+    Images are ``shrink`` times smaller than the camera's. ``pixels``: (n, 2) position of each pixel of an image,
+    row-major, px of the pinhole.
     """
 
     def __init__(self, config: Config, ego: Ego, shrink: int) -> None:
@@ -24,7 +24,7 @@ class Backdrop:
         self.pixels = self.full(np.stack([columns, rows], axis=2).reshape(-1, 2))
 
     def shrink(self, image: Grey) -> Grey:
-        """The small image."""
+        """Return the downscaled image."""
         return np.asarray(cv2.resize(image, self.size, interpolation=cv2.INTER_AREA), np.uint8)
 
     def full(self, points: Floats) -> Floats:
@@ -33,7 +33,7 @@ class Backdrop:
         return self._ego.lens.undistort(np.float32(self._shrink) * (points + half) - half)
 
     def expect(self, points: Floats, slot: int) -> Floats:
-        """Where points (n, 2), px of the pinhole, were if they are far away or on the ground; derotated."""
+        """Return where points (n, 2), px of the pinhole, were if distant or on the ground; derotated."""
         ego = self._ego
         if self._height_m <= 0:
             return points
@@ -42,7 +42,7 @@ class Backdrop:
         return np.where(points[:, 1:] > np.float32(ego.focus[1]), ground, points)
 
     def lay(self, earlier: Grey, slot: int) -> tuple[Grey, Mask]:
-        """The slot's small image laid over the present one, and which pixels it covers; both of ``size``."""
+        """Return the slot's downscaled image warped onto this one, and the pixels that it covers; both of ``size``."""
         ego = self._ego
         derotated = self.expect(self.pixels, slot)
         turn_back = np.linalg.inv(ego.homography(slot)).astype(np.float32).ravel()

@@ -1,4 +1,4 @@
-"""Points that break the flow become circles: linked by place and motion, and trusted over time."""
+"""Points that break the flow become circles: linked by position and motion, and trusted over time."""
 
 from dataclasses import dataclass
 
@@ -11,7 +11,7 @@ from benchmarks.peers.residual import Residual
 from lcf_edge.messages import CIRCLE, Cause, Kind
 
 _MAX_POINTS = 500  # that are linked; all pairs are compared
-_LOOMS_PER_S = 1.0  # parts of an object this far apart may differ so much in velocity
+_LOOMS_PER_S = 1.0  # velocities within an object may differ by this times their distance
 _VELOCITY_NOISE_PXPS = 20.0
 _VELOCITY_SIGMA_PXPS = 5.0
 _MIN_RADIUS_PX = 6.0
@@ -29,7 +29,7 @@ class Clusters:
     vx: Floats  # px/s
     vy: Floats
     support: Rows
-    threat: Mask  # stands still, in the way
+    threat: Mask  # stationary, in the path
     ttc_s: Floats
     range_m: Floats
     lateral_m: Floats
@@ -60,7 +60,7 @@ def cluster(points: Residual, *, least: int, link_px: float, share: float) -> Cl
     spread = mean(dx * dx + dy * dy)
     down = points.down_then[flagged]
     lever = np.maximum(mean(down * down), 1)
-    growth = mean(down * vy) / lever  # what drives on the ground moves along it, so its rise and fall give Z'/Z
+    growth = mean(down * vy) / lever  # for motion along the ground, its vertical motion gives Z'/Z
     radius = np.clip(1.5 * np.sqrt(spread), _MIN_RADIUS_PX, _MAX_RADIUS_PX).astype(np.float32)
     threat = mean(points.threat[flagged]) >= 0.5
     sigma = _VELOCITY_SIGMA_PXPS / np.sqrt(lever * count)
@@ -111,7 +111,7 @@ def _linked(x: Floats, y: Floats, vx: Floats, vy: Floats, threat: Mask, link_px:
 
 
 class TrustedCircles:
-    """Circles over time: a circle is shown from trust 3 until it falls under 2."""
+    """Circles over time: a circle is published from trust 3 until it falls below 2."""
 
     def __init__(self, capacity: int = 32) -> None:
         self._table = np.zeros(capacity, CIRCLE)

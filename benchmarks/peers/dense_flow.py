@@ -1,4 +1,4 @@
-"""DIS optical flow on half-size images, on top of the motion of the ground and of what is far away."""
+"""DIS optical flow on half-size images, relative to the motion of the ground and of distant points."""
 
 import cv2
 import numpy as np
@@ -19,13 +19,13 @@ _GRID = 4
 _BORDER = 4
 _TEXTURE = 4.0  # least mean gradient of the surroundings, grey levels a pixel
 _RETURN = 0.7  # flow there and back must agree
-_SMOOTH = 1.0  # and with that of its neighbours: across an edge it is made up
+_SMOOTH = 1.0  # and with that of its neighbours: across an edge it is interpolated
 _NOISE_PX = 0.5
 _MOVER_PX = 2.0
 
 
 class DenseFlow:
-    """Flow on a grid, where there is texture to hold on to."""
+    """Flow on a grid, where there is texture."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config
@@ -68,7 +68,7 @@ class DenseFlow:
         return np.asarray(self._flow.calc(one, other, start), np.float32)
 
     def _sure(self, small: Grey, back: Floats, forth: Floats) -> Mask:
-        """Which grid points have texture, and a flow that leads back and is like that around; bool (n,)."""
+        """Return which grid points have texture, and a flow that is consistent backward and nearby; bool (n,)."""
         u, v = self._u, self._v
         across, down = (cv2.Sobel(small, cv2.CV_32F, dx, 1 - dx, scale=0.25) for dx in (1, 0))
         texture = np.asarray(cv2.blur(cv2.magnitude(across, down), (7, 7)))[v, u]

@@ -1,4 +1,4 @@
-"""How the camera turned and drove since each of the last images, and where it is heading now."""
+"""Rotation and displacement of the camera since each of the last images, and its present heading."""
 
 import math
 
@@ -12,7 +12,7 @@ from lcf_edge.lens import Lens
 
 SLOTS = 10
 SPACING_S = 0.045  # least time between two images that are remembered: half a second at 20 frame/s
-_PITCH_MEMORY_S = 1.0  # a camera that shakes faster than this does not change where the vehicle goes
+_PITCH_MEMORY_S = 1.0  # shaking of the camera faster than this does not change the heading
 _YAW_MEMORY_S = 0.3
 _STILL_M = 1e-3
 
@@ -20,9 +20,9 @@ Vectors = npt.NDArray[np.float64]
 
 
 class Ego:
-    """Rotation and way of the camera since the images in ``SLOTS`` slots.
+    """Rotation and displacement of the camera since the images in ``SLOTS`` slots.
 
-    What stands still at X in the camera's axes of slot k is now at ``rotation[k]`` X - ``way_m[k]``.
+    A stationary point at X in the camera's axes of slot k is now at ``rotation[k]`` X - ``way_m[k]``.
     """
 
     def __init__(self, config: Config, lens: Lens) -> None:
@@ -45,7 +45,7 @@ class Ego:
 
     @property
     def focus(self) -> tuple[float, float]:
-        """Where the vehicle is heading, px of the ideal pinhole."""
+        """The vehicle's heading, px of the ideal pinhole."""
         x, y, _ = self._forward
         return self.lens.cx + self.lens.fx * x, self.lens.cy + self.lens.fy * y
 
@@ -65,11 +65,11 @@ class Ego:
         self.sigma_rad += motion.rotation_sigma_rad  # mostly bias, which adds up
 
     def due(self) -> bool:
-        """Whether enough time went by to remember this image."""
+        """Whether enough time has passed to store this image."""
         return self.number == 0 or float(self.elapsed_s[(self.number - 1) % SLOTS]) >= SPACING_S
 
     def remember(self) -> int:
-        """Remember this image. Return its slot."""
+        """Store this image. Return its slot."""
         slot = self.number % SLOTS
         self.rotation[slot], self.way_m[slot], self.elapsed_s[slot], self.sigma_rad[slot] = np.eye(3), 0, 0, 0
         self.number += 1
@@ -108,7 +108,7 @@ class Ego:
         return warp(h, x, y)
 
     def focus_since(self, slot: Rows) -> tuple[Floats, Floats, Floats]:
-        """Focus of expansion of the way since each slot (n,), px, and the way's forward part, m."""
+        """Focus of expansion of the displacement since each slot (n,), px, and its forward part, m."""
         moves: Mask = np.abs(self.way_m[:, 2]) > _STILL_M
         ahead = np.where(moves, self.way_m[:, 2], 1.0)
         now_x, now_y = self.focus
@@ -120,5 +120,5 @@ class Ego:
 
 def warp(h: npt.NDArray[np.float32], x: Floats, y: Floats) -> tuple[Floats, Floats]:
     """Positions (n,) through homographies (9,) or (9, n)."""
-    scale = 1 / np.maximum(h[6] * x + h[7] * y + h[8], np.float32(1e-6))  # what is behind goes far away
+    scale = 1 / np.maximum(h[6] * x + h[7] * y + h[8], np.float32(1e-6))  # points behind the camera go far away
     return (h[0] * x + h[1] * y + h[2]) * scale, (h[3] * x + h[4] * y + h[5]) * scale

@@ -1,7 +1,7 @@
-"""Frame difference: what does not fit when an earlier image is laid over this one stands up or moves.
+"""Frame difference: what differs from a registered earlier image is upright or moves.
 
-A column of difference stands on the ground where its foot is; that tells range, time to contact and lateral
-miss. Columns in the way make blobs; what stands beside the path differs too, and is left out.
+A column of difference stands on the ground at its foot, which gives range, time to contact and lateral miss. Columns
+in the path make blobs; upright objects beside the path differ too, and are ignored.
 """
 
 import cv2
@@ -19,11 +19,11 @@ from lcf_edge.lens import Lens
 _SHRINK = 2
 _BACK = 8  # images
 _MIN_DIFFERENCE = 16  # grey levels
-_SLACK = np.ones((3, 3), np.uint8)  # so far may ground and distance be misplaced
+_SLACK = np.ones((3, 3), np.uint8)  # tolerance of the registration
 _OPEN = np.ones((3, 3), np.uint8)
 _CLOSE = np.ones((21, 13), np.uint8)
 _AREA_PX = 60  # of the small image
-_FOOT_PX = 4.0  # least below the horizon: farther away the range says nothing
+_FOOT_PX = 4.0  # least below the horizon: farther away the range is meaningless
 _TALL_M, _TALL_SHARE = 0.4, 0.8  # least height of a column, and as a share of the camera's, whichever is less
 
 
@@ -54,7 +54,7 @@ class FrameDifference:
         return circles
 
     def _differs(self, small: Grey, slot: int) -> Bytes:
-        """Mask of what does not fit; 0 or 1."""
+        """Return the mask of differences; 0 or 1."""
         before, covered = self._backdrop.lay(self._images[slot], slot)
         gain = float(small[covered].mean()) / max(float(before[covered].mean()), 1.0)  # the exposure may have changed
         before = np.asarray(cv2.convertScaleAbs(before, alpha=gain), np.uint8)
@@ -65,7 +65,7 @@ class FrameDifference:
         return np.asarray(cv2.morphologyEx(mask, cv2.MORPH_CLOSE, _CLOSE), np.uint8)
 
     def _blobs(self, mask: Bytes) -> Clusters:
-        """Connected parts of the mask, of the columns that stand in the way."""
+        """Connected parts of the mask, of columns in the path."""
         foot = mask.shape[0] - 1 - np.argmax(mask[::-1] > 0, axis=0)
         range_m, lateral_m = self._stands(foot)
         min_m = min(_TALL_M, _TALL_SHARE * self._config.camera.height_m)
@@ -94,7 +94,7 @@ class FrameDifference:
         )
 
     def _stands(self, foot: Rows) -> tuple[Floats, Floats]:
-        """Range and lateral miss of what stands with its foot in these rows, a row a column."""
+        """Range and lateral miss of columns with their feet in these rows, one row per column."""
         ego = self._ego
         columns = np.arange(len(foot))
         x, y = self._x[foot, columns], self._y[foot, columns]

@@ -1,7 +1,7 @@
 """The paper's own comparison: a map of all FAST-9 landmarks. It finds no circles; only its size is of interest.
 
-A landmark in sight is followed by Lucas-Kanade; a corner where no landmark is known is a new one. What goes
-out of sight stays in the map.
+A landmark in sight is tracked by Lucas-Kanade; a corner where no landmark is known is a new one. Landmarks out of
+sight stay in the map.
 """
 
 import cv2
@@ -34,7 +34,7 @@ class LandmarkMap:
         return self._forgotten + len(self._in_sight)
 
     def process(self, image: Grey, motion: Motion) -> Circles:
-        """Account for one image; there are no circles."""
+        """Process one image; there are no circles."""
         del motion
         if self._before is not None and len(self._in_sight):
             self._follow(self._before, image)

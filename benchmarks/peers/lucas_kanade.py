@@ -1,4 +1,4 @@
-"""FAST corners, followed by pyramidal Lucas-Kanade with a check forwards and backwards."""
+"""FAST corners, tracked by pyramidal Lucas-Kanade with a forward-backward check."""
 
 import cv2
 import numpy as np
@@ -16,12 +16,12 @@ from lcf_edge.lens import Lens
 _WINDOW_PX = (15, 15)
 _LEVELS = 2
 _CRITERIA = (cv2.TERM_CRITERIA_EPS | cv2.TERM_CRITERIA_COUNT, 12, 0.03)
-_RETURN_PX = 0.7  # a track that does not come back this near is lost
+_RETURN_PX = 0.7  # largest forward-backward error of a track
 _CELL_PX = 8  # one track in each such square
 _BORDER_PX = 4
 _LOOKS_PX = 4  # half a patch
 _LOOKS_LIKE = 0.7  # least correlation of a track's patch with that of its oldest image
-_MIN_DURATION_S = 0.12  # a younger track says nothing
+_MIN_DURATION_S = 0.12  # younger tracks are ignored
 _NOISE_PX = 0.3
 _MOVER_PX = 2.5
 
@@ -56,7 +56,7 @@ class LucasKanade:
         return circles
 
     def _follow(self, before: Grey, image: Grey) -> None:
-        """Carry every track into this image; the lost ones go."""
+        """Continue every track in this image; drop lost ones."""
         ego = self._ego
         ideal = ego.lens.undistort(self._points)
         h = ego.last_homography().astype(np.float32).ravel()
@@ -94,7 +94,7 @@ class LucasKanade:
         return self._circles.update(cluster(points, least=4, link_px=28.0, share=0.2), ego)
 
     def _add(self, image: Grey) -> None:
-        """New tracks at corners where there is none yet."""
+        """Start tracks at corners that have none."""
         corners, _ = self._detector.detect(image)
         columns = image.shape[1] // _CELL_PX + 1
         taken = np.zeros((image.shape[0] // _CELL_PX + 1) * columns, np.bool_)
@@ -114,7 +114,7 @@ class LucasKanade:
 
 
 def _both_ways(before: Grey, image: Grey, points: Floats, guess: Floats) -> tuple[Floats, Mask, Floats, Mask]:
-    """Points carried forwards and back again, and which were found each way."""
+    """Points tracked forward and back again, and which were found in each direction."""
     after, found = _carried(before, image, points, guess)
     back, returned = _carried(image, before, after, points)
     return after, found, back, returned

@@ -14,15 +14,15 @@ from lcf_edge.lens import Lens
 _FEATURES_A_CORNER = 1.4
 _SCALE, _LEVELS = 1.2, 4
 _FAST_THRESHOLD = 10
-_BACK = (8, 4)  # images; what the first does not show may be in the second
-_REACH_PX = 80.0  # that a feature may go, at least
+_BACK = (8, 4)  # images; features missing in the first may be in the second
+_REACH_PX = 80.0  # least search radius of a feature
 _HAMMING = 48  # bits that may differ
 _NOISE_PX = 1.0
 _MOVER_PX = 3.5
 
 
 class Orb:
-    """Features of this image against those of earlier ones: long baselines without tracking."""
+    """Matches features of this image with those of earlier ones: long baselines without tracking."""
 
     def __init__(self, config: Config, lens: Lens) -> None:
         self._config = config

@@ -1,4 +1,4 @@
-"""What a peer is given, and what it returns."""
+"""The interface of a peer: its input and output."""
 
 from typing import Protocol
 

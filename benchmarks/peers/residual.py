@@ -1,9 +1,9 @@
-"""Which points break the flow of what stands still, and which will be met.
+"""Points that break the flow of the static scene, and points on a collision course.
 
-What stands still at depth Z moves, while the camera goes ΔZ ahead, along the line through the focus of
-expansion by the share μ = ΔZ/Z of its distance r. A *mover* leaves that line, goes inwards, or stays inside of
-where even the ground behind it would be. A *threat* follows the flow, stands above the ground, and will be
-met within the horizon (time to contact ΔZ/(μ v)) and the half width.
+While the camera moves ahead by ΔZ, a stationary point at depth Z moves along the line through the focus of expansion by
+the share μ = ΔZ/Z of its distance r. A *mover* leaves that line, moves inwards, or moves less than the ground in its
+row would. A *threat* follows the flow, stands above the ground, and will be met within the horizon (time to contact
+ΔZ/(μ v)) and the half width.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ _NEAREST_M = 0.25  # nothing is nearer
 _GROUND_MARGIN = 0.2  # share by which the ground's depth may be misjudged
 _PITCH_SIGMA_RAD = 0.008
 _FOCUS_SIGMA_PX = 6.0
-_ASKEW = 0.25  # share of its way that a corner between two things drifts
-_CERTAIN = 1.0  # standard deviations that a threat's flow must exceed
+_ASKEW = 0.25  # drift of a corner between two objects, as a share of its displacement
+_CERTAIN = 1.0  # sigmas that a threat's flow must exceed
 _BIAS_SIGMA_RADPS = 0.006
 _LEFT_SHARE, _LEFT_PX = 0.4, 1.0  # of the gyro's uncertainty, once the flow has shown its bias
 _MIN_BIAS = 40  # points that show the gyro's bias
@@ -27,7 +27,7 @@ _MIN_BIAS = 40  # points that show the gyro's bias
 
 @dataclass(frozen=True, slots=True)
 class Tracks:
-    """Points that were seen before, in the image of ``slot``; (n,), px of the pinhole."""
+    """Points with their earlier positions, in the image of ``slot``; (n,), px of the pinhole."""
 
     slot: Rows
     x_then: Floats  # as if the camera had not turned since
@@ -41,7 +41,7 @@ class Tracks:
 
 @dataclass(frozen=True, slots=True)
 class Residual:
-    """What the flow of each track says; (n,)."""
+    """Results for each track; (n,)."""
 
     x: Floats  # px
     y: Floats
@@ -56,7 +56,7 @@ class Residual:
 
 
 def residual(tracks: Tracks, ego: Ego, config: Config, noise_px: float, mover_px: float) -> Residual:
-    """Judge tracks. ``noise_px``: 1 sigma of a flow vector; ``mover_px``: that a mover is off at least."""
+    """Judge tracks. ``noise_px``: 1 sigma of a flow vector; ``mover_px``: least deviation of a mover."""
     lens, focal = ego.lens, np.float32(ego.focal_px)
     elapsed = ego.elapsed_s.astype(np.float32)[tracks.slot]
     sigma_px = ego.sigma_rad.astype(np.float32)[tracks.slot] * focal
@@ -116,8 +116,8 @@ def _gyro_bias(
 ) -> tuple[Floats, Floats, bool]:
     """Flow that the gyro's bias leaves: the rate that puts most tracks back on their flow lines.
 
-    Robust least squares over the drift, which the way does not touch; 0 where too few tracks tell it. (ax, ay):
-    unit vector from the focus, (mx, my): motion, px. Answers the flow, px, and whether it is known.
+    Robust least squares over the drift, which translation does not affect; 0 with too few tracks. (ax, ay): unit
+    vector from the focus, (mx, my): motion, px. Returns the flow, px, and whether it is known.
     """
     if len(tracks) < _MIN_BIAS:
         return np.zeros_like(mx), np.zeros_like(my), False
