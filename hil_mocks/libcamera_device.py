@@ -2,8 +2,8 @@
 
 ``python -m hil_mocks.libcamera_device WORLD FD REQUEST`` runs ``drivers.camera.libcamera_process`` on the cameras of
 ``WORLD``, which is a ``World`` as JSON. They behave as a Raspberry Pi's: a sensor with modes of which some see only a
-part of the image, and the one of the nearest size is taken when nobody chooses; images in shared memory, at the
-camera's rate, on the system's clock. ``command`` makes what the driver is given.
+part of the image, and the one of the nearest size is the default; images in shared memory, at the camera's rate, on the
+system's clock. ``command`` returns the command for the driver.
 """
 
 import contextlib
@@ -39,7 +39,7 @@ UNLOCKED = {"ExposureTime": 20_000, "AnalogueGain": 1.0}  # what switching the a
 
 
 class World(msgspec.Struct, frozen=True, kw_only=True):
-    """What there is, and what goes wrong; numbers of images count from the start of the stream."""
+    """The cameras and their faults; image numbers count from the start of the stream."""
 
     names: tuple[str, ...] = ("imx219",)  # of the cameras
     nodes: tuple[int, ...] = ()  # device numbers that belong to the first
@@ -108,7 +108,7 @@ class Info:
 
 @dataclass
 class SensorConfiguration:
-    """A mode of the sensor that somebody chooses."""
+    """A chosen mode of the sensor."""
 
     bit_depth: int = 0
     output_size: Size = field(default_factory=lambda: Size(0, 0))
@@ -154,7 +154,7 @@ class Configuration:
         return self.stream
 
     def validate(self) -> Status:
-        """Make of it what there is."""
+        """Adjust it to what is supported."""
         stream, mode = self.stream, self.sensor_config
         if mode is not None and mode.bit_depth != 10:
             return Status.Invalid
@@ -236,14 +236,14 @@ class Camera:
         self._stopped = threading.Event()
 
     def acquire(self) -> None:
-        """Make it this process's."""
+        """Acquire it for this process."""
         if self._world.busy:
             raise RuntimeError("Failed to acquire camera: Device or resource busy")
         while self._world.hangs:
             time.sleep(60)
 
     def release(self) -> None:
-        """Let others have it."""
+        """Release it for others."""
 
     def generate_configuration(self, roles: list[StreamRole]) -> Configuration:
         """A default."""

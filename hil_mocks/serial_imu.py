@@ -1,4 +1,4 @@
-"""A serial IMU on a pseudo-terminal: the real driver opens it, and it goes wrong as real ones do.
+"""A serial IMU on a pseudo-terminal: the real driver opens it, and it fails as real ones do.
 
 ``SerialImuStandIn`` holds the terminal, speaks a protocol (``ENCODERS``) and plays a recording's samples. Its port is a
 symbolic link that keeps its name while the terminal behind it changes with every replug, as /dev/serial/by-id does.
@@ -66,7 +66,7 @@ class WitMotionBleEncoder:
 
 
 class RvcEncoder:
-    """Keeps the orientation that the gyro's rates add up to, and sends it with the acceleration."""
+    """Integrates the gyro's rates to an orientation, and sends it with the acceleration."""
 
     baud = 115200
 
@@ -90,7 +90,7 @@ class RvcEncoder:
 
 
 class ShtpUartEncoder:
-    """A BNO08x in UART-SHTP mode that was asked for its sensors: time, accelerometer and gyro in one packet."""
+    """A BNO08x in UART-SHTP mode with its sensors enabled: time, accelerometer and gyro in one packet."""
 
     baud = 3_000_000
 
@@ -206,7 +206,7 @@ class SerialImuStandIn:
 
     @property
     def port(self) -> str:
-        """The name under which it is found whenever it is plugged in."""
+        """The path at which it appears when plugged in."""
         return str(self._link)
 
     def plug(self) -> None:
@@ -238,7 +238,7 @@ class SerialImuStandIn:
         return count
 
     def send_bytes(self, data: bytes) -> None:
-        """Send these as the device would at its own baud rate; what nobody reads in time is lost, as on a real line."""
+        """Send bytes as the device would at its own baud rate; if not read in time they are lost, as on a real line."""
         with self._hands, suppress(BlockingIOError):
             if self._ends is None:
                 return
@@ -248,7 +248,7 @@ class SerialImuStandIn:
                 heard = heard[os.write(master, heard) :]
 
     def heard(self) -> bytes:
-        """What the host has sent since it was asked last."""
+        """Return what the host has sent since the last call."""
         with self._hands, suppress(BlockingIOError):
             if self._ends is not None:
                 return os.read(self._ends[0], 65536)
@@ -260,7 +260,7 @@ class SerialImuStandIn:
         self._player.start()
 
     def wait(self) -> None:
-        """Until what plays is over."""
+        """Wait until playing has ended."""
         if self._player is not None:
             self._player.join()
 
@@ -296,12 +296,12 @@ class SerialImuStandIn:
 
 
 def garbage(count: int, seed: int = 0) -> Fault:
-    """So many random bytes come before the sample."""
+    """That many random bytes come before the sample."""
     return lambda data: np.random.default_rng(seed).bytes(count) + data
 
 
 def flipped_bits(count: int = 1, seed: int = 0) -> Fault:
-    """So many bits arrive wrong."""
+    """That many bits are flipped."""
 
     def flip(data: bytes) -> bytes:
         bits = np.unpackbits(np.frombuffer(data, np.uint8))
@@ -322,13 +322,13 @@ def silent(_: bytes) -> bytes:
 
 
 def unplugged(_: bytes) -> None:
-    """The IMU is pulled out; the first sample without this fault plugs it in again."""
+    """The IMU is unplugged; the first sample without this fault plugs it in again."""
 
 
 def heard_at(data: bytes, sent_baud: int, read_baud: int) -> bytes:
-    """What a receiver at ``read_baud`` makes of bytes sent at ``sent_baud``, 8N1 without pauses between them.
+    """Return the bytes that a receiver at ``read_baud`` gets of those sent at ``sent_baud``, 8N1 without pauses.
 
-    The line is looked at in the middle of each bit that the receiver expects, as a UART does; a missing stop bit is not
+    The line is sampled in the middle of each bit that the receiver expects, as a UART does; a missing stop bit is not
     reported, as by Linux.
     """
     if sent_baud == read_baud or not data:
@@ -350,7 +350,7 @@ def heard_at(data: bytes, sent_baud: int, read_baud: int) -> bytes:
 
 
 def _baud(terminal: int) -> int | None:
-    """The baud rate that is set at a terminal; None for one that is none of the usual."""
+    """Return the baud rate set at a terminal; None: not a common one."""
     code = termios.tcgetattr(terminal)[5]
     return next((baud for baud in _BAUDS if getattr(termios, f"B{baud}") == code), None)
 
@@ -372,7 +372,7 @@ def mtdata2(data: bytes) -> bytes:
 
 
 def still(rate_hz: float, start_ns: int = 0) -> Iterator[ImuSample]:
-    """An IMU that lies level and still, for ever."""
+    """Samples of an IMU that is level and at rest, without end."""
     number = 0
     while True:
         yield ImuSample(start_ns + round(number * 1e9 / rate_hz), (0.0, 0.0, 0.0), (0.0, 0.0, 9.80665))
@@ -388,7 +388,7 @@ def _with_sum(frame: bytes, begin: int) -> bytes:
 
 
 def _rotation(vector: Rotation) -> Rotation:
-    """Rodrigues' formula: the turn by a rotation vector, rad."""
+    """Rodrigues' formula: the rotation by a rotation vector, rad."""
     x, y, z = vector
     cross: Rotation = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     angle = float(np.linalg.norm(vector))

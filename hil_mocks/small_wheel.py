@@ -22,5 +22,5 @@ def wheel_of(folder: Path, version: str, program: str = PROGRAM) -> Path:
     wheel = folder / f"lcf_edge-{version}-py3-none-any.whl"
     with zipfile.ZipFile(wheel, "w") as archive:
         for name, text in files.items():
-            archive.writestr(zipfile.ZipInfo(name), text)  # as if made at no time
+            archive.writestr(zipfile.ZipInfo(name), text)  # with a constant time stamp
     return wheel

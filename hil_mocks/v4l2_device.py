@@ -1,4 +1,4 @@
-"""Cameras behind the kernel's V4L2 interface, so that the shipped driver runs without a kernel that has one.
+"""Cameras behind the kernel's V4L2 interface, so that the shipped driver runs without such a kernel.
 
 ``MockKernel`` answers the system calls of ``drivers.camera.v4l2_ioctl.Kernel`` for the ``MockCamera`` that are plugged
 into it; images come at the camera's rate on a clock. What a real device was seen to do wrong can be switched on.
@@ -55,7 +55,7 @@ def webcam_controls() -> dict[int, MockControl]:
 
 
 def drawn_image(seq: int, width: int, height: int) -> Grey:
-    """A slope of grey whose brightness encodes ``seq`` (modulo 128)."""
+    """A grey gradient whose brightness encodes ``seq`` (modulo 128)."""
     ramp = np.linspace(0, 100, width, dtype=np.uint8)[None, :]
     return np.repeat(ramp + np.uint8(seq % 128), height, axis=0)
 
@@ -256,7 +256,7 @@ class MockKernel:
         answer.numbers[:2] = 1000, round(1000 * _item(list(rates), answer.index))
 
     def _set_format(self, file: _Open, answer: v4l2.Format | v4l2.PlanesFormat) -> None:
-        """What is not there becomes the nearest that is, as the kernel's drivers do."""
+        """Replace an unsupported format by the nearest supported one, as the kernel's drivers do."""
         _refuse(file.camera.format_error)
         modes = file.camera.modes
         requested = v4l2.fourcc_text(answer.pixelformat)
@@ -338,7 +338,7 @@ class MockKernel:
 def encode(image: Grey, pixel_format: str, row_padding: int = 0) -> bytes:
     """A grey image as a camera would send it, rows of raw formats followed by padding.
 
-    Bits that the format has beyond eight are set, so that a reader that takes the wrong ones sees it.
+    Bits beyond eight are set, so that a reader that takes the wrong ones is noticed.
     """
     height, width = image.shape
     if pixel_format == "MJPG":

@@ -1,8 +1,8 @@
-"""A clock that only moves when somebody sleeps on it: minutes of a device's life pass at once, the same every time."""
+"""A clock that advances only by sleeping on it: minutes of a device's life pass instantly and reproducibly."""
 
 
 class VirtualClock:
-    """``drivers.clock.Clock`` that a test turns by hand."""
+    """``drivers.clock.Clock`` that a test advances."""
 
     def __init__(self, now_ns: int = 1_000_000_000_000) -> None:
         self._now_ns = now_ns
@@ -12,5 +12,5 @@ class VirtualClock:
         return self._now_ns
 
     def sleep_s(self, seconds: float) -> None:
-        """Time passes."""
+        """Advance the time."""
         self._now_ns += max(round(seconds * 1e9), 0)

@@ -1,12 +1,12 @@
-"""A vehicle in a rendered world: what it decides changes what its camera sees next.
+"""A vehicle in a rendered world: its decisions change what its camera sees next.
 
-``course``   where it is to go
-``vehicle``  how it moves: delay, lag, limits, differential drive or bicycle
-``world``    what stands and moves, and who yields to whom
-``worlds``   worlds from seeds; ``draft`` one in the making, ``events`` what happens in it
+``course``   the path that it is to drive
+``vehicle``  its dynamics: delay, lag, limits, differential drive or bicycle
+``world``    stationary and moving bodies, and who yields to whom
+``worlds``   worlds from seeds; ``draft`` builds one, ``events`` are what happens in it
 ``sensors``  a shaken camera, IMU, wheel odometry
-``exact``    the truth about each image, also as the records of objects
+``exact``    ground truth of each image, also as the records of objects
 ``loop``     one drive in lockstep
-``outcome``  what came of it: collisions, brakings, those for nothing, speed
+``outcome``  its result: collisions, brakings, false ones, speed
 ``live``     the daemon in the vehicle, in real time
 """

@@ -1,4 +1,4 @@
-"""Where the vehicle is to go: a line on the ground by the distance along it."""
+"""The path that the vehicle is to drive: a line on the ground, by the distance along it."""
 
 import math
 

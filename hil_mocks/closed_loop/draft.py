@@ -1,4 +1,4 @@
-"""A world in the making: draws from its seed, bodies that keep clear of each other and of everybody's way."""
+"""A world under construction: random draws from its seed, bodies that keep clear of each other and of all paths."""
 
 import math
 from dataclasses import dataclass, field
@@ -16,7 +16,7 @@ _PACE_SHARE = 0.5  # of the cruise speed: who is faster comes from out of sight
 
 @dataclass
 class Draft:
-    """A world in the making."""
+    """A world under construction."""
 
     random: np.random.Generator
     course: Course
@@ -30,7 +30,7 @@ class Draft:
         return float(self.random.uniform(low, high))
 
     def pace(self, low: float, high: float) -> float:
-        """A walking speed, at which somebody who is met from the side stays in the camera's sight."""
+        """Draw a walking speed, at which somebody who approaches from the side stays in view."""
         most = max(_PACE_SHARE * self.cruise_mps, 0.2)
         return self.between(min(low, 0.6 * most), min(high, most))
 
@@ -41,12 +41,12 @@ class Draft:
         return Paint(int(self.random.integers(2**31)), 1.0, feature_m, self.between(80, 175))
 
     def walker(self, start: tuple[float, float], legs: tuple[Leg, ...]) -> None:
-        """Somebody who stands at a place and goes his legs."""
+        """Add somebody who starts at a place and walks along his legs."""
         size = self.between(0.4, 0.6), self.between(1.5, 1.9), self.between(0.25, 0.4)
         self._mover("walker", size, start, legs, self.paint(self.between(0.09, 0.16)), 3.0, walker=True)
 
     def cart(self, start: tuple[float, float], legs: tuple[Leg, ...]) -> None:
-        """A vehicle on wheels."""
+        """Add a vehicle on wheels."""
         size = self.between(0.6, 1.1), self.between(0.7, 1.4), self.between(0.8, 1.5)
         self._mover("cart", size, start, legs, self.paint(0.18), 1.5, walker=False)
 
@@ -72,7 +72,7 @@ class Draft:
     def stand(
         self, name: str, at_m: float, right_m: float, size: tuple[float, float, float], turn_rad: float = 0.0
     ) -> None:
-        """Something that stands, unless it is where somebody goes or something else stands."""
+        """Add a stationary body, unless it would be in somebody's path or in another body."""
         x, z = self.course.place(at_m, right_m)
         paint = self.paint(float(np.clip(min(size) / 3, 0.03, 0.3)))
         heading = self.course.heading(at_m) + turn_rad
@@ -88,11 +88,11 @@ class Draft:
         self.bodies.append(body)
 
     def beside(self, right_m: float) -> float:
-        """An offset from the vehicle's flank on, m, as one from the course's middle."""
+        """Convert an offset from the vehicle's flank, m, to one from the middle of the course."""
         return self.build.half_width_m + right_m
 
     def begin(self, at_m: float, seconds: float) -> float:
-        """Where the vehicle is that much before it comes to a place at its cruise speed."""
+        """Return where the vehicle is that long before it reaches a place at its cruise speed."""
         return at_m - self.cruise_mps * seconds
 
 

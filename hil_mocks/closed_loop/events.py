@@ -1,4 +1,4 @@
-"""What happens at a distance along a course. Times are those of a vehicle that does not brake."""
+"""Events at a distance along a course. Times are those of a vehicle that does not brake."""
 
 import math
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from hil_mocks.closed_loop.world import Body, Leg
 
 
 def _cross(draft: Draft, at_m: float, late_s: float, *, speed_mps: tuple[float, float] = (0.5, 1.7)) -> None:
-    """Crosses; is on the course's middle so much after the vehicle is there."""
+    """Crosses; reaches the middle of the course that long after the vehicle."""
     side, speed, lead_s = draft.side(), draft.pace(*speed_mps), draft.between(3.0, 5.5)
     aside, slant = speed * (lead_s + late_s), draft.between(-0.35, 0.35)
     start = draft.course.place(at_m - aside * slant, side * aside)
@@ -57,7 +57,7 @@ def _turns_round(draft: Draft, at_m: float) -> None:
 
 
 def _steps_out(draft: Draft, at_m: float) -> None:
-    """From behind a parked van, near enough that it is a fright and far enough to stop."""
+    """Steps out from behind a parked van, near but far enough to stop."""
     side, speed, van_m = draft.side(), draft.pace(0.6, 1.4), draft.between(2.5, 3.5)
     van_right = side * (draft.beside(draft.between(0.5, 0.9)) + 0.75)
     _van(draft, at_m - 0.6 - van_m / 2, van_right, van_m)

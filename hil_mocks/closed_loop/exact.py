@@ -1,4 +1,4 @@
-"""What is true of each body in an image, as the records of objects have it."""
+"""Ground truth of each body in an image, as the records of objects."""
 
 import math
 from collections.abc import Sequence
@@ -12,10 +12,10 @@ from lcf_edge.rendered.drives import Floats
 from lcf_edge.rendered.projection import Stage, View
 from lcf_edge.rendered.truth import MIN_BOX_PX, MIN_VISIBLE, MOVING_MPS, Bounds, passages_of, visible_shares
 
-REMEMBERED_S = 1.5  # what is out of sight no longer than this is still reported
+REMEMBERED_S = 1.5  # bodies are still reported for so long after they leave the view
 _SIGMA = 0.05  # of every number
 _SLOW_MPS = 0.1  # a slower vehicle has no path
-_ASIDE_SHARE = 0.35  # of its speed: what goes ahead and more to the side than this does not lead
+_ASIDE_SHARE = 0.35  # of its speed: a body ahead that moves inwards faster than this cuts in
 
 
 @dataclass(frozen=True, slots=True)
@@ -59,7 +59,7 @@ class Exact:
 
 
 def exact(stage: Stage, view: View, motion: Motion, footprints: Floats, velocities: Floats) -> list[Exact]:
-    """The truth about all that is in a view; footprints (n, 4, 2) and velocities (n, 2) of all bodies, (x, z)."""
+    """Ground truth of everything in a view; footprints (n, 4, 2) and velocities (n, 2) of all bodies, (x, z)."""
     numbers = [placed.number for placed in view.placed]
     if not numbers:
         return []
@@ -111,7 +111,7 @@ def _class(forward_mps: float, right_mps: float, beside_m: float) -> ObjectClass
 
 
 class Memory:
-    """The truth as objects: what is in sight, and for a short while what was."""
+    """Ground truth as objects: those in sight, and for a short while those that were."""
 
     def __init__(self) -> None:
         self._first: dict[int, float] = {}
@@ -156,7 +156,7 @@ class Memory:
 
 
 def exact_of_drive(stage: Stage, view: View) -> list[Exact]:
-    """The same for a view of a rendered drive, whose motion is known beforehand."""
+    """The same for a view of a rendered drive, whose motion is known in advance."""
     drive, time = stage.drive, np.array([view.time_s])
     x, z = stage.trajectory.forward(time)[0].tolist()
     speed, yaw_rate = float(drive.speed.at(time)[0]), float(drive.yaw_rate.at(time)[0])

@@ -1,8 +1,8 @@
 """`lcf-edge run` in a vehicle in a rendered world: ``python -m hil_mocks.closed_loop.live SEED [OPTION ...]``.
 
 Wanted speeds, m/s, are read from standard input, one a line; a planner in another process writes them. At the end of
-the drive the daemon ends, and what came of the drive is written to standard output as JSON. The world keeps real time
-where the computer can; else its time, and that of the stamps, passes more slowly.
+the drive the daemon ends, and the outcome is written to standard output as JSON. The world runs in real time if the
+computer is fast enough; else its time, and that of the stamps, passes more slowly.
 """
 
 import os
@@ -33,12 +33,12 @@ Item = Frame | ImuSample | SpeedSample
 
 
 def world_of(seed: int) -> World:
-    """The world of a seed with small images, which a busy computer draws in time; it starts at rest."""
+    """The world of a seed with small images, which a busy computer can render in time; it starts at rest."""
     return worlds.make(seed, lens=LENS, start_mps=0.0)
 
 
 class LiveDriver:
-    """Hands images and samples to the devices as they come, and obeys the newest speed."""
+    """Passes images and samples to the devices, and drives at the newest commanded speed."""
 
     def __init__(self, fps: float) -> None:
         self.target_mps = 0.0
@@ -61,7 +61,7 @@ class LiveDriver:
         return self.target_mps
 
     def obey(self, line: str) -> None:
-        """Take a line of the planner's; what is no speed is left alone."""
+        """Take a line from the planner; ignore what is no speed."""
         try:
             speed = float(line)
         except ValueError:
@@ -70,7 +70,7 @@ class LiveDriver:
             self.target_mps = speed
 
     def come(self, kind: type) -> list[Item]:
-        """What came of a kind since the last call; waits for it a little."""
+        """Return the records of a kind since the last call; waits briefly for one."""
         with self._came:
             self._came.wait_for(lambda: bool(self._waiting[kind]), WAIT_S)
             found = list(self._waiting[kind])
@@ -86,7 +86,7 @@ class _Device:
         self._live, self._kind = live, kind
 
     def read(self) -> Sequence[Item]:
-        """What came; of images the newest."""
+        """Return new records; of images the newest."""
         found = self._live.come(self._kind)
         return found[-1:] if self._kind is Frame else found
 

@@ -16,18 +16,18 @@ from lcf_edge.rendered.projection import Stage
 from lcf_edge.rendered.rendering import Renderer
 
 BODIES_EVERY = 2  # steps of the vehicle
-LATE_STEPS = 4  # samples that are read after an image was taken and before it is looked at
+LATE_STEPS = 4  # samples that are read between an image and its processing
 STANDS_MPS = 0.02
-_ARRIVED_S = 1.0  # that it stands before what ends its course
+_ARRIVED_S = 1.0  # of standstill before the obstacle that ends its course
 _NEAR_END_M = 1.5
 
 
 @dataclass(frozen=True, slots=True)
 class Moment:
-    """What there is to decide on."""
+    """The input of a decision."""
 
     time_s: float
-    cruise_mps: float  # what is wanted where nothing is in the way
+    cruise_mps: float  # wanted speed where nothing is in the way
     speed_mps: float  # of the vehicle, true
     curvature: float  # of the course here, 1/m, left positive
     samples: tuple[ImuSample | SpeedSample, ...]  # since the last
@@ -44,7 +44,7 @@ class Driver(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Contact:
-    """The vehicle runs into something, which is then taken away."""
+    """A collision with a body, which is then removed."""
 
     number: int
     name: str
@@ -54,7 +54,7 @@ class Contact:
 
 @dataclass(slots=True)
 class Log:
-    """What a drive was, one entry an image."""
+    """Log of a drive, one entry per image."""
 
     cruise_mps: list[float] = field(default_factory=list)
     target_mps: list[float] = field(default_factory=list)
@@ -67,7 +67,7 @@ class Log:
 
 
 def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
-    """Let a driver drive through a world until its end, or until the time is over."""
+    """Run a driver through a world until its end, or a timeout."""
     stage = Stage(world.drawn())
     renderer = Renderer(stage) if with_images else None
     vehicle, bodies, sensors = Vehicle(world.build, world.course, world.start_mps), Bodies(world), Sensors(world)

@@ -1,4 +1,4 @@
-"""What came of a drive: collisions, brakings, those for nothing, mean speed."""
+"""Result of a drive: collisions, brakings, false ones, mean speed."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,7 +8,7 @@ from hil_mocks.closed_loop.loop import Contact, Log
 
 _BRAKES, _DONE = 0.85, 0.95  # a braking: below this share of the cruise speed, until above that
 _STOPS_MPS2, _DELAY_S = 1.5, 0.35  # as the planner brakes
-_BEFORE_S, _AFTER_S = 1.0, 0.5  # the truth's own braking is looked for so long before it, and after its end
+_BEFORE_S, _AFTER_S = 1.0, 0.5  # window before its begin and after its end in which the ideal planner may brake
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,8 +24,8 @@ class Braking:
 class Outcome:
     """Of one drive, or of several together."""
 
-    threats: int = 0  # that a blind vehicle runs into, and the one with the truth does not
-    collisions: tuple[Contact, ...] = ()  # those that the vehicle with the truth avoids
+    threats: int = 0  # bodies that a blind vehicle hits, and the planner with ground truth does not
+    collisions: tuple[Contact, ...] = ()  # those that the planner with ground truth avoids
     unseen: int = 0  # of these, with what was out of view while braking would have helped
     brakings: int = 0
     for_nothing: int = 0
@@ -43,9 +43,9 @@ class Outcome:
 
 
 def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
-    """The brakings of a drive; `right`: whether the planner with the truth would brake, for each image.
+    """Return the brakings of a drive; `right`: whether the planner with ground truth would brake, for each image.
 
-    A braking is for nothing if it would not in any image of it, nor shortly before or after.
+    A braking is false if that planner would not brake in any image of it, nor shortly before or after.
     """
     found: list[Braking] = []
     first: int | None = None
@@ -67,14 +67,14 @@ def brakings(log: Log, right: Sequence[bool], fps: float) -> list[Braking]:
 
 
 def brakes(target_mps: float, cruise_mps: float) -> bool:
-    """Whether it is less than the cruise speed, so that a braking at the same time is not for nothing."""
+    """Whether a speed is below the cruise speed, so that a braking at the same time is justified."""
     return target_mps < _DONE * cruise_mps
 
 
 def was_in_view(log: Log, contact: Contact, fps: float) -> bool:
-    """Whether an image showed what was run into early enough to stop, and late enough to be remembered then.
+    """Whether an image showed the hit body early enough to stop, and late enough to be remembered then.
 
-    Where none did, the planner with the truth, in this drive, would have run into it as well.
+    If not, the planner with ground truth would have hit it as well in this drive.
     """
     at = round(contact.time_s * fps)
     fastest_mps = max(log.speed_mps[max(at - round(fps), 0) : at + 1], default=contact.speed_mps)
@@ -84,7 +84,7 @@ def was_in_view(log: Log, contact: Contact, fps: float) -> bool:
 
 
 def judge(log: Log, right: Sequence[bool], fps: float, truth: Log, blind: Log) -> Outcome:
-    """Compare a drive with those of the planner with the truth and of nobody in the same world."""
+    """Compare a drive with those of the planner with ground truth and of a blind vehicle in the same world."""
     unavoidable = {contact.number for contact in truth.contacts}
     threats = {contact.number for contact in blind.contacts} - unavoidable
     found = brakings(log, right, fps)

@@ -1,4 +1,4 @@
-"""What the vehicle's sensors say: pose of a shaken camera, IMU, wheel odometry."""
+"""The vehicle's sensors: pose of a shaken camera, IMU, wheel odometry."""
 
 import math
 
@@ -14,7 +14,7 @@ IMU_HZ = 200
 ODOMETRY_EVERY = 4  # of the IMU's samples
 _RATTLE_RADPS, _RATTLE_MPS2 = 0.004, 0.15  # 1 sigma a sample at 1 m/s, besides the sines
 _WALK_RADPS = 3e-4  # of the gyro's bias, 1 sigma in a second
-_MAX_SHAKEN_MPS = 2.0  # it shakes no more when it is faster
+_MAX_SHAKEN_MPS = 2.0  # speed from which shaking does not increase
 
 
 class Sensors:
@@ -35,7 +35,7 @@ class Sensors:
         return rotation(*angles)[0], np.array([x, -self._world.camera_height_m - heave, z])
 
     def sample(self, time_s: float, vehicle: Vehicle) -> list[ImuSample | SpeedSample]:
-        """What is read at a time; call it at `IMU_HZ`."""
+        """Return the samples at a time; call it at `IMU_HZ`."""
         samples: list[ImuSample | SpeedSample] = []
         if self._world.gyro:
             samples.append(self._inertial(time_s, vehicle))

@@ -1,4 +1,4 @@
-"""How the vehicle moves when it is given a speed: delay, lag, limits of acceleration, and steering along its course."""
+"""Dynamics of the vehicle for a commanded speed: delay, lag, acceleration limits, and steering along its course."""
 
 import math
 from collections import deque
@@ -10,13 +10,13 @@ import numpy as np
 from hil_mocks.closed_loop.course import Course
 from lcf_edge.rendered.drives import Floats
 
-_PULL_PER_M2 = 0.8  # curvature for each metre beside the course
-_DAMPING_PER_M = 2 * math.sqrt(_PULL_PER_M2)  # and for each radian askew
+_PULL_PER_M2 = 0.8  # curvature per metre of lateral error
+_DAMPING_PER_M = 2 * math.sqrt(_PULL_PER_M2)  # and per radian of heading error
 
 
 @dataclass(frozen=True, slots=True)
 class Build:
-    """What the vehicle is; the camera stands over the point that moves along the heading."""
+    """Properties of the vehicle; the camera is above the point that moves along the heading."""
 
     kind: Literal["differential", "bicycle"] = "differential"
     half_width_m: float = 0.3
@@ -24,7 +24,7 @@ class Build:
     wheelbase_m: float = 0.5  # of the bicycle
     acceleration_mps2: float = 1.0
     braking_mps2: float = 2.5  # the most
-    delay_s: float = 0.15  # from an image to the first effect of what was decided on it
+    delay_s: float = 0.15  # from an image to the first effect of its decision
     drive_lag_s: float = 0.12
     steering_lag_s: float = 0.12
     steering_radps: float = 1.5  # fastest turn of the bicycle's wheel
@@ -32,7 +32,7 @@ class Build:
 
 
 class Vehicle:
-    """Where it is and how it moves. World axes as in `lcf_edge.rendered.drives`; headings left positive, rad."""
+    """Position and motion of the vehicle. World axes as in `lcf_edge.rendered.drives`; headings left positive, rad."""
 
     def __init__(self, build: Build, course: Course, speed_mps: float = 0.0) -> None:
         self.build, self.course = build, course
@@ -65,11 +65,11 @@ class Vehicle:
         return self.position + corners @ self.axes
 
     def command(self, time_s: float, speed_mps: float) -> None:
-        """Decide a speed on the image of a time."""
+        """Command a speed, decided on the image of a time."""
         self._commands.append((time_s + self.build.delay_s, max(speed_mps, 0.0)))
 
     def step(self, time_s: float, dt_s: float, track_m: float) -> None:
-        """Move from a time on for a short while."""
+        """Advance by one step from a time on."""
         while self._commands and self._commands[0][0] <= time_s + 1e-9:
             self._target_mps = self._commands.popleft()[1]
         build, before = self.build, self.speed_mps

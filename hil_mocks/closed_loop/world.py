@@ -1,4 +1,4 @@
-"""What stands and what moves around the vehicle, and who yields to whom."""
+"""Stationary and moving bodies around the vehicle, and who yields to whom."""
 
 import math
 from dataclasses import dataclass, replace
@@ -10,9 +10,9 @@ from hil_mocks.closed_loop.course import Course
 from hil_mocks.closed_loop.vehicle import Build, Vehicle
 from lcf_edge.rendered.drives import Box, Drive, Floats, Lens, Paint, Profile, SensorNoise, Shake
 
-_REACH_M = 0.3  # movers keep so much between themselves and others
+_REACH_M = 0.3  # clearance that movers keep from others
 _SLOW_MPS = 0.25  # a vehicle slower than this is stepped around
-_EVEN_SHARE = 0.1  # of its speed: what is less to one side is straight on
+_EVEN_SHARE = 0.1  # of its speed: less sideways motion counts as straight ahead
 _PATIENCE_S = 3.0
 _NEAR_M = 8.0
 _TURNING_RADPS = 3.0
@@ -23,7 +23,7 @@ LENS, NOISE, STEADY, GREY = Lens(), SensorNoise(), Profile(((0.0, 1.0),)), Paint
 
 @dataclass(frozen=True, slots=True)
 class Leg:
-    """A way on a straight line, a rest at its end."""
+    """Motion along a straight line, with a rest at its end."""
 
     x_m: float
     z_m: float
@@ -34,7 +34,7 @@ class Leg:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """A cuboid that stands on the ground, and what it does; without legs it stands."""
+    """A cuboid on the ground, and its motion; without legs it is stationary."""
 
     name: str
     width_m: float
@@ -50,14 +50,14 @@ class Body:
 
     @property
     def box(self) -> Box:
-        """As it stands at first."""
+        """Its initial pose."""
         path = ((0.0, self.x_m, self.z_m),)
         return Box(self.name, self.width_m, self.height_m, self.length_m, path, self.heading_rad, self.paint)
 
 
 @dataclass(frozen=True)
 class World:
-    """A drive to be: the same world and the same decisions give the same bytes."""
+    """A world to drive in: the same world and the same decisions give the same bytes."""
 
     seed: int
     events: tuple[str, ...]  # what happens along the course
@@ -66,7 +66,7 @@ class World:
     cruise_mps: float
     build: Build
     bodies: tuple[Body, ...]
-    blocked: bool = False  # its course ends before a box that stands in the way
+    blocked: bool = False  # its course ends before a box in the path
     start_mps: float = 0.0
     waits_m: tuple[tuple[float, float], ...] = ()  # where it stops of its own accord, and for how long, s
     fps: float = 20.0
@@ -86,11 +86,11 @@ class World:
 
     @property
     def seconds(self) -> float:
-        """A drive that takes longer is given up."""
+        """Timeout of a drive."""
         return 2.5 * (self.course.length_m / self.cruise_mps + sum(rest for _, rest in self.waits_m) + 5.0)
 
     def drawn(self) -> Drive:
-        """What the renderer is given: everything but the motion."""
+        """The renderer's input: everything but the motion."""
         nothing = Profile(((0.0, 0.0),))
         return Drive(
             "closed loop",
@@ -117,7 +117,7 @@ class World:
 
 
 class _Mover:
-    """Where one that moves is in its legs."""
+    """Progress of a mover along its legs."""
 
     def __init__(self, row: int, body: Body) -> None:
         self.row, self.body = row, body
@@ -150,13 +150,13 @@ class Bodies:
         return corners + self.position[:, None]
 
     def remove(self, number: int) -> None:
-        """Take away what was run into."""
+        """Remove a body that was hit."""
         self.position[number] = _GONE_M
         self.velocity[number] = 0.0
         self._movers = [mover for mover in self._movers if mover.row != number]
 
     def step(self, dt_s: float, vehicle: Vehicle) -> None:
-        """Let all movers move on for a short while."""
+        """Advance all movers by one step."""
         for mover in self._movers:
             wish = self._wish(mover, dt_s, vehicle.travelled_m)
             if wish.any():
@@ -170,7 +170,7 @@ class Bodies:
                 self.heading[row] += min(max(way, -_TURNING_RADPS * dt_s), _TURNING_RADPS * dt_s)
 
     def _wish(self, mover: _Mover, dt_s: float, travelled_m: float) -> Floats:
-        """The velocity that its legs give."""
+        """The velocity that its legs demand."""
         mover.rests_s = max(mover.rests_s - dt_s, 0.0)
         legs = mover.body.legs
         if mover.leg == len(legs) or mover.rests_s > 0 or travelled_m < legs[mover.leg].from_m:
@@ -190,9 +190,9 @@ class Bodies:
         return velocity
 
     def _around(self, mover: _Mover, wish: Floats, vehicle: Vehicle, dt_s: float) -> Floats:
-        """The wish, so that it goes round what is near: the others, and the vehicle, if it is slow or cannot see it.
+        """Adapt a wanted velocity to avoid others nearby, and the vehicle, if that is slow or cannot see the mover.
 
-        Nobody whom its camera could see looks out for a vehicle that comes.
+        Movers that are in the vehicle's view rely on it to stop.
         """
         row = mover.row
         here = self.position[row]
@@ -222,7 +222,7 @@ class Bodies:
         mover.hindered_s = mover.hindered_s + dt_s if hindered else max(mover.hindered_s - dt_s, 0.0)
         if mover.hindered_s == 0:
             mover.side, mover.patience_s = 0, _PATIENCE_S
-        elif mover.hindered_s > mover.patience_s:  # it does not get round there: the other way, and farther
+        elif mover.hindered_s > mover.patience_s:  # blocked on this side: try the other one, and farther
             mover.side, mover.hindered_s = -mover.side, dt_s
             mover.patience_s *= 2
         return wish

@@ -1,4 +1,4 @@
-"""Worlds from seeds: a course, what happens along it, what stands beside it, and what is wrong with the vehicle."""
+"""Worlds from seeds: a course, events along it, stationary bodies beside it, and faults of the vehicle."""
 
 import math
 import zlib
@@ -17,12 +17,12 @@ from lcf_edge.rendered.drives import Axis, Lens, Paint, Profile, SensorNoise, Sh
 CRUISES_MPS = ((0.3, 0.7), (0.7, 1.3), (1.3, 2.2), (2.2, 4.0))
 CONDITIONS = ("fair", "fair", "vibration", "dusk", "gyro bias", "no gyro", "no speed")
 COURSES = ("straight", "straight", "arc", "slalom", "bend")
-_LOOKS = 6  # of ground and sky: making them takes longer than a drive
+_LOOKS = 6  # textures of ground and sky: making them takes longer than a drive
 _SECONDS = 15.0  # of a drive at its cruise speed
 _EVENT_S = 4.0  # from one event to the next
 _FIRST_S = 3.0
 _TURN_RADPS, _ASIDE_MPS2 = 0.35, 1.0  # most yaw rate and side acceleration
-_BESIDE_M = 0.35  # of what stands beside the course, from the vehicle's flank
+_BESIDE_M = 0.35  # distance of bodies beside the course from the vehicle's flank
 
 
 def make(seed: int, **changes: Any) -> World:
@@ -77,7 +77,7 @@ def _course(random: np.random.Generator, cruise_mps: float) -> Course:
 
 
 def _clutter(draft: Draft) -> None:
-    """What stands beside the course, sparser where it goes fast."""
+    """Bodies beside the course, sparser where it is fast."""
     gaps = (0.9, 2.2) if draft.cruise_mps < CRUISES_MPS[2][0] else (2.0, 4.5)
     for side in (-1, 1):
         at_m = draft.between(0.5, 2.0)
@@ -92,7 +92,7 @@ def _clutter(draft: Draft) -> None:
 
 
 def _dressed(draft: Draft, seed: int, condition: str) -> World:
-    """The world with its looks, and with what is wrong with sensors and light."""
+    """The world with its textures, and with faults of sensors and light."""
     random = draft.random
     bias = random.normal(0, 0.03 if condition == "gyro bias" else 0.004, 3).tolist()
     noise = SensorNoise(

@@ -1,8 +1,8 @@
-"""I2C IMUs as their registers, behind the interface of smbus2: the shipped drivers talk to them.
+"""I2C IMUs simulated at register level, behind the interface of smbus2, for the shipped drivers.
 
-``bus`` has the chips and the faults of the wire, ``chip`` what all chips share, ``motion`` what they feel (a
-recording). ``CHIPS`` has a model by the name that ``imu.driver`` gives to its driver. Sensitivities are written down
-here a second time, from the full scale, not taken from the drivers.
+``bus`` connects the chips and injects bus faults, ``chip`` is their base, ``motion`` the motion that they measure (a
+recording). ``CHIPS`` maps the driver's name in ``imu.driver`` to a model. Sensitivities are derived here independently,
+from the full scale, not taken from the drivers.
 """
 
 from hil_mocks.i2c.bmi import Bmi160, Bmi270

@@ -14,11 +14,11 @@ from hil_mocks.i2c.motion import Vector
 SIX = struct.Struct("<hhh")
 FRAME_BYTES = 12
 WAKES = {0x11: (0x10, 3_800_000), 0x15: (0x04, 80_000_000)}  # CMD of a BMI160: bit of PMU_STATUS, time
-INIT_NS = 20_000_000  # that a BMI270 takes with its file
+INIT_NS = 20_000_000  # time in which a BMI270 loads its firmware
 
 
 class Bmi(SimulatedChip):
-    """What both have alike: a FIFO of whole frames, here without headers; a frame cut short comes again."""
+    """Common parts: a FIFO of whole frames, here without headers; a partially read frame is repeated."""
 
     address = 0x68
     fifo_bytes: int
@@ -139,7 +139,7 @@ class Bmi270(Bmi):
     lean = -20
 
     def power_up(self) -> None:
-        """Also forgets the firmware."""
+        """Also clears the firmware."""
         self._loaded = bytearray(8192)
         self._initialised_at_ns = 0
         super().power_up()

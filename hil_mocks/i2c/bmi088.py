@@ -14,11 +14,11 @@ SIX = struct.Struct("<hhh")
 GYRO_HZ = (2000.0, 2000.0, 1000.0, 400.0, 200.0, 100.0, 200.0, 100.0)  # by the bandwidth's code
 ACCEL_RATE_ERROR = 0.011  # its clock is not the gyro's
 FRAME_BYTES = 7
-SETTINGS_CHANGED = b"\x48\x01"  # a frame that the chip puts in by itself
+SETTINGS_CHANGED = b"\x48\x01"  # a frame that the chip inserts by itself
 
 
 class Accelerometer(SimulatedChip):
-    """The BMI088's accelerometer: asleep at power-on, and while it is nothing can be set but its power."""
+    """The BMI088's accelerometer: suspended at power-on; then only its power registers can be written."""
 
     address = 0x18
     power_on: ClassVar[Mapping[int, int]] = {0x00: 0x1E, 0x40: 0xA8, 0x41: 0x01, 0x48: 0x02, 0x49: 0x10, 0x7C: 0x03}

@@ -12,13 +12,13 @@ from hil_mocks.i2c.motion import Motion, Vector
 ANNOUNCEMENT = bytes(276 - 4)
 ACCELEROMETER, GYRO = 1, 2
 FASTEST_US = {ACCELEROMETER: 2000, GYRO: 2500}
-MAX_PACKETS = 200  # that it keeps
+MAX_PACKETS = 200  # in its queue
 
 
 class Bno08x(SimulatedChip):
-    """It says what it is when it has booted, and then nothing until it is asked for a sensor.
+    """It identifies itself after booting, and then sends nothing until a sensor is enabled.
 
-    What was read of a packet without its end comes again, marked as continued.
+    A partially read packet is repeated, marked as a continuation.
     """
 
     address = 0x4A
@@ -30,7 +30,7 @@ class Bno08x(SimulatedChip):
         self._boots_until_ns = 0  # it was switched on long ago
 
     def power_up(self) -> None:
-        """Forgets what it was asked for, and boots."""
+        """Disables all sensors, and boots."""
         self.intervals_us: dict[int, int] = {}
         self._numbers = [0] * 6
         self._report_numbers = {ACCELEROMETER: 0, GYRO: 0}
@@ -41,7 +41,7 @@ class Bno08x(SimulatedChip):
         self._packets += [(0, ANNOUNCEMENT), (1, b"\x01"), (2, b"\xf1" + bytes(15))]
 
     def rate_hz(self) -> float:
-        """The gyro's; 0 until both were asked for."""
+        """The gyro's rate; 0 until both sensors are enabled."""
         return 1e6 / self.intervals_us[GYRO] if len(self.intervals_us) == len(FASTEST_US) else 0.0
 
     def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
@@ -58,10 +58,10 @@ class Bno08x(SimulatedChip):
         self._packets.append((3, b"\xfb" + bytes(4) + reports))
 
     def clear_fifo(self) -> None:
-        """It has a queue of packets instead."""
+        """Do nothing: it has a queue of packets instead."""
 
     def receive(self, length: int) -> bytes:
-        """Bytes of the packet that comes next; zeros when there is none."""
+        """Return bytes of the next packet; zeros if there is none."""
         self._refuse_while_booting()
         self._catch_up()
         if not self._packets:

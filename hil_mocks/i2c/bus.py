@@ -1,4 +1,4 @@
-"""The wire: chips at their addresses, and what goes wrong on it."""
+"""The bus: chips at their addresses, and bus faults."""
 
 import errno
 import os
@@ -12,7 +12,7 @@ from drivers.clock import Clock
 from hil_mocks.i2c.chip import SimulatedChip
 
 READ = 0x0001  # of a message's flags
-HANG_S = 1.0  # after which Linux gives a transfer up
+HANG_S = 1.0  # after which Linux aborts a transfer
 BLOCK_BYTES = 32
 OVERHEAD_BYTES = 3  # address, register, address again
 CLOCKS_PER_BYTE = 9
@@ -20,7 +20,7 @@ CLOCKS_PER_BYTE = 9
 
 @dataclass(slots=True)
 class Fault:
-    """What befalls the next transfers (of one register, if given)."""
+    """A fault of the next transfers (of one register, if given)."""
 
     left: int
     number: int = 0  # errno; 0: the transfer succeeds with ``changed`` data
@@ -32,9 +32,9 @@ Transfer = Callable[[SimulatedChip], bytes]
 
 
 class SimulatedBus:
-    """Takes the place of ``smbus2.SMBus``. ``transfers``: how many there were; ``closed``: whether it was let go.
+    """Replaces ``smbus2.SMBus``. ``transfers``: their number; ``closed``: whether the bus was closed.
 
-    ``speed_hz``: of the wire's clock; 0: transfers take no time.
+    ``speed_hz``: clock of the bus; 0: transfers take no time.
     """
 
     def __init__(self, clock: Clock, chips: Mapping[int, SimulatedChip], speed_hz: float = 0.0) -> None:
@@ -48,14 +48,14 @@ class SimulatedBus:
         self._faults: deque[Fault] = deque()
 
     def open(self, bus: str) -> None:
-        """As smbus2; this bus is there under any name."""
+        """As smbus2; this bus exists under any name."""
 
     def fail(self, number: int, times: int = 1, register: int | None = None) -> None:
-        """The next transfers (of a register) fail with this ``errno``; faults befall one after the other."""
+        """Make the next transfers (of a register) fail with this ``errno``; faults apply one after the other."""
         self._faults.append(Fault(times, number, register))
 
     def flip(self, at: int, mask: int = 0x80, times: int = 1, register: int | None = None) -> None:
-        """The next reads (of a register) answer with bits of their byte ``at`` inverted."""
+        """Invert bits of byte ``at`` in the next reads (of a register)."""
 
         def changed(data: bytes) -> bytes:
             return data[:at] + bytes([data[at] ^ mask]) + data[at + 1 :]
@@ -90,7 +90,7 @@ class SimulatedBus:
                 message.buf[at] = bytes([value])
 
     def close(self) -> None:
-        """Let the bus go."""
+        """Close the bus."""
         self.closed = True
 
     def _transfer(self, address: int, register: int, transfer: Transfer) -> bytes:

@@ -16,11 +16,10 @@ Counts = tuple[int, int, int]
 
 
 class SimulatedChip(ABC):
-    """A chip's registers. ``rate_error``: share by which its clock is too fast. ``celsius``: of its die.
+    """A chip's registers. ``rate_error``: share by which its clock is too fast. ``celsius``: die temperature.
 
-    Time passes for it when it is accessed. ``power_up`` is also what a chip does that resets itself, ``brown_out`` the
-    same with the time that it takes. ``resets``: how many of those there were. ``acknowledges_reset``: whether it
-    acknowledges the command for one.
+    Its time advances when it is accessed. ``power_up`` sets the state after a reset, ``brown_out`` resets it and takes
+    the time to boot. ``resets``: number of resets. ``acknowledges_reset``: whether it acknowledges the command for one.
     """
 
     address: ClassVar[int]
@@ -41,7 +40,7 @@ class SimulatedChip(ABC):
 
     @property
     def places(self) -> "Mapping[int, SimulatedChip]":
-        """What is to be put on a bus, by address; some chips are two."""
+        """Its devices on a bus, by address; some chips are two."""
         return {self.address: self}
 
     def power_up(self) -> None:
@@ -54,7 +53,7 @@ class SimulatedChip(ABC):
         self.clear_fifo()
 
     def brown_out(self) -> None:
-        """It resets itself, and boots."""
+        """Reset by itself, and boot."""
         self.resets += 1
         self.power_up()
         self._boots_until_ns = self._clock.monotonic_ns() + self.boot_ns
@@ -86,7 +85,7 @@ class SimulatedChip(ABC):
 
     @abstractmethod
     def rate_hz(self) -> float:
-        """At which the registers make it sample; 0 while it does not."""
+        """Sample rate by the registers; 0: not sampling."""
 
     @abstractmethod
     def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
@@ -101,11 +100,11 @@ class SimulatedChip(ABC):
         """Empty it."""
 
     def not_acknowledged(self) -> OSError:
-        """What a transfer ends with that the chip leaves without an answer."""
+        """Return the error of a transfer that the chip does not acknowledge."""
         return OSError(errno.EREMOTEIO, os.strerror(errno.EREMOTEIO))
 
     def _reset(self) -> None:
-        """It was told to."""
+        """Reset on command."""
         self.brown_out()
         if not self.acknowledges_reset:
             raise self.not_acknowledged()
@@ -141,6 +140,6 @@ class SimulatedChip(ABC):
 
 
 def counts(vector: Vector, full_scale: float, full_counts: float = 32768, most: int = 32767) -> Counts:
-    """A vector as a chip sees it whose ``full_scale`` (same unit) is ``full_counts``: rounded, cut off at ``most``."""
+    """Convert a vector to counts, ``full_counts`` at ``full_scale`` (same unit): rounded, clipped at ``most``."""
     x, y, z = (min(max(round(value / full_scale * full_counts), -most - 1), most) for value in vector)
     return x, y, z

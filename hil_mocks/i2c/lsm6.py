@@ -17,7 +17,7 @@ TURN_MDPS_PER_COUNT = (8.75, 17.5, 35.0, 70.0)  # by FS_G
 
 
 class Lsm6(SimulatedChip):
-    """What all have alike. A reset while the FIFO fills is neither acknowledged nor done."""
+    """Common parts. A reset while the FIFO fills is neither acknowledged nor executed."""
 
     address = 0x6A
     boot_ns = 15_000_000

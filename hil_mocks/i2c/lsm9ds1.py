@@ -17,9 +17,9 @@ FORCE_G = (2, 16, 4, 8)
 
 
 class Lsm9ds1(SimulatedChip):
-    """LSM9DS1: of the motion's right-handed axes its x looks the other way.
+    """LSM9DS1: its x axis is opposite to that of the motion's right-handed axes.
 
-    A sample of the FIFO goes when its accelerometer was read, which comes after its gyro.
+    A sample leaves the FIFO when its accelerometer has been read, after its gyro.
     """
 
     address = 0x6A

@@ -1,4 +1,4 @@
-"""What a simulated chip feels."""
+"""The motion that a simulated chip measures."""
 
 from bisect import bisect_right
 from collections.abc import Callable, Sequence
@@ -11,7 +11,7 @@ Motion = Callable[[float], tuple[Vector, Vector]]
 
 
 def replay(samples: Sequence[ImuSample]) -> Motion:
-    """A recording: begins at power-on, straight lines between its samples, holds the last one when it is over."""
+    """A recording from power-on: interpolated linearly, and held at the end."""
     begin_ns = samples[0].stamp_ns
     times_s = [(sample.stamp_ns - begin_ns) / 1e9 for sample in samples]
 

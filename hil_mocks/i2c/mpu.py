@@ -12,7 +12,7 @@ SIX = struct.Struct(">hhh")
 
 
 class Mpu6050(SimulatedChip):
-    """MPU-6050. When its FIFO of bytes runs over, the oldest bytes go, not the oldest samples."""
+    """MPU-6050. When its FIFO overflows, the oldest bytes are lost, not the oldest samples."""
 
     address = 0x68
     power_on: ClassVar[Mapping[int, int]] = {0x6B: 0x40, 0x75: 0x68}

@@ -14,8 +14,8 @@ COMMAND_NS = 1_500_000
 class Qmi8658(SimulatedChip):
     """QMI8658. A command takes time, and its end must be acknowledged.
 
-    At power-on it is big-endian, and addresses do not count up in a burst. Reading STATUSINT when there is a sample
-    locks the data until the last byte of them was read; without that, here, a burst meets a sample that just comes.
+    At power-on it is big-endian, and addresses do not auto-increment in a burst. Reading STATUSINT when there is a
+    sample locks the data until its last byte has been read; without that, here, a burst is torn by a new sample.
     """
 
     address = 0x6B
@@ -25,13 +25,13 @@ class Qmi8658(SimulatedChip):
     _number = 0
 
     def power_up(self) -> None:
-        """Also forgets the samples' number and the command."""
+        """Also clears the sample counter and the command."""
         self._number, self._done_at_ns = 0, None
         self._gated, self._available, self._locked = True, False, False
         super().power_up()
 
     def brown_out(self) -> None:
-        """Also says that the reset is done."""
+        """Also reports that the reset is done."""
         super().brown_out()
         self.registers[0x4D] = 0x80
 

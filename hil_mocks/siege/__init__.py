@@ -1,4 +1,4 @@
-"""A siege: the daemon, its gate and its page under attack by all at once, on loopback, for a bounded time.
+"""A siege: the daemon, its gate and its page under all attacks at once, on loopback, for a bounded time.
 
-``attacks`` are who comes; ``place`` is what they come to; ``figures`` says what must hold meanwhile.
+``attacks`` are the attackers; ``place`` is what they attack; ``__main__`` runs it and checks what must hold meanwhile.
 """

@@ -1,4 +1,4 @@
-"""``python -m hil_mocks.siege``: besiege, and report what it did."""
+"""``python -m hil_mocks.siege``: run the siege, and report the results."""
 
 import argparse
 import socket
@@ -53,7 +53,7 @@ MAX_LINES = 300  # of one log
 
 @dataclass
 class Figures:
-    """What was seen during the siege."""
+    """Measurements during the siege."""
 
     waves: dict[str, int] = field(default_factory=dict)
     let_in_s: list[float] = field(default_factory=list)  # of planners
@@ -76,7 +76,7 @@ class Figures:
         ]
 
     def judge(self, min_share: float) -> None:
-        """Complain of what must not be; of frames, where fewer than this share came."""
+        """Add a complaint for each violation; of frames, if fewer than ``min_share`` were received."""
         for complaint, wrong in (
             (
                 f"a planner was let in after {max(self.let_in_s, default=0):.1f} s",
@@ -96,7 +96,7 @@ class Figures:
 
 
 def free_ports(count: int) -> list[int]:
-    """Of loopback."""
+    """Return free TCP ports on loopback."""
     probes = [socket.socket() for _ in range(count)]
     for probe in probes:
         probe.bind(("127.0.0.1", 0))
@@ -225,7 +225,7 @@ def watched(
 
 
 def wait_for_planner(endpoint: str, settings: str, patience_s: float) -> float:
-    """How long a planner takes from nothing to its first scene, s. Raises ``LcfError``."""
+    """Return how long a planner takes from its start to the first scene, s. Raises ``LcfError``."""
     came = threading.Event()
     begin_s = time.monotonic()
     with opened_session(reading_from(endpoint, settings)) as session:

@@ -34,11 +34,11 @@ UPGRADE = (
     b"GET /updates HTTP/1.1\r\nHost: 127.0.0.1\r\nConnection: Upgrade\r\nUpgrade: websocket\r\n"
     b"Sec-WebSocket-Version: 13\r\nSec-WebSocket-Key: AAAAAAAAAAAAAAAAAAAAAA==\r\n\r\n"
 )
-CLIENT_HELLO = b"\x16\x03\x01\x02\x00\x01"  # as far as it goes
+CLIENT_HELLO = b"\x16\x03\x01\x02\x00\x01"  # incomplete
 
 
 class Attack(threading.Thread):
-    """Calls ``wave`` each ``pause_s`` until it is to end. ``waves`` counts."""
+    """Calls ``wave`` every ``pause_s`` until it is ended. ``waves``: number of calls."""
 
     def __init__(self, name: str, pause_s: float, wave: Callable[[], object]) -> None:
         super().__init__(name=name, daemon=True)
@@ -54,7 +54,7 @@ class Attack(threading.Thread):
             self.waves += 1
 
     def end(self) -> None:
-        """And wait for it."""
+        """Stop, and wait for the thread."""
         self._ends.set()
         self.join(10.0)
 
@@ -74,7 +74,7 @@ class Strangers(Attack):
         self._held[-1].sendall(self._first)
 
     def end(self) -> None:
-        """And leave."""
+        """Stop, and close the connections."""
         super().end()
         for one in self._held:
             one.close()
@@ -98,14 +98,14 @@ class WildImu(Attack):
             os.write(self._ends_of_line[0], b"".join(islice(self._pieces, LINES_AT_ONCE)))
 
     def end(self) -> None:
-        """And be pulled out."""
+        """Stop, and unplug."""
         super().end()
         for one in self._ends_of_line:
             os.close(one)
 
 
 def liar(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
-    """A local process that speaks for the rover, sends what is too large, and asks without listening."""
+    """A local process that impersonates the rover, sends oversized messages, and queries without listening."""
 
     def wave() -> None:
         with opened_session(Zenoh(mode="client", connect=[endpoint], listen=[])) as session:
@@ -124,7 +124,7 @@ def liar(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
 
 
 def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
-    """A local process that declares what nobody needs, and goes; Zenoh keeps part of it."""
+    """A local process that makes useless declarations, and disconnects; Zenoh keeps part of them."""
     turn = iter(range(2**30))
 
     def wave() -> None:
@@ -138,7 +138,7 @@ def declarer(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
 
 
 def wild(endpoint: str, settings: str = "", prefix: str = "lcf") -> Callable[[], None]:
-    """A party, or a local program, whose keys take Zenoh long to compare: one of many wildcards, many of two."""
+    """A client whose keys take Zenoh long to compare: one of many wildcards, many of two."""
     turn = iter(range(2**30))
     options = Zenoh(mode="client", connect=[endpoint], listen=[], config_file=settings)
 
@@ -148,7 +148,7 @@ def wild(endpoint: str, settings: str = "", prefix: str = "lcf") -> Callable[[],
             deep = first.declare_publisher("/".join("a" * LEVELS))
             many = [second.declare_publisher(f"{prefix}/**/{number}/**/{n}") for n in range(WILD)]
             one = second.declare_publisher("**/a/" * (LEVELS // 4) + str(number))
-            time.sleep(WILD_S)  # the sessions come again when they are cut
+            time.sleep(WILD_S)  # the sessions reconnect when they are cut
             del deep, many, one
 
     return wave
@@ -167,7 +167,7 @@ def flood(endpoint: str, prefix: str = "lcf") -> Callable[[], None]:
 
 
 def reloads(file: Path, good: str) -> Callable[[], None]:
-    """In turn a configuration that is broken, wrong, unreadably large, and good."""
+    """Write in turn a configuration that is malformed, invalid, too large, and good."""
     texts = ("nonsense = 1\n", "[filter]\ntr_s = -1.0\n", "a" * 3_000_000, good)
     turn = iter(range(2**30))
 
@@ -180,7 +180,7 @@ def reloads(file: Path, good: str) -> Callable[[], None]:
 
 
 def frames(port: int) -> Callable[[], None]:
-    """A browser that sends what is no frame of a WebSocket, another one each time."""
+    """A browser that sends invalid WebSocket frames, a different one each time."""
     wrong = (
         b"\x81\xff" + b"\xff" * 8 + bytes(4),
         b"\x01\x81\0\0\0\0a" * 1000,

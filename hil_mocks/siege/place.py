@@ -1,4 +1,4 @@
-"""What is besieged: processes, each with its log, descriptors and memory; and the certificates of a planner."""
+"""The targets of a siege: processes, each with its log, descriptors and memory; and the certificates of a planner."""
 
 import json
 import os
@@ -37,27 +37,27 @@ class Process:
 
     @property
     def status(self) -> int | None:
-        """Of its end; None: it runs."""
+        """Its exit status; None: it runs."""
         return self._process.poll()
 
     @property
     def descriptors(self) -> int:
-        """That it has open."""
+        """Number of open descriptors."""
         return len(list(Path(f"/proc/{self.pid}/fd").iterdir()))
 
     @property
     def resident_mib(self) -> float:
-        """Of memory."""
+        """Resident memory, MiB."""
         pages = int(Path(f"/proc/{self.pid}/statm").read_text(encoding="ascii").split()[1])
         return pages * os.sysconf("SC_PAGE_SIZE") / MIB
 
     @property
     def said(self) -> list[str]:
-        """Its lines so far."""
+        """Its log lines so far."""
         return self.log.read_text(encoding="utf-8", errors="replace").splitlines()
 
     def end(self) -> int:
-        """Ask it to end; its status, -9 where it did not."""
+        """Terminate it; returns its exit status, -9 if it had to be killed."""
         self._process.terminate()
         try:
             return self._process.wait(10.0)

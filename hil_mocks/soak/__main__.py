@@ -26,15 +26,15 @@ from lcf_edge.zenoh_link import opened_session
 
 KINDS = ("crossing", "passing", "two_crossing", "oncoming")  # of drives, in turn
 SILENT_S = 60.0  # without diagnostics: the daemon is stuck, or gone
-SETTLED = 3  # seconds with the same counters: all images are where they belong
-RELOAD_EACH_S = 20.0  # in the mean
+SETTLED = 3  # seconds with constant counters: no image is on its way
+RELOAD_EACH_S = 20.0  # on average
 LOOK_EACH_S = 15.0
 ENDS_WITHIN_S = 10.0
 BUDGET_MIB = 192.0  # the drive's images are in it
 
 
 class SoakError(LcfError):
-    """The daemon did what it must not do."""
+    """The daemon misbehaved."""
 
 
 class Daemon:
@@ -82,7 +82,7 @@ class Daemon:
         new.replace(self.config)
 
     def look(self, *, on: bool) -> None:
-        """Subscribe to the preview, or no longer."""
+        """Subscribe to the preview, or unsubscribe."""
         if on and self._preview is None:
             self._preview = self._session.declare_subscriber("lcf/preview/compressed", lambda _: None)
         elif not on and self._preview is not None:
@@ -99,11 +99,11 @@ class Daemon:
             ) from None
 
     def last_line(self) -> str:
-        """Of its log."""
+        """The last line of its log."""
         return (self.log.read_text(encoding="utf-8", errors="replace").splitlines() or ["(it is empty)"])[-1]
 
     def pause(self) -> None:
-        """Let no image come."""
+        """Stop the images, or continue them."""
         self._process.send_signal(signal.SIGUSR1)
 
     go_on = pause
@@ -124,7 +124,7 @@ class Daemon:
         return time.monotonic() - begin_s
 
     def close(self) -> None:
-        """Leave nothing behind."""
+        """Clean up."""
         self._process.kill()
         self._process.wait()
         self.look(on=False)
@@ -163,7 +163,7 @@ def live(daemon: Daemon, life: Life, frame_limit: int, seconds: float) -> None:
 
 
 def disturb(daemon: Daemon) -> None:
-    """Now and then a new configuration, a wrong one, somebody who looks or looks away."""
+    """Now and then, write a new or an invalid configuration, or subscribe or unsubscribe."""
     if daemon.random.random() < 1 / RELOAD_EACH_S:
         daemon.random.choice((daemon.spoil_configuration, lambda: daemon.configure(daemon.random.uniform(0.2, 0.6))))()
     if daemon.random.random() < 1 / LOOK_EACH_S:
@@ -171,7 +171,7 @@ def disturb(daemon: Daemon) -> None:
 
 
 def soak(frame_limit: int, seconds: float, lives: int, seed: int, folder: Path) -> list[Life]:
-    """As many lives of the daemon, ended in turn by SIGTERM and SIGKILL, with log and memory of each in ``folder``.
+    """Run the daemon that many times, ended in turn by SIGTERM and SIGKILL, with log and memory of each in ``folder``.
 
     Raises ``LcfError``.
     """

@@ -22,7 +22,7 @@ def main(argv: Sequence[str]) -> int:
     feed = Feed(Path(drive), int(seed), time.monotonic_ns())
 
     class TellingLink(link.Link):
-        """Tells the feed of each scene."""
+        """Notifies the feed of each scene."""
 
         def put_scene(self, scene: Scene) -> None:
             super().put_scene(scene)

@@ -1,4 +1,4 @@
-"""What a soak comes to, reckoned from the daemon's diagnostics."""
+"""Results of a soak test, computed from the daemon's diagnostics."""
 
 import math
 from collections import Counter
@@ -17,7 +17,7 @@ Parts = Mapping[str, DeviceStatus]
 
 @dataclass(frozen=True, slots=True)
 class Balance:
-    """Where the images of one life are."""
+    """Balance of the images of one run."""
 
     delivered: int
     put: int
@@ -35,7 +35,7 @@ class Balance:
 
     @property
     def lost(self) -> int:
-        """Frames that left no trace; while images come, one or two are on their way."""
+        """Unaccounted frames; while images come, one or two are in transit."""
         return self.delivered - self.put - self.overtaken
 
 
@@ -132,7 +132,7 @@ def _warm(memory: Sequence[tuple[int, float]]) -> float:
 
 
 def complaints(lives: Sequence[Life], allowed_mib: float) -> list[str]:
-    """What a soak must not show: one line each."""
+    """Violations: one line each."""
     found = [f"life {n}: {life.balance.lost} images lost" for n, life in enumerate(lives, 1) if life.balance.lost]
     found += [f"life {n}: {life.gave_up}" for n, life in enumerate(lives, 1) if life.gave_up]
     found += [

@@ -1,4 +1,4 @@
-"""Camera, IMU and odometry of one drive that is driven again and again, as fast as the daemon takes its images.
+"""Camera, IMU and odometry of one looped drive, as fast as the daemon takes its images.
 
 The drive's own time runs: stamps are those of a vehicle in real time, only that they come sooner. Whoever knows that a
 image became a scene calls ``Feed.taken``, and the next one comes. Faults come at random, from a seed.
@@ -21,8 +21,8 @@ from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import stamp_ns
 
 WAIT_S = 0.25  # of one read
-CAMERA_FAULT_EACH = 1500  # images, in the mean
-SAMPLES_FAULT_EACH = 3000  # reads of IMU or odometry, in the mean
+CAMERA_FAULT_EACH = 1500  # images, on average
+SAMPLES_FAULT_EACH = 3000  # reads of IMU or odometry, on average
 MAX_FAULT = 40  # images
 
 Table = npt.NDArray[np.float64]
@@ -68,11 +68,11 @@ class Feed:
         self._goes_on.set()
 
     def taken(self) -> None:
-        """The newest image is done with."""
+        """The newest image has been processed."""
         self._taken.set()
 
     def pause_or_go_on(self) -> None:
-        """No image comes until it is called again; for a signal handler."""
+        """Stop the images, until called again; for a signal handler."""
         (self._goes_on.clear if self._goes_on.is_set() else self._goes_on.set)()
 
     def await_taken(self) -> bool:
@@ -92,13 +92,13 @@ class Feed:
         return stamp_ns
 
     def await_after(self, stamp_ns: int) -> int:
-        """Wait until time has passed ``stamp_ns``, a little at most. Return the time."""
+        """Wait briefly until time has passed ``stamp_ns``. Return the time."""
         with self._passed:
             self._passed.wait_for(lambda: self._horizon_ns > stamp_ns, WAIT_S)
             return self._horizon_ns
 
     def fault(self, device: str, kinds: Sequence[str], each: int) -> str:
-        """A fault of ``device`` that begins now, mostly none ("")."""
+        """Draw a fault of ``device`` that begins now, mostly none ("")."""
         if self.random.random() * each > 1:
             return ""
         kind = self.random.choice(kinds)
@@ -151,7 +151,7 @@ class FastCamera:
             raise DeviceLostError(f"{self.name}: unplugged; plug it in again")
 
     def _skipped(self) -> int:
-        """Images that the camera counts and nobody gets."""
+        """Images that the camera counts but does not deliver."""
         most = {"dropped": MAX_FAULT, "leap": 200}.get(self._fault, 0)
         skipped = self._feed.random.randint(1, most) if most else 0
         self.counts["dropped"] += skipped
