@@ -149,7 +149,7 @@ def without(*seqs: int) -> list[int]:
     return [seq for seq in range(FRAMES) if seq not in seqs]
 
 
-def test_a_good_recording_has_nothing_to_tell(replay: Callable[..., Replayed], drive: Drive) -> None:
+def test_a_good_recording_has_nothing_to_report(replay: Callable[..., Replayed], drive: Drive) -> None:
     done = replay(drive.root)
     assert (done.status, done.warnings, done.skipped) == (0, [], {})
     assert done.sequence == without()

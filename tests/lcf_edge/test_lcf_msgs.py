@@ -43,7 +43,7 @@ def test_the_published_schema_is_made_of_the_same_messages() -> None:
     assert all(text.decode() in schema for text in MESSAGES.values())
 
 
-def test_classes_can_be_made_of_what_a_daemon_tells_without_ros_and_without_this_package(rover: Any) -> None:
+def test_classes_can_be_made_of_what_a_daemon_sends_without_ros_and_without_this_package(rover: Any) -> None:
     document = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
     (code,) = (code for code in re.findall(r"```python\n(.*?)```", document, re.DOTALL) if "rosbags" in code)
     assert "lcf_edge" not in code

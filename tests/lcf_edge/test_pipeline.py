@@ -264,7 +264,7 @@ def test_an_image_that_stands_still_is_noted_although_the_odometry_goes_on(appro
     frozen = [replace(item, image=image) if isinstance(item, Frame) else item for item in drive]
     *_, last = outcomes(frozen, Config(camera=Camera(height_m=0.3)))
     assert "stands still" in last.scene.notes
-    assert last.scene.vehicle_speed == pytest.approx(2.0)  # as it is told
+    assert last.scene.vehicle_speed == pytest.approx(2.0)  # as reported
     assert not any("stands still" in each.scene.notes for each in outcomes(drive))
 
 
@@ -280,7 +280,7 @@ def test_positions_are_px_of_the_input_frame(approach: Approach, lens: Lens) -> 
     assert (circles["x"] <= lens.width - 1).all()
     assert (circles["y"] >= 0).all()
     assert (circles["y"] <= lens.height - 1).all()
-    assert np.allclose(seen[-1].view.focus, (lens.cx, lens.cy), atol=4.0)  # as corners of whole px tell it
+    assert np.allclose(seen[-1].view.focus, (lens.cx, lens.cy), atol=4.0)  # as far as corners of whole px show it
     for each in seen[5:]:
         kept = each.view.corners[~each.view.omitted]
         estimated = np.concatenate([each.view.edges, each.view.rebels])

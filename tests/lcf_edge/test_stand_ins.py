@@ -186,7 +186,7 @@ class Seen:
 
     threats: dict[str, float | None]  # after how long each was found, s
     rotations: np.ndarray  # (images, 3, 3) of the camera since the image before
-    notes: set[str]  # but for the first images, which tell the gyro's bias
+    notes: set[str]  # except for the first images, from which the gyro's bias is learnt
 
 
 def driven(config: Config, events: Iterable[Frame | ImuSample | SpeedSample]) -> Seen:

@@ -42,19 +42,19 @@ def rendered(turntable: Make, given: Make) -> tuple[Any, Floats, float]:
     return given(table.samples(), table.frames(), lens=table.lens), axes, offset_s
 
 
-def test_images_tell_the_axes_within_a_degree(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
+def test_images_show_the_axes_within_a_degree(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
     source, axes, _ = rendered
     found = calibrate_by_camera(source, Config(), None, 0.0, guide)
     assert np.degrees(angle_rad(np.array(found.values["axes"]), axes)) < 0.5
     assert any("37 ms apart, which is not configured: run lcf-edge calibrate time" in line for line in found.findings)
 
 
-def test_images_tell_the_offset_within_3_ms(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
+def test_images_show_the_offset_within_3_ms(rendered: tuple[Any, Floats, float], guide: Guide) -> None:
     source, _, offset_s = rendered
     assert calibrate_time(source, Config(), None, guide).values["time_offset_s"] == pytest.approx(offset_s, abs=0.001)
 
 
-def test_a_drive_past_near_things_tells_the_offset_within_3_ms(given: Make, guide: Guide) -> None:
+def test_a_drive_past_near_things_shows_the_offset_within_3_ms(given: Make, guide: Guide) -> None:
     drive = scenes.make("turn", 4)
     weave = scenes.Profile(tuple((0.5 * knot, float(rate)) for knot, rate in enumerate(UNEVEN.uniform(-0.5, 0.5, 13))))
     drive = replace(drive, seconds=6.0, yaw_rate=weave, lens=scenes.Lens(width=240, height=180, focal_px=190.0))
@@ -94,7 +94,7 @@ def only(row: int, rate: float = 1.0) -> Callable[[Floats], Floats]:
     return angles
 
 
-def test_one_axis_tells_the_offset_but_not_the_axes(turntable: Make) -> None:
+def test_one_axis_shows_the_offset_but_not_the_axes(turntable: Make) -> None:
     table = turntable(only(0), offset_s=0.02)
     assert align(table.turns(), table.samples()).offset_s == pytest.approx(0.02, abs=0.002)
     with pytest.raises(CalibrationError, match=r"turn more about the camera's (x: nod|z: roll) and (x: nod|z: roll)"):
@@ -113,7 +113,7 @@ def swinging(times_s: Floats) -> Floats:
         ("apart by more than 0.5 s", {"offset_s": 0.53}),
     ],
 )
-def test_motion_that_tells_nothing_is_refused(turntable: Make, message: str, change: dict[str, Any]) -> None:
+def test_motion_that_shows_nothing_is_refused(turntable: Make, message: str, change: dict[str, Any]) -> None:
     table = turntable(**change)
     with pytest.raises(CalibrationError, match=message):
         align(table.turns(0.002), table.samples())

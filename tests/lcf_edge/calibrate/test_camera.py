@@ -1,4 +1,4 @@
-"""The lens that a board was seen through is found again, or the reason is told why not."""
+"""The lens that a board was seen through is recovered, or the reason why not is reported."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -53,11 +53,11 @@ def is_that_lens(result: Result, lens: Lens) -> None:
     assert np.abs(np.arctan(bearings[0]) - np.arctan(bearings[1])).max() < np.radians(0.4)
 
 
-def test_a_checkerboard_tells_the_lens(found: Result) -> None:
+def test_a_checkerboard_determines_the_lens(found: Result) -> None:
     is_that_lens(found, WEBCAM)
 
 
-def test_a_charuco_board_tells_a_fisheye(given: Make, guide: Guide, studio: Make) -> None:
+def test_a_charuco_board_determines_a_fisheye(given: Make, guide: Guide, studio: Make) -> None:
     is_that_lens(calibrated(given, studio(CHARUCO, FISHEYE).views(11), CHARUCO, guide, "equidistant"), FISHEYE)
 
 
@@ -78,7 +78,7 @@ def test_the_stated_uncertainty_is_about_right(studio: Make, lens: Lens, model: 
         (r"corners are \d.\d+ px from where a radial-tangential lens would put them", {"noise_px": 3.0}),
     ],
 )
-def test_views_that_tell_no_lens_are_refused(studio: Make, message: str, views: dict[str, float]) -> None:
+def test_views_that_determine_no_lens_are_refused(studio: Make, message: str, views: dict[str, float]) -> None:
     with pytest.raises(CalibrationError, match=message):
         solve(studio(CHECKERBOARD, WEBCAM).sightings(12, **views), "radial-tangential")
 

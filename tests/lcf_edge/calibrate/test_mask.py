@@ -63,7 +63,7 @@ def test_who_stands_still_is_told_to_drive() -> None:
         own_parts(watched(still))
 
 
-def test_few_images_tell_nothing() -> None:
+def test_few_images_show_nothing() -> None:
     with pytest.raises(CalibrationError, match="20 are needed"):
         own_parts(watched(images_of(scenes.make("passing", 23, seconds=2.0))))
 

@@ -1,4 +1,4 @@
-"""What an IMU tells by itself: noise at rest, and its axes from motions by hand."""
+"""What an IMU shows by itself: noise at rest, and its axes from motions by hand."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -56,7 +56,7 @@ def at_rest(turntable: Make) -> list[ImuSample]:
     return samples
 
 
-def test_rest_tells_bias_noise_and_gravity(at_rest: list[ImuSample], given: Make, guide: Guide) -> None:
+def test_rest_shows_bias_noise_and_gravity(at_rest: list[ImuSample], given: Make, guide: Guide) -> None:
     rest = measure(at_rest)
     assert rest.bias_radps == pytest.approx((0.01, -0.02, 0.015), abs=0.001)
     assert rest.noise_radps == pytest.approx(0.005, rel=0.1)
@@ -119,7 +119,7 @@ def test_too_little_or_saturated_rest_is_refused(at_rest: list[ImuSample]) -> No
 
 
 @pytest.mark.parametrize("axes", [CHIP, EXACT[5], EXACT[17]], ids=str)
-def test_motions_by_an_unsteady_hand_tell_exact_axes(turntable: Make, given: Make, guide: Guide, axes: Floats) -> None:
+def test_motions_by_an_unsteady_hand_show_exact_axes(turntable: Make, given: Make, guide: Guide, axes: Floats) -> None:
     samples = of_motions(turntable, axes=axes, angles=by_hand(40, 50, 80, askew_deg=8))
     result = calibrate_motions(given(samples), Config(), radians(15), guide)
     assert result.values["axes"] == axes.tolist()
@@ -127,7 +127,7 @@ def test_motions_by_an_unsteady_hand_tell_exact_axes(turntable: Make, given: Mak
     assert any("taken as exact" in line for line in result.findings)
 
 
-def test_straight_motions_tell_any_axes_within_a_degree(turntable: Make, given: Make, guide: Guide) -> None:
+def test_straight_motions_show_any_axes_within_a_degree(turntable: Make, given: Make, guide: Guide) -> None:
     axes = best_rotation(np.random.default_rng(8).normal(size=(3, 3)))[0]
     result = calibrate_motions(given(of_motions(turntable, axes=axes)), Config(), 0.0, guide)
     assert angle_rad(np.array(result.values["axes"]), axes) < radians(1)
@@ -151,7 +151,7 @@ def test_the_mounting_of_the_camera_is_allowed_for(turntable: Make, given: Make,
         ("end before this was seen: left turn", by_hand(left_deg=20)),
     ],
 )
-def test_motions_that_tell_no_axes_are_refused(
+def test_motions_that_show_no_axes_are_refused(
     turntable: Make, given: Make, guide: Guide, message: str, angles: Any
 ) -> None:
     with pytest.raises(CalibrationError, match=message):

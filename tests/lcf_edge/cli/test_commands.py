@@ -54,7 +54,7 @@ def lcf_edge(*arguments: object, cwd: Path = Path(), **environment: str) -> Done
 
 
 def is_one_line(errors: str, *parts: str) -> bool:
-    """One error that tells all of ``parts``, after warnings perhaps; no traceback."""
+    """One error that contains all of ``parts``, after warnings perhaps; no traceback."""
     *warnings, error = errors.splitlines()
     return (
         all(line.startswith("lcf-edge: warning: ") for line in warnings)
@@ -172,7 +172,7 @@ def test_config_prints_what_load_reads_back(tmp_path: Path) -> None:
     assert load(file) == load(None, ["vehicle.half_width_m=0.6", "filter.profile=paper"])
 
 
-def test_config_tells_the_bytes_of_each_table_and_in_all() -> None:
+def test_config_shows_the_bytes_of_each_table_and_in_all() -> None:
     text = lcf_edge("config").stdout
     assert tomllib.loads(text)["vehicle"]["horizon_s"] == 4.0
     rows = {
@@ -241,7 +241,7 @@ def replayed(recording: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple
     return done, folder
 
 
-def test_replay_tells_a_summary_and_away_from_a_terminal_nothing_else(replayed: tuple[Done, Path]) -> None:
+def test_replay_prints_a_summary_and_away_from_a_terminal_nothing_else(replayed: tuple[Done, Path]) -> None:
     done, _ = replayed
     assert (done.returncode, done.stderr) == (0, "")
     assert f"frames   {FRAMES}, 2.3 s of recording" in done.stdout

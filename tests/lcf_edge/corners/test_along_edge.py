@@ -1,4 +1,4 @@
-"""Corners and places along an edge are told apart by the structure tensor around them."""
+"""Corners are distinguished from points along an edge by the structure tensor around them."""
 
 from collections.abc import Callable
 

@@ -1,4 +1,4 @@
-"""What is wrong with an image is told in a word."""
+"""Faults of an image are reported in a word."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""An image that comes once more tells nothing new, and is known by it."""
+"""A repeated image holds nothing new, and is recognised."""
 
 import numpy as np
 import numpy.typing as npt

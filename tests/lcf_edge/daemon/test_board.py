@@ -35,10 +35,10 @@ def test_a_processor_that_is_being_cooled_is_slowed(tmp_path: Path) -> None:
     ("bits", "slowed"),
     [("0", ()), ("5", ("under-voltage", "throttled")), ("50000", ()), ("d0008", ("soft temperature limit",))],
 )
-def test_the_firmware_of_a_raspberry_pi_tells_more(tmp_path: Path, bits: str, slowed: tuple[str, ...]) -> None:
+def test_the_firmware_of_a_raspberry_pi_reports_more(tmp_path: Path, bits: str, slowed: tuple[str, ...]) -> None:
     tree = write(tmp_path, {"devices/platform/soc/soc:firmware/get_throttled": bits})
     assert read_board(tree).slowed == slowed
 
 
-def test_a_board_that_tells_nothing(tmp_path: Path) -> None:
+def test_a_board_that_reports_nothing(tmp_path: Path) -> None:
     assert read_board(tmp_path) == Board(None, ())

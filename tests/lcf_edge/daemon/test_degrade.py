@@ -1,4 +1,4 @@
-"""What makes the scenes worse is told in words."""
+"""What degrades the scenes is reported in words."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""Whoever uses up the descriptors: some stay in reserve for devices and files, and the shortage is told."""
+"""Whoever uses up the descriptors: some stay in reserve for devices and files, and the shortage is reported."""
 
 import os
 import subprocess

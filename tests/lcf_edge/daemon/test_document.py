@@ -1,4 +1,4 @@
-"""docs/operation.md tells what the daemon does; each row of its table of what may be missing has a test."""
+"""docs/operation.md describes what the daemon does; each row of its table of what may be missing has a test."""
 
 import re
 from pathlib import Path
@@ -30,7 +30,7 @@ TESTS = {
     "system clock set": "test_stamps_follow_a_step_of_the_system_clock_and_it_is_reported",
     "disk full, or gone": "test_a_disk_that_takes_nothing_costs_the_recording_only",
     "memory short": "test_over_the_mark_it_gives_up_the_preview_then_corners_and_says_so",
-    "file descriptors used up by connections": "test_without_descriptors_it_lives_tells_and_reads_its_configuration",
+    "file descriptors used up by connections": "test_without_descriptors_it_lives_reports_and_reads_its_configuration",
     "board hot": "test_a_board_that_is_hot_is_reported",
 }
 

@@ -38,7 +38,7 @@ def test_an_event_is_one_line() -> None:
     ]
 
 
-def test_journald_is_told_the_priority(tmp_path: Path) -> None:
+def test_journald_gets_the_priority(tmp_path: Path) -> None:
     with (tmp_path / "journal").open("w+", encoding="utf-8") as stream:
         status = os.fstat(stream.fileno())
         log.start("debug", stream, {"JOURNAL_STREAM": f"{status.st_dev}:{status.st_ino}"})

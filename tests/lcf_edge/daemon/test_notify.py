@@ -1,4 +1,4 @@
-"""systemd is told in its own words, and nothing it does holds the daemon up."""
+"""systemd is notified by its own protocol, and nothing it does holds the daemon up."""
 
 import os
 import socket

@@ -154,7 +154,7 @@ class TooMuch:
         pass
 
 
-def test_what_is_dropped_for_being_too_much_is_told_once(
+def test_what_is_dropped_for_being_too_much_is_reported_once(
     caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("lcf_edge.daemon.reader._COUNTS_EACH_NS", 0)

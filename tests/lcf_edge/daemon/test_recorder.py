@@ -256,7 +256,7 @@ def test_a_normal_circle_is_no_threat(tmp_path: Path, begin: Begin) -> None:
 
 
 @pytest.mark.parametrize(("probability", "files"), [(0.8, 1), (0.2, 0)])
-def test_where_there_is_an_object_it_tells_whether_it_threatens_and_not_its_circles(
+def test_where_there_is_an_object_it_decides_whether_it_threatens_and_not_its_circles(
     tmp_path: Path, begin: Begin, probability: float, files: int
 ) -> None:
     walker = np.zeros(1, OBJECT)

@@ -163,7 +163,7 @@ sys.exit(main(sys.argv[1:]))
 
 
 @pytest.mark.parametrize("years", [200, 300, 9000])
-def test_a_clock_that_no_message_can_tell_is_no_end(start: Start, manager: Any, tmp_path: Path, years: int) -> None:
+def test_a_clock_that_no_message_can_express_is_no_end(start: Start, manager: Any, tmp_path: Path, years: int) -> None:
     daemon = start("record.when=always", f"record.folder={tmp_path}", program=("-c", LATE.format(years=years)))
     manager.until("READY=1")
     for _ in range(3):
@@ -193,7 +193,7 @@ sys.exit(main(sys.argv[1:]))
 """
 
 
-def test_without_descriptors_it_lives_tells_and_reads_its_configuration(
+def test_without_descriptors_it_lives_reports_and_reads_its_configuration(
     start: Start, manager: Any, tmp_path: Path
 ) -> None:
     fifo = tmp_path / "fifo"

@@ -167,7 +167,7 @@ def test_every_frame_is_a_scene_or_counted(
 # Health.
 
 
-def test_diagnostics_tell_of_each_part(config: Config, runs: Runs, link: Any) -> None:
+def test_diagnostics_report_each_part(config: Config, runs: Runs, link: Any) -> None:
     runs.start(config)
     link.wait_for(lambda: link.statuses and int(link.statuses["pipeline"].values["scenes"]) > 20)
     assert {"camera", "imu", "speed", "pipeline", "memory", "board", "link"} == set(link.statuses)
@@ -386,7 +386,7 @@ def test_a_pipeline_that_fails_does_not_take_the_place_of_the_old_one(
     caplog: pytest.LogCaptureFixture,
     broken: str,
 ) -> None:
-    """However it fails: of a mistake in the program it is told in one line."""
+    """However it fails, a mistake in the program is reported in one line."""
     path = written(tmp_path, config)
     begun = runs.start(config, path)
     manager.until("READY=1")

@@ -35,7 +35,7 @@ def machine(tmp_path: Path, clock: VirtualClock) -> Machine:
 
 @pytest.fixture
 def process(tmp_path: Path) -> Callable[..., None]:
-    """A process of that machine, with its command line and what it has open; None: that is not told."""
+    """A process of that machine, with its command line and what it has open; None: not shown."""
 
     def run(pid: int, *words: str, opened: tuple[str, ...] = ()) -> None:
         folder = tmp_path / "proc" / str(pid)

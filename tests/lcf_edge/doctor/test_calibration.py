@@ -1,4 +1,4 @@
-"""What the filter was not told about the vehicle."""
+"""What is not configured about the vehicle."""
 
 import shlex
 import stat
@@ -85,7 +85,7 @@ def test_a_camera_that_turns_show_elsewhere_than_configured_is_warned_of(machine
         assert found.text == f"camera.ahead_m is 0, driving shows {float(ahead_m):.3f} ± {float(sigma_m):.3f}"
 
 
-def test_what_a_daemon_of_another_version_tells_is_left_alone(machine: Machine) -> None:
+def test_what_a_daemon_of_another_version_reports_is_left_alone(machine: Machine) -> None:
     assert learnt(machine, "unknown", "0.0030") == []
 
 

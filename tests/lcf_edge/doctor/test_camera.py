@@ -220,7 +220,7 @@ def test_an_exposure_longer_than_the_frame_is_why_it_is_slow(look: Look, webcam:
     assert "--set camera.exposure_s=0.0167" in found.remedy
 
 
-def test_a_camera_that_tells_no_exposure_is_good(look: Look, webcam: MockCamera) -> None:
+def test_a_camera_that_reports_no_exposure_is_good(look: Look, webcam: MockCamera) -> None:
     del webcam.controls[v4l2.CID_EXPOSURE_ABSOLUTE]
     assert all(finding.level is Severity.OK and "exposure" not in finding.text for finding in look())
 

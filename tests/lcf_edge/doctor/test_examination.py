@@ -80,7 +80,7 @@ def test_without_a_configuration_the_rest_is_looked_at(machine: Machine) -> None
     }
 
 
-def test_the_configuration_tells_where_it_comes_from(tmp_path: Path) -> None:
+def test_the_configuration_shows_where_it_comes_from(tmp_path: Path) -> None:
     file = tmp_path / "rover.toml"
     file.write_text("[camera]\nheight_m = 0.4\n")
     context = context_of(file, ["vehicle.speed_mps=1.0"])

@@ -259,7 +259,7 @@ def test_a_noisy_wire_is_reported(machine: Machine, clock: VirtualClock, write: 
         (lambda t: ((t % 1, 0.0, 0.0), (0.0, 0.0, 9.81)), Severity.WARN, "moving"),
     ],
 )
-def test_what_no_imu_at_rest_tells(look: Look, motion: Motion, level: Severity, text: str) -> None:
+def test_what_no_imu_at_rest_shows(look: Look, motion: Motion, level: Severity, text: str) -> None:
     found = bad(look(Imu(driver="mpu6050"), "mpu6050", motion))
     assert found.level is level
     assert found.text.startswith(text)

@@ -220,7 +220,7 @@ def test_the_ports_of_the_file_are_looked_at_too(machine: Machine, endpoint: str
 
 @pytest.fixture
 def running(endpoint: str) -> Iterator[Config]:
-    """All of a daemon that is on Zenoh, and tells diagnostics until the end; its configuration."""
+    """All of a daemon that is on Zenoh, publishing diagnostics until the end; its configuration."""
     config = Config(zenoh=Zenoh(listen=[endpoint]))
     link = Link(open_session(config.zenoh), config)
     statuses = [

@@ -1,4 +1,4 @@
-"""Rendered drives whose gyro has a bias, dies, sticks or is missing; and a sudden shock: the images tell the rest."""
+"""Rendered drives whose gyro has a bias, dies, sticks or is missing; and a sudden shock: the images show the rest."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -118,7 +118,7 @@ def test_a_bias_is_learnt_while_the_vehicle_drives(truth: list[np.ndarray], bias
     assert np.median(seen.given_mrad[10:]) < 0.5  # a quarter of a pixel
 
 
-def test_without_an_imu_the_images_tell_the_turn(truth: list[np.ndarray]) -> None:
+def test_without_an_imu_the_images_show_the_turn(truth: list[np.ndarray]) -> None:
     seen = driven(truth, none)
     assert all("no imu" in notes for notes in seen.notes)
     assert np.percentile(seen.given_mrad[10:], 90) < 6.0

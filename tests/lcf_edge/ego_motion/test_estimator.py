@@ -206,7 +206,7 @@ class TestUncertainty:
         np.testing.assert_array_equal(motion.rotation, np.eye(3))
         assert motion.rotation_sigma_rad == pytest.approx(0.1 * 0.1)
 
-    def test_without_imu_odometry_tells_the_turn(self) -> None:
+    def test_without_imu_odometry_gives_the_turn(self) -> None:
         ego = estimator()
         for t in np.arange(0, 1, 0.1):
             ego.add_speed(SpeedSample(ns(t), 1.0, 0.4))
@@ -390,7 +390,7 @@ class TestBrokenGyro:
         assert after.rotation_sigma_rad > 5 * before.rotation_sigma_rad / 0.05 * 0.1
         assert after.yaw_rate_radps == pytest.approx(before.path_yaw_rate_radps, abs=0.2)  # it goes on as it went
 
-    def test_the_image_tells_the_rotation_when_the_gyro_died(self) -> None:
+    def test_the_image_gives_the_rotation_when_the_gyro_died(self) -> None:
         ego = calibrated()
         feed(ego, np.arange(0, 1, 0.01), gyro=self.alive)
         ego.advance(ns(1.4))

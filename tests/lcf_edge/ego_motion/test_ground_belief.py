@@ -80,7 +80,7 @@ def played(source: str) -> Iterator[tuple[Scene, float]]:
 
 
 @pytest.mark.parametrize("source", ["auto", "imu"])
-def test_images_alone_tell_the_speed_and_say_so(source: str) -> None:
+def test_images_alone_give_the_speed_and_say_so(source: str) -> None:
     after = list(played(source))[WARM_UP:]
     shares = [scene.vehicle_speed / speed_mps for scene, speed_mps in after]
     assert np.median(shares) == pytest.approx(1, abs=0.1)

@@ -24,7 +24,7 @@ def drive(
     drift_radps2: float = 0.0,
     dt_s: float = DT_S,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Let the flow tell the rate; errors and sigmas, (frames, 3) each."""
+    """Learn the rate from the flow; errors and sigmas, (frames, 3) each."""
     errors, sigmas = [], []
     for frame in range(round(seconds / dt_s)):
         true = truth_radps + drift_radps2 * frame * dt_s
@@ -94,7 +94,7 @@ def test_flow_alone_is_never_believed_beyond_its_own_errors() -> None:
     assert (sigmas > 0.0015).all()
 
 
-def test_flow_tells_the_less_the_nearer_things_pass() -> None:
+def test_flow_shows_the_less_the_nearer_things_pass() -> None:
     """Mean V/Z of 2/s, as beside a floor half a metre below: 0.01 rad of error in O are 0.02 rad/s."""
     far, near = GyroBias(), GyroBias()
     for bias, expansion_hz in ((far, 0.1), (near, 2.0)):
@@ -105,7 +105,7 @@ def test_flow_tells_the_less_the_nearer_things_pass() -> None:
     assert (np.abs(near.mean_radps) < 2 * near.sigma_radps).all()
 
 
-def test_rest_tells_more_than_flow() -> None:
+def test_rest_shows_more_than_flow() -> None:
     bias = GyroBias()
     drive(bias, np.full(3, 0.05), 5.0, np.random.default_rng(0))
     bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)

@@ -110,7 +110,7 @@ def test_what_comes_nearer_turns_nothing() -> None:
 
 
 @pytest.mark.parametrize("what", ["plain", "dark", "other noise", "another place"])
-def test_images_that_share_nothing_do_not_tell(what: str) -> None:
+def test_images_that_share_nothing_show_no_rotation(what: str) -> None:
     lens, random = LENSES["640x480"], np.random.default_rng(0)
     before, after = {
         "plain": (np.full((480, 640), 120, np.uint8),) * 2,
@@ -128,7 +128,7 @@ def test_roll_is_not_reported() -> None:
     assert turn.sigma_rad[2] > 1
 
 
-def test_after_forgetting_one_image_tells_nothing() -> None:
+def test_after_forgetting_one_image_shows_nothing() -> None:
     lens = LENSES["160x120"]
     rotation = ImageRotation(lens)
     rotation.turn(small(image(lens)))

@@ -16,7 +16,7 @@ def forwards(acceleration_mps2: float) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("late_frames", [0, 2, 4])
 def test_a_start_that_is_noticed_late_costs_no_speed(late_frames: int) -> None:
-    """The rest is told for some frames more, and its mean force has the first of the acceleration in it."""
+    """Rest is reported for some more frames, and its mean force includes the beginning of the acceleration."""
     speed = InertialSpeed(0.001)
     for _ in range(20):
         speed.rest(UP, FRAME_S, UP, STEADY)

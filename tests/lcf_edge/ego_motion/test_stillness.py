@@ -25,7 +25,7 @@ def verdicts(frames: int, place: npt.NDArray[np.int32], px_a_frame: float = 0.0,
     return answers
 
 
-def test_half_a_second_must_pass_before_it_tells() -> None:
+def test_half_a_second_must_pass_before_it_decides() -> None:
     answers = verdicts(40, corners())
     assert answers[:10] == [None] * 10
     assert answers[10:] == [True] * 30
@@ -49,7 +49,7 @@ def test_a_few_corners_may_move_by_themselves(walkers: int, still: bool) -> None
     assert answer is still
 
 
-def test_too_few_corners_and_a_clock_that_goes_back_do_not_tell() -> None:
+def test_too_few_corners_and_a_clock_that_goes_back_do_not_decide() -> None:
     stillness, place = Stillness(WIDTH, HEIGHT), corners()
     for frame in range(15):
         assert stillness.look(frame * FRAME_NS, place[:39]) is None

@@ -38,8 +38,8 @@ class Board:
     """A drive towards a board; iterating gives what each step takes, with the image.
 
     ``range_m``, ``right_m``, ``width_m``, ``height_m``: of the board's middle, at the start and at the camera's height,
-    and its size. ``speed_mps``, ``yaw_rate_radps``: as told; the camera itself looks straight ahead. ``flicker``: share
-    of the corners that a frame does not show. ``floor_m``: the camera's height above a floor that is drawn; None: none.
+    and its size. ``speed_mps``, ``yaw_rate_radps``: as reported; the camera itself looks straight ahead. ``flicker``:
+    share of the corners that a frame does not show. ``floor_m``: the camera's height above a drawn floor; None: none.
     """
 
     range_m: float = 6.0

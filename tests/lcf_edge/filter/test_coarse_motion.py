@@ -163,12 +163,12 @@ def test_what_hangs_in_the_air_moves_for_another_reason_than_that_it_drives() ->
     assert any(rebels(Passing(top=160.0, height=100.0)))  # as large, but it reaches below the horizon
 
 
-def test_a_straight_edge_does_not_tell_how_it_moves() -> None:
+def test_a_straight_edge_does_not_show_how_it_moves() -> None:
     half_of_the_picture = Passing(left=100.0, width=3000.0, top=-100.0, height=800.0, contrast=0.0)
     assert not any(rebels(half_of_the_picture))
 
 
-def test_where_the_rotation_is_uncertain_nothing_is_told() -> None:
+def test_where_the_rotation_is_uncertain_nothing_is_reported() -> None:
     tables = LineCircleFilter(CONFIG, LENS)
     for motion, image in Passing():
         unsure = replace(motion, rotation_sigma_rad=0.02)

@@ -1,4 +1,4 @@
-"""Step 0: the rotation is taken out of everything; what the gyro missed, the flow tells."""
+"""Step 0: the rotation is taken out of everything; what the gyro missed, the flow shows."""
 
 import math
 from typing import Any
@@ -137,7 +137,7 @@ def off_the_lines(missed: npt.NDArray[np.float64], outliers: float, number: int 
 def missing_rotation(
     edges: EdgeTable, corners: CornerTable, sigma_rad: float
 ) -> tuple[npt.NDArray[np.float64], float, Residual]:
-    """The rotation that the gyro missed, (3, 3), what stays uncertain of it, and what the flow tells by itself."""
+    """The rotation that the gyro missed, (3, 3), what stays uncertain of it, and what the flow shows by itself."""
     off = OffLine()
     for row in range(edges.count):
         derotation.off_line(off, edges.columns, row, corners.columns, PINHOLE)
@@ -161,7 +161,7 @@ def test_edges_on_their_lines_ask_for_no_rotation() -> None:
 
 
 @given(st.tuples(angle, angle, angle), st.integers(0, 1000))
-def test_what_the_flow_tells_by_itself_is_free_of_the_gyro(axis: tuple[float, float, float], seed: int) -> None:
+def test_what_the_flow_shows_by_itself_is_free_of_the_gyro(axis: tuple[float, float, float], seed: int) -> None:
     missed = rotation_of(axis)
     _, _, alone = missing_rotation(*off_the_lines(missed, 0.1, seed=seed), SIGMA_RAD)
     off_rad = alone.turn_rad - cv2.Rodrigues(missed)[0].ravel()
@@ -187,7 +187,7 @@ def test_more_edges_leave_less_uncertain() -> None:
     assert all(math.isfinite(sigma) for sigma in sigmas)
 
 
-def test_a_few_edges_tell_no_rotation() -> None:
+def test_a_few_edges_show_no_rotation() -> None:
     edges, corners = off_the_lines(np.eye(3), 0.0, 24)
     assert not derotation.measure_off_line(OffLine(), edges.columns, corners.columns, PINHOLE, SETTINGS)
 

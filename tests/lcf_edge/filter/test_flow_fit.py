@@ -1,4 +1,4 @@
-"""What all edges together tell of the camera: rotation, focus, noise."""
+"""What all edges together show of the camera: rotation, focus, noise."""
 
 import math
 from dataclasses import dataclass, field
@@ -43,7 +43,7 @@ class Seen:
     number: int = 300
     seed: int = 0
     slot_turn_rad: float = 0.0  # error of the rotation since the oldest key frame alone
-    known_radps: float = 0.0  # at which the camera turns to the left, as the gyro tells
+    known_radps: float = 0.0  # at which the camera turns to the left, by the gyro
     distortion: float = 0.0  # of a lens that is taken for a pinhole: r is seen at r·(1 + distortion·r²)
     youngest: bool = False  # nothing was seen in the older half of the key frames
     fit: FlowFit = field(default_factory=FlowFit)
@@ -164,13 +164,13 @@ def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation() -> None:
     assert rotation[0] @ rotation[0].T == pytest.approx(np.eye(3), abs=1e-3)
     assert np.abs(rotation[1:] - np.eye(3)).max() < 0.005
     assert seen.keys.sigma_rad[0] < 0.002
-    seen.measured(14)  # too few for a fit: those that told it are gone
+    seen.measured(14)  # too few for a fit: those of the last one are gone
     assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
     assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
 
 
 @pytest.mark.parametrize(("bias_sigma_radps", "turned_rad"), [(0.05, -0.02), (0.0, 0.0)])
-def test_few_edges_tell_the_rotation_of_a_key_frame_while_the_gyro_s_bias_is_unknown(
+def test_few_edges_show_the_rotation_of_a_key_frame_while_the_gyro_s_bias_is_unknown(
     bias_sigma_radps: float, turned_rad: float
 ) -> None:
     """At the start of a drive: else the far end of a street, all that is followed for long, seems to cross."""

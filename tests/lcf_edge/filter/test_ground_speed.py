@@ -1,4 +1,4 @@
-"""How fast the vehicle is, as the ground tells that is seen below the horizon."""
+"""The vehicle's speed, from the ground seen below the horizon."""
 
 import math
 from collections.abc import Callable
@@ -26,7 +26,7 @@ def ground(landmarks: int = 300, height_m: float = 0.3) -> npt.NDArray[np.float6
 
 
 def ground_speed(way: Any, speed_mps: float, config: Config | None = None) -> GroundSpeed:
-    """What the ground tells at the end of a drive of which a wrong speed was told."""
+    """The speed by the ground at the end of a drive of which a wrong speed was reported."""
     tables = LineCircleFilter(config or Config(), way.lens)
     for corners, motion in way:
         tables.step(corners, replace(motion, speed_mps=speed_mps))
@@ -34,7 +34,7 @@ def ground_speed(way: Any, speed_mps: float, config: Config | None = None) -> Gr
 
 
 @pytest.mark.parametrize("wrong_mps", [2.0, 1.0, 3.0, -0.5])
-def test_the_ground_tells_the_speed_whatever_was_reported(drive: Drive, clutter: Landmarks, wrong_mps: float) -> None:
+def test_the_ground_shows_the_speed_whatever_was_reported(drive: Drive, clutter: Landmarks, wrong_mps: float) -> None:
     way = replace(drive(ground()) + drive(clutter(100)), frames=16)
     found = ground_speed(way, wrong_mps)
     assert found.speed_mps == pytest.approx(2.0, rel=0.1)
@@ -64,7 +64,7 @@ def test_a_speed_by_the_accelerometer_follows_the_ground_as_far_as_it_is_unsure(
     speed = InertialSpeed(0.01)
     up = np.array([0.0, -9.81, 0.0])
     speed.rest(up, 0.05, up, np.eye(3))
-    for _ in range(40):  # 2 s at 0.5 m/s², of which the accelerometer tells half
+    for _ in range(40):  # 2 s at 0.5 m/s², of which the accelerometer measures half
         speed.advance(0.05, np.array([0.0, -9.81, 0.25]), np.eye(3), 0.0)
     before, doubt = speed.mean_mps, speed.sigma_mps
     for _ in range(20):

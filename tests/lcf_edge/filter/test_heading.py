@@ -147,7 +147,7 @@ def test_in_a_left_turn_a_camera_before_the_axle_goes_to_the_left() -> None:
     assert mounted.aside_x == -left
 
 
-def test_a_fit_that_tells_nothing_teaches_nothing(situation: Situation) -> None:
+def test_a_fit_that_shows_nothing_teaches_nothing(situation: Situation) -> None:
     prior_px = 500 * heading.focus_sigma_rad(UNKNOWN_RAD)
     mounted = after(situation(), sigma_px=prior_px)
     assert (mounted.mounted_x, mounted.mounted_y) == (0.0, 0.0)

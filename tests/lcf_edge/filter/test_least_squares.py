@@ -78,7 +78,7 @@ def test_nothing_measured_leaves_the_priors() -> None:
     assert np.diag(equations.inverse)[:3] == pytest.approx([0.25, 1.0, 4.0])
 
 
-def test_what_nothing_tells_stays_finite() -> None:
+def test_what_nothing_determines_stays_finite() -> None:
     """Rows that are all alike, without a prior, leave a direction open."""
     equations = entered(np.ones((10, 2)), np.full(10, 3.0), np.ones(10), np.zeros(2))
     least_squares.solve(equations)

@@ -267,7 +267,7 @@ def test_what_a_table_takes_is_said(lens: Lens) -> None:
     assert sum(small.values()) < sum(large.values())
 
 
-def test_the_horizon_is_the_surer_the_better_the_flow_tells_it(street: Any, lens: Lens) -> None:
+def test_the_horizon_is_the_surer_the_better_the_flow_shows_it(street: Any, lens: Lens) -> None:
     """As sure as configured without any; on a street that flows surer, but no surer than the ground is flat."""
     tables = LineCircleFilter(Config(), lens)
     configured = Config().filter.pitch_sigma_rad

@@ -1,4 +1,4 @@
-"""C_r from S: what an object tells its circles, and that what will be met keeps one."""
+"""C_r from S: objects correct their circles, and one that will be met keeps one."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -36,7 +36,7 @@ def steps(way: Any) -> Iterator[LineCircleFilter]:
 
 
 def published(objects: ObjectTable) -> list[int]:
-    """Rows of what is told."""
+    """Rows of published objects."""
     return np.flatnonzero(objects.active & (objects.trust >= TR_S)).tolist()
 
 

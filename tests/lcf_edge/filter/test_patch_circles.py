@@ -15,7 +15,7 @@ CONFIG = Config(vehicle=VEHICLE)
 
 
 def driven(board: Board, config: Config = CONFIG) -> list[LineCircleFilter]:
-    """The filter after the drive, once for each frame in which it told of a rebel circle; the last one always."""
+    """The filter after the drive, once for each frame in which it reported a rebel circle; the last one always."""
     tables, reported = LineCircleFilter(config, LENS), []
     for corners, motion, image in board:
         tables.step(corners, motion, image)
@@ -28,7 +28,7 @@ def without_patches(config: Config) -> Config:
     return Config(vehicle=config.vehicle, filter=Filter(patches=0))
 
 
-def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it() -> None:
+def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_show_it() -> None:
     board = Board()
     assert not driven(board, without_patches(CONFIG))
     tables = LineCircleFilter(CONFIG, LENS)
@@ -45,7 +45,7 @@ def test_what_stands_ahead_is_found_with_its_range_where_corners_do_not_tell_it(
     assert np.median(ranges_m) == pytest.approx(1.0, abs=0.15)
 
 
-def test_at_the_rim_of_the_way_it_is_told_without_a_gap() -> None:
+def test_at_the_rim_of_the_way_it_is_reported_without_a_gap() -> None:
     tables = LineCircleFilter(CONFIG, LENS)
     told = []
     for corners, motion, image in Board(right_m=VEHICLE.half_width_m):

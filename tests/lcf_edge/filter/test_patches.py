@@ -73,7 +73,7 @@ def test_over_many_images_the_scale_is_that_since_the_first_one() -> None:
 
 @given(st.floats(-0.06, 0.06), st.floats(1.0, 1.06), st.integers(0, 50))
 @settings(max_examples=30)
-def test_what_grows_more_one_way_than_the_other_is_told(stretch: float, scale: float, seed: int) -> None:
+def test_what_grows_more_one_way_than_the_other_is_noticed(stretch: float, scale: float, seed: int) -> None:
     """As do things in a row, of which the nearer go outward faster: no one thing grows like that."""
     image = pattern(640, 480, seed)
     patches = born(image)
@@ -141,7 +141,7 @@ def test_it_ends_with_its_time_and_without_a_speed(situation: type[Situation]) -
     assert not lost.active[0]
 
 
-def test_what_stands_tells_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
+def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
     """From 5 m to 4 m: s = 5/4, and 1/Z = (s - 1)/ΔZ."""
     image, around = pattern(640, 480, 7, 4.0), situation(speed_mps=2.0)
     patches = born(image)

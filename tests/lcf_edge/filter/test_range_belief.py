@@ -114,7 +114,7 @@ def test_a_wide_thing_is_met_with_its_front_and_sooner(situation: Situation) -> 
     assert wide.sigma[RATE] > narrow.sigma[RATE]
 
 
-def test_looming_tells_of_the_speed_at_which_it_was_measured(situation: Situation) -> None:
+def test_looming_belongs_to_the_speed_at_which_it_was_measured(situation: Situation) -> None:
     """The vehicle has braked since from 2 m/s to 1: contact takes twice as long, the range is the same."""
     evidence = evidence_of(5.0, 0, 0, 0.0, 2.0)
     before, after = (belief_of(evidence, situation(speed_mps=speed_mps)) for speed_mps in (2.0, 1.0))
@@ -138,7 +138,7 @@ def test_a_thing_is_passed_when_its_contact_comes(situation: Situation) -> None:
 
 @pytest.mark.parametrize("lifted_m", [0.0, 0.4])
 def test_a_foot_that_shows_no_edge_lies_below_by_less_than_a_metre(situation: Situation, lifted_m: float) -> None:
-    """At rest only the foot tells how far somebody is who crosses; his lowest edge may be a knee."""
+    """At rest only the foot shows how far away somebody is who crosses; his lowest edge may be a knee."""
     range_m = 3.0
     foot = (1 - lifted_m / HEIGHT_M) / range_m
     belief = belief_of(evidence_of(range_m, 0.0, 1.0, 0.0, 0.0, foot=foot), situation(speed_mps=0.0))
@@ -189,7 +189,7 @@ def test_whatever_is_measured_the_belief_is_finite_and_probabilities_are(
 
 
 def test_what_is_seen_as_small_as_a_hand_is_not_right_in_front(situation: Situation) -> None:
-    """Nothing else tells how far it is."""
+    """Nothing else shows how far away it is."""
     unmeasured: dict[str, Any] = {"mm": 4.0, "qq": 4.0, "is_cut": True, "foot": 0.0}
     small, large = (
         belief_of(evidence_of(0.5, 0, 0, 0.02, 1.0, half_extent=half, **unmeasured), situation(speed_mps=1.0))

@@ -385,7 +385,7 @@ def test_circles_stay_while_something_covers_the_image_for_up_to_a_second(situat
     assert scene.update().trust == [TR_S - 1]
 
 
-def test_a_circle_that_is_not_seen_again_with_the_image_is_told_no_more(situation: Situation) -> None:
+def test_a_circle_that_is_not_seen_again_with_the_image_is_reported_no_more(situation: Situation) -> None:
     scene = Scene(situation())
     scene.update((200, 200, 0.0, 60.0)).update((203, 200, 0.0, 60.0)).update((206, 200, 0.0, 60.0))
     scene.around.is_blind = True
@@ -515,7 +515,7 @@ def test_what_comes_towards_us_has_the_time_of_its_closing_speed(
 def test_what_crosses_is_crossing_to_the_side_it_goes_to(
     drive: Drive, box: Landmarks, clutter: Landmarks, side: int
 ) -> None:
-    """Most of a walker is above the camera; beside him stands what tells the camera's motion from his."""
+    """Most of a walker is above the camera; what stands beside him separates the camera's motion from his."""
     way = drive(clutter(150)) + drive(
         box((-0.8 * side, -1.2, 6.0), (0.5, 0.6, 0.2), landmarks=40), np.array([1.2 * side, 0, 0])
     )
@@ -527,7 +527,7 @@ def test_what_crosses_is_crossing_to_the_side_it_goes_to(
 
 
 def test_what_drives_ahead_of_us_is_leading(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
-    """On a ground that is seen to flow: else what keeps station is all that tells whether the vehicle stands."""
+    """On a ground that is seen to flow: else only what keeps station would show whether the vehicle stands."""
     leader = drive(box((0.0, 0.1, 2.5), (0.6, 0.35, 0.0), landmarks=40), np.array([0, 0, 2.0]))
     tables, rows, _ = settled(replace(drive(beside_the_path()) + drive(clutter(150)) + leader, frames=18))
     assert rows
@@ -581,7 +581,7 @@ def test_what_is_to_stand_near_must_spread(situation: Situation) -> None:
     assert shifted.count == 0
 
 
-def test_one_edge_that_took_the_place_of_another_tells_no_range(situation: Situation) -> None:
+def test_one_edge_that_took_the_place_of_another_shows_no_range(situation: Situation) -> None:
     around = situation()
     x, y = thing(8)
     rate = np.full_like(x, 0.3)

@@ -135,7 +135,7 @@ def test_what_stands_beside_the_path_is_neither_mover_nor_incoming_at_any_depth(
 
 @given(depth, beside, st.floats(-3.0, 0.29))
 def test_nor_when_its_corners_are_at_whole_pixels(watch: Watch, z: float, x: float, y: float) -> None:
-    assume(abs(x) > 0.06 * z)  # farther away, a pixel of flow does not tell beside from before
+    assume(abs(x) > 0.06 * z)  # farther away, a pixel of flow does not distinguish beside from ahead
     verdict = watch((x, y, z), rounded=True).verdict()
     assert not verdict.mover
     assert not verdict.incoming
@@ -273,7 +273,7 @@ def test_a_small_turn_may_as_well_not_come(
     assert least_miss(right_m, 3.0, around) == pytest.approx(arc_m if least_m is None else least_m)
 
 
-def test_neighbours_tell_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
+def test_neighbours_show_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
     """10 px from the focus an edge moves by a pixel or so; a dozen of them leave no doubt."""
     few = [(0.06, -0.08, 6.5)]
     many = [(x, y, 6.5) for x in (-0.08, 0.0, 0.08) for y in (-0.16, -0.12, -0.08, -0.04)]
@@ -300,7 +300,7 @@ def test_what_may_as_well_be_the_ground_is_not_met(watch: Watch, horizon_sigma_r
 
 @given(st.floats(3.0, 4.0), st.floats(-0.4, 0.4), st.floats(-1.6, -1.0), st.sampled_from([-1.2, -0.9, 0.9, 1.2]))
 def test_what_crosses_moves(watch: Watch, z: float, x: float, y: float, velocity_mps: float) -> None:
-    """High up, where aside is across the flow: along it one eye cannot tell a motion from another depth."""
+    """High up, where aside is across the flow: along it one camera cannot distinguish a motion from another depth."""
     verdict = watch((x, y, z), (velocity_mps, 0, 0)).verdict()
     assert verdict.mover
     assert not verdict.incoming

@@ -1,4 +1,4 @@
-"""Whether the vehicle stands, as the image tells, although a speed is told."""
+"""Whether the vehicle is stationary, by the image, although a speed is reported."""
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -19,7 +19,7 @@ SOON = 15  # images, 0.75 s
 
 
 def verdicts(way: Any, config: Config | None = None, measured_mps: float = MEASURED_MPS) -> Iterator[LineCircleFilter]:
-    """The filter after each step, told a speed that need not be true."""
+    """The filter after each step, given a speed that need not be true."""
     tables = LineCircleFilter(config or Config(), way.lens)
     for corners, motion in way:
         tables.step(corners, replace(motion, speed_mps=measured_mps))

@@ -31,7 +31,7 @@ def steps(way: Any, config: Config | None = None, speed_mps: float | None = None
 
 
 def published(objects: ObjectTable) -> list[int]:
-    """Rows of what is told."""
+    """Rows of published objects."""
     return np.flatnonzero(objects.active & (objects.trust >= TR_S)).tolist()
 
 
@@ -107,7 +107,7 @@ def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clu
 
 
 @pytest.mark.parametrize(("speed_mps", "aside_mps", "ahead_m"), [(0.5, 0.3, 5.0), (1.0, 0.3, 6.0), (0.3, 0.25, 5.0)])
-def test_two_who_part_before_the_vehicle_come_no_nearer_than_their_height_tells(
+def test_two_who_part_before_the_vehicle_come_no_nearer_than_their_height_shows(
     drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, aside_mps: float, ahead_m: float
 ) -> None:
     """They stand side by side and walk off to both sides: taken for one, they grow in width and not in height."""
@@ -337,7 +337,7 @@ def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     assert last_s - lost_s == pytest.approx(about_s, abs=0.11)
 
 
-def test_the_few_corners_left_of_what_is_near_do_not_tell_how_it_moves(
+def test_the_few_corners_left_of_what_is_near_do_not_show_how_it_moves(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
     """What is very near shows few corners; a hand that swings back would make its range grow while it comes closer."""

@@ -96,7 +96,7 @@ def calm(drive: Drive, clutter: Landmarks) -> Any:
     return drive(clutter(400), sigma_rad=1e-4)
 
 
-def test_it_is_a_rebel_circle_of_which_no_motion_is_told(calm: Any) -> None:
+def test_it_is_a_rebel_circle_without_reported_motion(calm: Any) -> None:
     tables, told = after(Storm(calm))
     assert told > 10
     (c,) = reported(tables)
@@ -107,7 +107,7 @@ def test_it_is_a_rebel_circle_of_which_no_motion_is_told(calm: Any) -> None:
     assert np.isnan(rebel.lateral[c])
 
 
-def test_it_is_told_within_half_a_second_and_forgotten_after_it(calm: Any) -> None:
+def test_it_is_reported_within_half_a_second_and_forgotten_after_it(calm: Any) -> None:
     _, told = after(Storm(replace(calm, frames=4 + 10)))
     assert told
     tables, _ = after(Storm(replace(calm, frames=40), until_seq=20))
@@ -197,7 +197,7 @@ def test_in_a_quick_turn_it_is_not_looked_for(calm: Any) -> None:
     assert after(Storm(replace(calm, speed_mps=1.0, yaw_rate_radps=1.0)))[1] == 0
 
 
-def test_where_rebels_tell_more_it_is_left_to_them(drive: Drive, clutter: Landmarks, box: Landmarks) -> None:
+def test_where_rebels_show_more_it_is_left_to_them(drive: Drive, clutter: Landmarks, box: Landmarks) -> None:
     """Somebody crosses, whose clothes flutter."""
     walker = drive(box((-0.6, 0.0, 4.0), (0.5, 0.8, 0.2), 10, seed=3), np.array([1.0, 0.0, 0.0]))
     tables = LineCircleFilter(CONFIG, walker.lens)
@@ -263,7 +263,7 @@ def slow(drive: Drive, clutter: Landmarks) -> Any:
     return drive(clutter(700), sigma_rad=1e-4, speed_mps=0.3, frames=20)
 
 
-def test_what_comes_before_the_camera_without_a_corner_is_told_by_what_it_hides(slow: Any) -> None:
+def test_what_comes_before_the_camera_without_a_corner_is_noticed_by_what_it_hides(slow: Any) -> None:
     told = covered(Cover(slow))
     assert not any(told[:12])
     assert any(told[12:18])

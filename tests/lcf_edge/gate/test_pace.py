@@ -17,7 +17,7 @@ def waited_s(messages: int, times: int, each_s: float) -> float:
     return waited_s
 
 
-def test_who_tells_the_speed_never_waits() -> None:
+def test_who_sends_the_speed_never_waits() -> None:
     assert waited_s(3, 10_000, 0.01) == 0
 
 

@@ -1,4 +1,4 @@
-"""A running daemon tells its metrics in a file and on a port."""
+"""A running daemon exports its metrics to a file and on a port."""
 
 import subprocess
 import sys
@@ -11,7 +11,7 @@ from prometheus_client.parser import text_string_to_metric_families
 PATIENCE_S = 20.0
 
 
-def test_a_daemon_without_a_camera_tells_so(tmp_path: Path, endpoint: str) -> None:
+def test_a_daemon_without_a_camera_reports_so(tmp_path: Path, endpoint: str) -> None:
     textfile, port = tmp_path / "lcf-edge.prom", 1 + int(endpoint.rpartition(":")[2]) % 60000
     settings = (
         f'zenoh.listen=["{endpoint}"]',

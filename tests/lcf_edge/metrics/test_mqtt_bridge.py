@@ -32,7 +32,7 @@ def bridge() -> Any:
     return module
 
 
-def test_an_object_of_no_known_class_is_told_as_unknown(bridge: Any) -> None:
+def test_an_object_of_no_known_class_is_reported_as_unknown(bridge: Any) -> None:
     things = np.zeros(1, OBJECT)
     things["class_id"], things["state"] = 250, 77
     empty = np.zeros(0, CIRCLE), np.zeros(0, PSI_REGION)

@@ -224,7 +224,7 @@ class TestFaults:
         assert min(delays_s) < max(delays_s)
         assert all((frame.stamp_ns - start_ns) % FRAME_NS == 0 for frame, _ in frames)
 
-    def test_a_stall_is_reported_as_the_real_driver_tells_it(self, devices: Devices) -> None:
+    def test_a_stall_is_reported_as_by_the_real_driver(self, devices: Devices) -> None:
         faults = Faults()
         camera = devices(RecordedCamera, faults=faults)
         camera.read()
@@ -259,7 +259,7 @@ class TestFaults:
 
 
 class TestRefusals:
-    """What cannot be played is told at the opening."""
+    """What cannot be played is reported on opening."""
 
     def test_a_recording_that_is_not_there(self, tmp_path: Path) -> None:
         with pytest.raises(DeviceMissingError, match="nowhere: no such file"):

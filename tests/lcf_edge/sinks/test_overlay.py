@@ -273,7 +273,7 @@ def test_in_a_crowd_what_passes_gives_up_its_label_and_what_is_met_does_not() ->
         assert (len(changed) > 10) == is_labelled
 
 
-def test_a_circle_of_an_object_leaves_the_telling_to_it() -> None:
+def test_a_circle_of_an_object_has_no_label_of_its_own() -> None:
     rebels = np.concatenate([circle(kind=Kind.REBEL, x=x, y=200, radius=10, ttc=1.0) for x in (60, 250)])
     with_labels, own, none = (panels_of(circles=rebels, circle_objects=of) for of in ((0, 0), (0, 7), (7, 7)))
     left, right = np.s_[172:187, WIDTH : WIDTH + 160], np.s_[172:187, WIDTH + 160 :]

@@ -191,7 +191,7 @@ def test_the_circles_of_an_object_that_came_over_the_wire_are_not_reported() -> 
     assert written == {key: value for key, value in whole.items() if key != "circles"}
 
 
-def test_an_unknown_speed_is_null_and_notes_tell_why() -> None:
+def test_an_unknown_speed_is_null_and_notes_say_why() -> None:
     known = scene()
     parts = {
         name: getattr(known, name) for name in ("stamp_ns", "seq", "image_width", "image_height", "circles", "psi")

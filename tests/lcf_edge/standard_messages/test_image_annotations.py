@@ -61,7 +61,7 @@ def test_what_will_not_be_met_is_blue_and_what_is_not_seen_is_thin(drawn: Callab
     assert drawn().points[1].thickness == 2.0
 
 
-def test_texts_tell_of_objects_and_of_rebels_outside_of_them(drawn: Callable[..., Any]) -> None:
+def test_texts_label_objects_and_rebels_outside_of_them(drawn: Callable[..., Any]) -> None:
     """The incoming rebel is inside the walker's box."""
     assert [text.text for text in drawn().texts] == ["crossing", "crossing 2.0 ±0.2 s 4.0 m"]
     assert next(text.text for text in drawn(x=600.0).texts) == "incoming 1.2 s"

@@ -31,7 +31,7 @@ def points_of(message: Any) -> np.ndarray[Any, Any]:
 
 
 @given(Angle, st.floats(-1.4, 1.4), st.floats(0.1, 100))
-def test_the_lens_tells_bearing_and_elevation_of_the_place(bearing: float, across: float, ahead_m: float) -> None:
+def test_the_lens_gives_bearing_and_elevation_of_the_place(bearing: float, across: float, ahead_m: float) -> None:
     """What is there in the optical frame is seen under these angles, by the lens's own formula."""
     thing = np.zeros(1, OBJECT)
     thing["range"], thing["bearing"], thing["elevation"] = ahead_m, bearing, across

@@ -27,7 +27,7 @@ class Peer:
         self.kept: list[Any] = []
 
     def connected(self, timeout_s: float = PATIENCE_S) -> bool:
-        """Whether somebody is there in time; Zenoh tells of it to nobody who asks later."""
+        """Whether somebody is there in time; Zenoh does not report it to those who ask later."""
         deadline_s = time.monotonic() + timeout_s
         info: Any = self.session.info
         while not (list(info.peers_zid()) or list(info.routers_zid())):

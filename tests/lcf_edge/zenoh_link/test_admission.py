@@ -1,4 +1,4 @@
-"""On loopback every local process may read, ask and tell the speed; it cannot speak for the rover."""
+"""On loopback every local process may read, query and send the speed; it cannot impersonate the rover."""
 
 import subprocess
 from collections.abc import Callable

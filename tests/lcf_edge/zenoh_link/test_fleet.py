@@ -1,4 +1,4 @@
-"""Rovers behind one router are seen together and told apart, as docs/fleet.md says."""
+"""Rovers behind one router are seen together and distinguished, as docs/fleet.md says."""
 
 import re
 import tomllib
@@ -78,7 +78,7 @@ def test_one_subscription_sees_all_rovers_by_their_keys(
     arriving.close()
 
 
-def test_each_tells_that_it_is_there(links: dict[str, tuple[zenoh.Session, Link]], router: Any) -> None:
+def test_each_shows_that_it_is_there(links: dict[str, tuple[zenoh.Session, Link]], router: Any) -> None:
     wanted = [f"{rover}/lcf/@alive/{rover}" for rover in ROVERS]
     assert links
     while router.tokens("*/lcf/@alive/*") != wanted:

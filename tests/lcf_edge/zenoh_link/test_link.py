@@ -1,4 +1,4 @@
-"""What a daemon tells the outside, as a process that knows nothing of it sees it."""
+"""What a daemon sends, as seen by a process that knows nothing of it."""
 
 import subprocess
 import sys
@@ -93,7 +93,7 @@ def test_preview_is_a_compressed_image(received: Callable[..., Any], ros: Typest
     assert image.header.stamp.sec * 10**9 + image.header.stamp.nanosec == STAMP_NS
 
 
-def test_diagnostics_tell_of_every_device(received: Callable[..., Any], ros: Typestore) -> None:
+def test_diagnostics_report_every_device(received: Callable[..., Any], ros: Typestore) -> None:
     array: Any = ros.deserialize_cdr(received(send_diagnostics).payload, "diagnostic_msgs/msg/DiagnosticArray")
     assert array.header.stamp.sec * 10**9 + array.header.stamp.nanosec == STAMP_NS
     assert [(one.name, one.level, one.message, one.hardware_id) for one in array.status] == [

@@ -166,7 +166,7 @@ def test_a_planner_reads_as_documented(
             planner.kill()
 
 
-def test_a_planner_reads_and_asks_but_does_not_tell_the_speed(
+def test_a_planner_reads_and_queries_but_does_not_send_the_speed(
     link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity
 ) -> None:
     planner = party("planner")
@@ -181,7 +181,7 @@ def test_a_planner_reads_and_asks_but_does_not_tell_the_speed(
     assert not any(name.startswith("speed") for name in link.counts)
 
 
-def test_wheels_tell_the_speed_but_do_not_read(
+def test_wheels_send_the_speed_but_do_not_read(
     link: Link, rover: zenoh.Session, until_matched: Any, party: Any, scene: NewScene, velocity: Velocity
 ) -> None:
     wheels, planner = party("wheels"), party("planner")

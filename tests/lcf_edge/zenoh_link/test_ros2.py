@@ -66,7 +66,7 @@ def test_every_sample_has_a_twin(
     assert not received
 
 
-def test_a_node_tells_of_itself_its_publishers_and_its_subscription(
+def test_a_node_announces_itself_its_publishers_and_its_subscription(
     link: Link, session: zenoh.Session, peer: Any
 ) -> None:
     assert link
@@ -140,7 +140,7 @@ def test_a_replay_publishes_as_a_node_too(
         ("geometry_msgs/msg/TwistStamped", "nav_msgs::msg::dds_::Odometry_", "speed wrong type"),
     ],
 )
-def test_a_node_tells_the_speed(
+def test_a_node_sends_the_speed(
     link: Link, peer: Any, velocity: Callable[..., bytes], kind: str, announced: str, counted: str
 ) -> None:
     peer.put(f"7/lcf/speed/{announced}/RIHS01_0", velocity(kind=kind))

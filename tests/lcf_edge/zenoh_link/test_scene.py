@@ -109,7 +109,7 @@ def test_a_prefix_that_is_no_key_is_refused(session: zenoh.Session, prefix: str)
         ScenePublisher(session, Publish(prefix=prefix))
 
 
-def test_a_liveliness_token_tells_that_the_publisher_is_there(session: zenoh.Session, endpoint: str) -> None:
+def test_a_liveliness_token_shows_that_the_publisher_is_there(session: zenoh.Session, endpoint: str) -> None:
     alive, output = threading.Event(), []
 
     def tell(sample: zenoh.Sample) -> None:

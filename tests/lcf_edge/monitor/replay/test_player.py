@@ -46,7 +46,7 @@ class Playing:
         deadline_s = time.monotonic() + PATIENCE_S
         while not self.replay().searched:
             assert time.monotonic() < deadline_s
-            threading.Event().wait(0.01)  # its thread tells nobody
+            threading.Event().wait(0.01)  # its thread sends no notification
         return self.replay()
 
     def replay(self) -> Replay:

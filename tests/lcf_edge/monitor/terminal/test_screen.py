@@ -119,7 +119,7 @@ def test_objects_stand_above_circles_what_is_met_first() -> None:
 @pytest.mark.parametrize(
     ("state", "said"), [(ObjectState.SEEN, "seen"), (ObjectState.HIDDEN, "hidden"), (ObjectState.COASTING, "coasting")]
 )
-def test_it_tells_what_an_object_does_and_whether_it_is_seen(state: ObjectState, said: str) -> None:
+def test_it_shows_what_an_object_does_and_whether_it_is_seen(state: ObjectState, said: str) -> None:
     known = snapshot(objects=1)
     assert known.scene
     known.scene.objects["class_id"], known.scene.objects["state"] = ObjectClass.CUTTING_IN, state

@@ -185,7 +185,7 @@ def test_a_signal_ends_it_by_the_way_back(
 
 
 @pytest.mark.usefixtures("rover")
-def test_colours_tell_rebels(terminal: Callable[..., Terminal]) -> None:
+def test_colours_distinguish_rebels(terminal: Callable[..., Terminal]) -> None:
     watch = terminal()
     watch.shows(is_live)
     assert b"\x1b[1;31m" in watch.raw

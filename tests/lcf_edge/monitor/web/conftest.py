@@ -13,7 +13,7 @@ PATIENCE_S = 60.0
 
 
 class View:
-    """``lcf-edge view`` on a free port. ``address``: what it told to open."""
+    """``lcf-edge view`` on a free port. ``address``: the one that it prints."""
 
     def __init__(self, endpoint: str, *more: str) -> None:
         command = (sys.executable, "-m", "lcf_edge", "view", "--connect", endpoint, "--port", "0", *more)

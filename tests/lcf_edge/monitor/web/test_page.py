@@ -74,7 +74,7 @@ def test_from_above_it_shows_objects_the_way_and_the_horizon(seen: tuple[Any, An
     browser.wait_for(f"{LIVE} && {label}.includes('crossing')")
     assert browser.evaluate(label) == "From above: crossing 3.3 m ahead, standing 1.5 m ahead"
     ahead = "document.getElementById('ahead').textContent"
-    browser.wait_for(f"{ahead}.includes('way')")  # the daemon tells its configuration when it is asked
+    browser.wait_for(f"{ahead}.includes('way')")  # the daemon answers queries for its configuration
     assert browser.evaluate(ahead) == "10 m ahead · way 0.60 m wide, horizon 4 s (6.0 m) · 1 without range"
     place = "(({clientWidth: w, clientHeight: h}) => [w / 2 + {x} * (h - 30) / 10, h - 22 - {y} * (h - 30) / 10])"
     x, y = 3.25 * math.tan(0.05), 3.25
@@ -119,7 +119,7 @@ def test_the_picture_is_saved_as_a_png(seen: tuple[Any, Any], browser: Any, tmp_
 def test_the_numbers_beside_a_picture_are_those_of_its_frame(
     rover: Any, view: Callable[..., Any], browser: Any, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """The preview comes with every third frame; what is told beside it does not run ahead."""
+    """The preview comes with every third frame; the figures beside it do not run ahead."""
     drawn_s: set[str] = set()
     put = rover.link.put_preview
 
@@ -148,7 +148,7 @@ def test_the_numbers_beside_a_picture_are_those_of_its_frame(
     assert seen <= drawn_s
 
 
-def test_what_passes_is_no_threat_and_without_objects_the_circles_tell(
+def test_what_passes_is_no_threat_and_without_objects_the_circles_decide(
     rover: Any, view: Callable[..., Any], browser: Any
 ) -> None:
     rover.objects = rover.objects[:1]  # it stands beside the path

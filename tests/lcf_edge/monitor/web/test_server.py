@@ -1,4 +1,4 @@
-"""Who is let in, what they are told, and what is saved: the real server over real HTTP."""
+"""Who is let in, what they receive, and what is saved: the real server over real HTTP."""
 
 import asyncio
 import json
@@ -143,7 +143,7 @@ def test_on_the_network_the_token_is_asked_for(view: Callable[..., Any]) -> None
     assert ask(address, f"/save?token={token}").status == 404  # let in; there is nothing to save
 
 
-def test_updates_tell_all_and_images_are_drawn_only_meanwhile(seen: tuple[Any, Any]) -> None:
+def test_updates_contain_all_and_images_are_drawn_only_meanwhile(seen: tuple[Any, Any]) -> None:
     rover, served = seen
 
     async def look(socket: aiohttp.ClientWebSocketResponse) -> dict[str, Any]:

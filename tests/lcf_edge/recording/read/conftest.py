@@ -46,7 +46,7 @@ T_BS:
 
 
 def texture(index: int, width: int = 64, height: int = 48) -> npt.NDArray[np.uint8]:
-    """An image that tells its index by its mean."""
+    """An image that encodes its index in its mean."""
     return np.full((height, width), 10 * index + 5, np.uint8)
 
 

@@ -199,7 +199,7 @@ def test_a_bad_image_is_skipped_and_the_rest_is_read(
         path.write_bytes({"empty": b"", "cut": data[:-20], "flipped": flipped, "text": b"hello"}[fault])
     recording, items = read(asl.path)
     assert frames(items) == FRAMES[:2] + FRAMES[3:]
-    assert [frame.seq for frame in of(Frame, items)] == [0, 1, 3, 4], "the gap tells the drop"
+    assert [frame.seq for frame in of(Frame, items)] == [0, 1, 3, 4], "the gap shows the drop"
     assert recording.skipped == {f"image {reason}": 1}
     assert recording.warnings == [f"{path}: image {reason}, skipped"]
     assert capfd.readouterr() == ("", ""), "nobody else writes about it"
@@ -212,7 +212,7 @@ def test_images_of_another_size_are_skipped(asl: Any, read: Read) -> None:
     assert recording.skipped == {"image of another size than the first": 1}
 
 
-def test_the_first_good_image_tells_the_size(asl: Any, read: Read) -> None:
+def test_the_first_good_image_sets_the_size(asl: Any, read: Read) -> None:
     asl.image_path(FRAMES[0]).write_bytes(b"")
     _, items = read(asl.path)
     assert frames(items) == FRAMES[1:]

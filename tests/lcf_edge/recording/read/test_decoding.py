@@ -142,7 +142,7 @@ except ImageDecodeError as error:
 """
 
 
-def test_a_tiff_that_tells_its_size_twice_takes_no_memory() -> None:
+def test_a_tiff_that_states_its_size_twice_takes_no_memory() -> None:
     """The decoder believes the first, who reads all of them the last."""
     whole = cv2.imencode(".tif", np.zeros((SIDE // 2, SIDE // 2), np.uint8))[1].tobytes()
     assert whole.startswith(b"II")

@@ -112,7 +112,7 @@ def test_a_damaged_video_is_read_up_to_the_damage(video: Path, read: Read, capfd
 
 
 def lying(path: Path, width: int, height: int) -> None:
-    """Let the header of an AVI file tell another size, px."""
+    """Let the header of an AVI file state another size, px."""
     data = bytearray(path.read_bytes())
     struct.pack_into("<II", data, data.find(b"avih") + 40, width, height)
     struct.pack_into("<ii", data, data.find(b"strf") + 12, width, height)

@@ -25,7 +25,7 @@ def written(path: Path, messages: Any, *, finished: bool = True) -> int:
     return count
 
 
-def test_it_tells_what_is_in_all_files_together(tmp_path: Path, recorded: Any) -> None:
+def test_it_lists_what_is_in_all_files_together(tmp_path: Path, recorded: Any) -> None:
     counts = [written(tmp_path / f"drive_{number}.mcap", recorded(3, (number + 1) * 10**9)) for number in range(11)]
     write_metadata(tmp_path)
     with Reader(tmp_path) as bag:

@@ -18,7 +18,7 @@ def filled(path: Path, mib: float) -> Path:
     return path
 
 
-def test_files_are_numbered_and_tell_when_they_began(tmp_path: Path) -> None:
+def test_files_are_numbered_and_show_when_they_began(tmp_path: Path) -> None:
     folder = Folder(Record(folder=str(tmp_path / "made" / "for us")))
     first = folder.next(NOW_NS)
     assert first == tmp_path / "made" / "for us" / "lcf-edge-000001-20261121T134100Z.mcap"

@@ -65,8 +65,8 @@ def test_independent_readers_find_all_messages(whole: Path, recorded: Any, by_ro
         assert summary.statistics.message_count == len(wanted)
 
 
-def test_each_topic_tells_how_it_is_to_be_played(whole: Path) -> None:
-    """As rosbag2 reads it; what is told once a second is kept for who subscribes later."""
+def test_each_topic_states_how_it_is_to_be_played(whole: Path) -> None:
+    """As rosbag2 reads it; what is sent once a second is kept for late subscribers."""
     with AnyReader([whole]) as reader:
         offered = {one.topic: one.ext.offered_qos_profiles for one in reader.connections}
     assert set(offered) == {topic.path("lcf") for topic in TOPICS}
