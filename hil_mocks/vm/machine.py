@@ -24,6 +24,7 @@ ZENOH_PORT = 7447  # in the guest
 MEMORY_MIB, PROCESSORS = 1024, 2
 KERNEL = "root=/dev/vda ro quiet panic=-1 net.ifnames=0 systemd.show_status=0"  # its command line
 EMULATED = "tcg,thread=multi"
+FOR_EMULATED = "systemd.default_timeout_start_sec=600"  # as what it starts may get no processor for long
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,7 +88,7 @@ class Machine:
             *("-m", str(MEMORY_MIB), "-smp", str(PROCESSORS)),
             *("-display", "none", "-monitor", "none", "-no-reboot", "-serial", f"file:{self.folder / 'console.txt'}"),
             *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
-            *("-append", f"console={board.console} {KERNEL}"),
+            *("-append", f"console={board.console} {KERNEL} {FOR_EMULATED if self.emulated else ''}"),
             *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
             *("-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
             *("-device", "virtio-net-pci,netdev=net,romfile="),  # nothing boots from it
