@@ -97,7 +97,7 @@ deb: wheels
 # As root. HIL: what pytest is told. ARCH=arm64: Debian 13 for 64-bit Arm.
 hil: $(VENV)/.dev $(VENV)/.compiled
 	$(RELEASE)
-	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pytest hil_mocks/vm -o timeout=$(if $(ARCH),1800,600) \
+	PATH="$(CURDIR)/$(BIN):$$PATH" $(BIN)/python -m pytest hil_mocks/vm -o timeout=3600 \
 		-p no:cacheprovider --durations=5 $(if $(ARCH),--arch $(ARCH) --ignore hil_mocks/vm/scenarios/test_drive.py) $(HIL)
 
 soak: $(VENV)/.dev $(VENV)/.compiled

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from hil_mocks.vm.daemon import Daemon, Subscriber
+from hil_mocks.vm.daemon import UNIT, Daemon, Subscriber
 from hil_mocks.vm.image import DEBIAN_12, DEBIAN_13_ON_ARM, HERE, Image, ImageError, System, image, missing
 from hil_mocks.vm.machine import Machine, MachineError
 
@@ -90,15 +90,16 @@ def machine(pytestconfig: pytest.Config) -> Iterator[Machine]:
 @pytest.fixture(scope="module")
 def subscriber(machine: Machine) -> Iterator[Subscriber]:
     """On the host, over the virtual network."""
-    connected = Subscriber(machine.endpoint)
+    connected = Subscriber(machine.endpoint, machine.patience)
     yield connected
     connected.close()
 
 
 @pytest.fixture(scope="module")
-def daemon(machine: Machine, subscriber: Subscriber) -> Daemon:
-    """The installed service."""
-    return Daemon(machine, subscriber)
+def daemon(machine: Machine, subscriber: Subscriber) -> Iterator[Daemon]:
+    """The installed service, which leaves the processor to the machines of other modules."""
+    yield Daemon(machine, subscriber)
+    machine.tried(f"systemctl stop {UNIT}")  # a module may have removed it
 
 
 @pytest.fixture(autouse=True)

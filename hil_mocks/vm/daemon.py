@@ -31,11 +31,12 @@ PATIENCE_S = 150.0
 
 
 class Subscriber:
-    """Scenes and diagnostics of the daemon, on the host."""
+    """Scenes and diagnostics of the daemon, on the host. ``patience``: the machine's."""
 
-    def __init__(self, endpoint: str, config_file: str = "") -> None:
+    def __init__(self, endpoint: str, patience: float, config_file: str = "") -> None:
         self.scenes: list[Scene] = []
         self.statuses: Mapping[str, DeviceStatus] = {}
+        self._patience = patience
         self._changed = threading.Condition()
         self._session = open_session(Zenoh(connect=[endpoint], listen=[], config_file=config_file))
         self._session.declare_subscriber("lcf/scene", self._take_scene)
@@ -43,6 +44,7 @@ class Subscriber:
 
     def wait_for(self, happened: Callable[[], object], what: str, timeout_s: float = PATIENCE_S) -> None:
         """Look at everything that comes until ``happened``. Raises ``MachineError``."""
+        timeout_s *= self._patience
         with self._changed:
             if not self._changed.wait_for(lambda: bool(happened()), timeout_s):
                 known = "; ".join(f"{one.name}: {one.message} {dict(one.values)}" for one in self.statuses.values())

@@ -19,10 +19,12 @@ BOOTS_S = 600.0
 PROBE_S = 10.0
 ENDS_S = 30.0
 REPLY_S = 20.0  # beyond a command's own time
+EMULATED_PATIENCE = 4.0  # times the usual: a busy computer leaves an emulated processor a fraction of its time
 ZENOH_PORT = 7447  # in the guest
 MEMORY_MIB, PROCESSORS = 1024, 2
 KERNEL = "root=/dev/vda ro quiet panic=-1 net.ifnames=0 systemd.show_status=0"  # its command line
 EMULATED = "tcg,thread=multi"
+FOR_EMULATED = "systemd.default_timeout_start_sec=600"  # as what it starts may get no processor for long
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,7 +54,8 @@ class Machine:
     """Boots ``image``; changes to its disk are forgotten. Leaves its console and journal in ``folder``.
 
     ``share``: a folder that the guest sees as /mnt. ``endpoint``: where the host reaches the guest's Zenoh. ``imu``:
-    the other end of the guest's USB serial port. ``emulated``: whether its processor is. Raises ``MachineError``.
+    the other end of the guest's USB serial port. ``emulated``: whether its processor is. ``patience``: by how much all
+    time limits are stretched. Raises ``MachineError``.
     """
 
     def __init__(self, image: Image, folder: Path) -> None:
@@ -64,6 +67,7 @@ class Machine:
         self.endpoint = f"tcp/127.0.0.1:{self.port}"
         self._accelerator = _accelerator(image)
         self.emulated = self._accelerator == EMULATED
+        self.patience = EMULATED_PATIENCE if self.emulated else 1.0
         self._number, self._read = 0, b""
         self._agent_path, self._imu_path = folder / "agent.sock", folder / "imu.sock"
         with ExitStack() as resources:
@@ -84,7 +88,7 @@ class Machine:
             *("-m", str(MEMORY_MIB), "-smp", str(PROCESSORS)),
             *("-display", "none", "-monitor", "none", "-no-reboot", "-serial", f"file:{self.folder / 'console.txt'}"),
             *("-kernel", str(image.kernel), "-initrd", str(image.initrd)),
-            *("-append", f"console={board.console} {KERNEL}"),
+            *("-append", f"console={board.console} {KERNEL} {FOR_EMULATED if self.emulated else ''}"),
             *("-drive", f"file={image.disk},format=raw,if=virtio,snapshot=on"),
             *("-netdev", f"user,id=net,restrict=on,hostfwd=tcp:127.0.0.1:{self.port}-:{ZENOH_PORT}"),
             *("-device", "virtio-net-pci,netdev=net,romfile="),  # nothing boots from it
@@ -110,7 +114,8 @@ class Machine:
     def tried(self, shell: str, timeout_s: float = 60.0) -> Outcome:
         """Run a command as root. Raises ``MachineError`` when the machine does not answer."""
         self._number += 1
-        deadline_s = time.monotonic() + timeout_s + REPLY_S
+        timeout_s *= self.patience
+        deadline_s = time.monotonic() + timeout_s + REPLY_S * self.patience
         try:
             self._agent.sendall(msgspec.json.encode(Command(self._number, shell, timeout_s)) + b"\n")
             while True:

@@ -79,7 +79,7 @@ def test_one_that_is_killed_comes_back_and_the_other_runs_on(both: Machine) -> N
 
 def test_doctor_looks_at_the_instance_and_its_neighbour(both: Machine) -> None:
     output = both.tried("lcf-edge doctor -c /etc/lcf-edge/front.toml", PATIENCE_S).output
-    assert "nothing of lcf-edge@front collides with lcf-edge@rear" in output
+    assert "lcf-edge@front and lcf-edge@rear do not conflict" in output
     assert "sudo systemctl enable lcf-edge@front" in output
     same = "lcf-edge doctor -c /etc/lcf-edge/front.toml --set publish.prefix=lcf/rear"
     assert "both have publish.prefix = lcf/rear" in both.tried(same, PATIENCE_S).output

@@ -69,7 +69,7 @@ def connected(machine: Machine, folder: Path, name: str, authority: str) -> Subs
         enable_mtls=True,
         verify_name_on_connect=True,
     )
-    return Subscriber(machine.endpoint.replace("tcp/", "tls/"), file)
+    return Subscriber(machine.endpoint.replace("tcp/", "tls/"), machine.patience, file)
 
 
 def test_a_planner_with_a_certificate_receives_scenes(machine: Machine, secured: Path) -> None:

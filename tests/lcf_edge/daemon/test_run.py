@@ -73,7 +73,7 @@ def test_a_subscriber_receives_scenes_of_now_until_sigterm(start: Start, manager
     status, said = ended(daemon)
     assert status == 0
     assert said[-1] == "lcf-edge: stopping: SIGTERM"
-    assert not [line for line in said if "error" in line or "left behind" in line]
+    assert not [line for line in said if "error" in line or "abandoned" in line]
 
 
 def test_sigint_ends_it_too_and_sighup_reads_again(start: Start, manager: Any, tmp_path: Path) -> None:
