@@ -315,7 +315,7 @@ class EgoMotionEstimator:
             return
         self._drove_ns = self._stamp_ns
         self._driven_s += self._interval.span.dt_s
-        if self._driven_s >= _DRIVES_S and self._inertial.may_stand():
+        if self._driven_s >= _DRIVES_S and self._inertial.is_zero():
             self._inertial.lose()
 
     def _rotation(self) -> Floats:

@@ -17,6 +17,7 @@ _LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # if the force differs from gravity by no more
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
 _SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes, or saturated ones
 _SIGMA_ODOMETRY_MPS = 0.05
+_ZERO_MPS = 0.15
 _LATE_S = 0.3  # delay with which the end of a rest is noticed
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
 
@@ -53,6 +54,10 @@ class InertialSpeed:
     def may_stand(self) -> bool:
         """Whether the vehicle may be stationary, within the uncertainty; true while the speed is unknown."""
         return not self.sigma_mps <= _SIGMA_LIMIT_MPS or abs(self._speed_mps) <= 2 * self.sigma_mps
+
+    def is_zero(self) -> bool:
+        """Whether the speed is known to be about 0."""
+        return abs(self._speed_mps) + 2 * self.sigma_mps <= _ZERO_MPS
 
     def rest(self, mean_mps2: Sequence[float], dt_s: float, accel_mps2: Sequence[float], rotation: Floats) -> None:
         """Zero-velocity update, with the mean specific force (3,) of the rest, and what ``advance`` takes."""

@@ -330,6 +330,20 @@ class TestBias:
         assert not any(rests for t, rests in seen if 0.7 < t < 1.9)
         assert all(rests for t, rests in seen if t > 2.1)
 
+    @pytest.mark.parametrize("forward_mps2", [0.0, 0.6], ids=["too gently to be measured", "measurably"])
+    def test_the_speed_of_a_start_is_unknown_only_if_the_accelerometer_missed_it(self, forward_mps2: float) -> None:
+        """It rests for a second; half a second after the flow has begun it drives at a steady speed."""
+        ego = calibrated()
+        feed(ego, np.arange(0, 6, 0.01), accel=lambda t: (0.0, LEVEL[1], forward_mps2 if 1.0 <= t < 1.5 else 0.0))
+        for t in np.arange(0.1, 6, 0.05):
+            motion = ego.advance(ns(t))
+            ego.see_driving(bool(t > 1.0))
+        if forward_mps2:
+            assert motion.speed_mps == pytest.approx(0.3, abs=0.1)
+        else:
+            assert np.isnan(motion.speed_mps)
+            assert "no speed" in motion.notes
+
     @pytest.mark.parametrize(("speed", "yaw"), [(0.5, 0.0), (0.0, 0.05)], ids=["drives", "turns on the spot"])
     def test_is_not_learnt_while_odometry_moves(self, speed: float, yaw: float) -> None:
         ego = estimator()
