@@ -30,6 +30,7 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
     thread = threading.Thread(target=answer)
     thread.start()
     made = Machine.__new__(Machine)
+    made.patience = 1.0
     made.folder, made._agent, made._number, made._read = tmp_path, host, 0, b""
     for name in ("qemu.txt", "console.txt"):
         (tmp_path / name).write_text(f"{name} says this\n")
