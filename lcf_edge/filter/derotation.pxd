@@ -27,7 +27,7 @@ cpdef void derotate_predictions(EdgeColumns edges, Homography h) noexcept nogil
 cdef bint shows_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
 cpdef bint measure_off_line(OffLine off, EdgeColumns edges, CornerColumns corners, Pinhole pinhole, Settings settings) noexcept nogil
 cpdef void off_line(OffLine off, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Pinhole pinhole) noexcept nogil
-@cython.locals(weak=double, shared=double, variance=double, doubt=double)
+@cython.locals(weak=double, shared=double, variance=double, inflation=double)
 cpdef void missing_rotation(OffLine off, double focal, double prior_sigma_rad) noexcept nogil
 @cython.locals(scatter=double)
 cdef double weigh(OffLine off, double prior) noexcept nogil

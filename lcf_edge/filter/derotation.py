@@ -133,11 +133,11 @@ def missing_rotation(off: OffLine, focal: float, prior_sigma_rad: float) -> None
     for i in range(3):
         off.alone[i] = off.equations.solution[i]
     least_squares.invert(off.equations)
-    doubt = max(1.0, scatter / SCATTER)
+    inflation = max(1.0, scatter / SCATTER)
     shared = MIN_SIGMA_PX / focal
     for i in range(3):
         variance = CORNER_SIGMA_PX * CORNER_SIGMA_PX * off.equations.inverse[i, i] + shared * shared
-        off.alone_sigma[i] = doubt * doubt * math.sqrt(variance)
+        off.alone_sigma[i] = inflation * inflation * math.sqrt(variance)
         off.equations.matrix[i, i] += prior - weak * weak
     least_squares.factorise(off.equations)
     least_squares.invert(off.equations)

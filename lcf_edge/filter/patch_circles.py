@@ -64,9 +64,9 @@ def stands(patches: Patches, p: int, around: Situation) -> bool:
 
 def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
     """Whether a patch shows something stationary above the ground that the vehicle reaches within the horizon."""
-    inverse, doubt = patches.inverse[p], patches.doubt[p]
+    inverse, inverse_sigma = patches.inverse[p], patches.inverse_sigma[p]
     reach_m = around.speed_mps * around.horizon_s
-    if not inverse > MIN_SIGMAS * doubt or not (inverse - doubt) * SLOWER_HORIZONS * reach_m > 1:
+    if not inverse > MIN_SIGMAS * inverse_sigma or not (inverse - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1:
         return False
     range_m = 1 / inverse
     half = patches.half_px[p] * patches.scale[p]
@@ -80,7 +80,7 @@ def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
     if not (1 - LOWEST_SHARE) * around.camera_height_m < above_m < around.height_m:
         return False
     ground = situation.ground_inverse(around, patches.y[p] + 0.5 * half)
-    return inverse > (1 + GROUND_MARGIN) * ground + doubt or (
+    return inverse > (1 + GROUND_MARGIN) * ground + inverse_sigma or (
         inverse > situation.ground_inverse(around, patches.y[p]) and is_upright(patches, p, around)
     )
 
@@ -95,10 +95,10 @@ def is_upright(patches: Patches, p: int, around: Situation) -> bool:
             continue
         nearer = (patches.y[q] - patches.y[p]) / around.pinhole.fy / around.camera_height_m
         short = nearer - (patches.inverse[q] - patches.inverse[p])
-        doubt = lengths.of(patches.doubt[p], patches.doubt[q])
+        inverse_sigma = lengths.of(patches.inverse_sigma[p], patches.inverse_sigma[q])
         if (
             math.fabs(nearer) > UPRIGHT_SHARE * patches.inverse[p]
-            and (short if nearer > 0 else -short) > UPRIGHT_SIGMAS * doubt
+            and (short if nearer > 0 else -short) > UPRIGHT_SIGMAS * inverse_sigma
         ):
             return True
     return False
@@ -123,11 +123,11 @@ def agree(patches: Patches, p: int, q: int) -> bool:
     if math.fabs(patches.y[p] - patches.y[q]) >= STACK_SIDES * half:
         return False
     one, other = patches.inverse[p], patches.inverse[q]
-    doubt = lengths.of(patches.doubt[p], patches.doubt[q])
+    inverse_sigma = lengths.of(patches.inverse_sigma[p], patches.inverse_sigma[q])
     apart = math.fabs(one - other)
     return (
-        other > ALIKE_SIGMAS * patches.doubt[q]
-        and apart < AGREE_SIGMAS * doubt + AGREE_SHARE * one
+        other > ALIKE_SIGMAS * patches.inverse_sigma[q]
+        and apart < AGREE_SIGMAS * inverse_sigma + AGREE_SHARE * one
         and apart < AGREE_AT_MOST * one
     )
 
@@ -135,7 +135,7 @@ def agree(patches: Patches, p: int, q: int) -> bool:
 def add(groups: PatchGroups, g: int, patches: Patches, p: int) -> None:
     """Add a patch to a group."""
     half = patches.half_px[p] * patches.scale[p]
-    weight = 1 / (patches.doubt[p] * patches.doubt[p])
+    weight = 1 / (patches.inverse_sigma[p] * patches.inverse_sigma[p])
     groups.members.size[g] += 1
     groups.left, groups.right = min(groups.left, patches.x[p] - half), max(groups.right, patches.x[p] + half)
     groups.top, groups.bottom = min(groups.top, patches.y[p] - half), max(groups.bottom, patches.y[p] + half)

@@ -41,7 +41,7 @@ cdef class Patches:
     cdef readonly int capacity
     cdef readonly unsigned char[::1] active
     cdef readonly int[::1] misses, circle
-    cdef readonly double[::1] x, y, scale, sigma, elapsed_s, depth_m, inverse, doubt
+    cdef readonly double[::1] x, y, scale, sigma, elapsed_s, depth_m, inverse, inverse_sigma
     cdef double[::1] first_x, first_y, half_px
     cdef readonly double[::1] contrast, unit
     cdef double[::1] weight, sampled, offset

@@ -53,8 +53,8 @@ class Patches:
     ``x``, ``y``: centre, px; ``first_x``, ``first_y``: where that was first seen, derotated to now, px; ``half_px``:
     half-side then; ``scale``: s since then, and ``sigma`` of it; ``elapsed_s``; ``depth_m``: ΔZ; ``stretch``: half the
     excess of its growth across over that down, as a share of its size; ``misses``: consecutive frames in which it was
-    not found; ``inverse``, ``doubt``: 1/Z if it is stationary, and its sigma, 1/m; ``circle``: row of C_r that it
-    supports in this frame, -1: none.
+    not found; ``inverse``, ``inverse_sigma``: 1/Z if it is stationary, with 1 sigma, 1/m; ``circle``: row of C_r that
+    it supports in this frame, -1: none.
 
     The template, over its samples: ``grey``, minus its mean; ``across``, ``down``, ``growing``, ``stretching``: its
     weighted derivatives by shift, scale and stretch; ``sums`` of these and of their products with ``grey`` (8);
@@ -72,7 +72,7 @@ class Patches:
         self.misses, self.circle = [integers(max(capacity, 1)) for _ in range(2)]
         self.x, self.y, self.first_x, self.first_y = [doubles(max(capacity, 1)) for _ in range(4)]
         self.half_px, self.scale, self.sigma, self.elapsed_s = [doubles(max(capacity, 1)) for _ in range(4)]
-        self.depth_m, self.inverse, self.doubt = [doubles(max(capacity, 1)) for _ in range(3)]
+        self.depth_m, self.inverse, self.inverse_sigma = [doubles(max(capacity, 1)) for _ in range(3)]
         self.contrast, self.unit = [doubles(max(capacity, 1)) for _ in range(2)]
         self.grey, self.across, self.down, self.growing = [doubles(max(capacity, 1), SAMPLES) for _ in range(4)]
         self.stretching = doubles(max(capacity, 1), SAMPLES)
@@ -249,10 +249,10 @@ def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
             patches.x[p], patches.y[p], patches.scale[p] = x, y, scale
             patches.misses[p] += 1
         patches.circle[p] = -1
-        patches.inverse[p] = patches.doubt[p] = 0.0
+        patches.inverse[p] = patches.inverse_sigma[p] = 0.0
         if patches.depth_m[p] > 0:
             patches.inverse[p] = (patches.scale[p] - 1) / patches.depth_m[p]
-            patches.doubt[p] = patches.sigma[p] / patches.depth_m[p]
+            patches.inverse_sigma[p] = patches.sigma[p] / patches.depth_m[p]
         if patches.misses[p] > MAX_MISSES or patches.elapsed_s[p] > LIFE_S:
             patches.active[p] = 0
 
@@ -331,7 +331,7 @@ def give_birth(patches: Patches, p: int, x: float, y: float, half: float, image:
     patches.x[p] = patches.first_x[p] = x
     patches.y[p] = patches.first_y[p] = y
     patches.scale[p], patches.sigma[p] = 1.0, MAX_SCALE_SIGMA
-    patches.elapsed_s[p] = patches.depth_m[p] = patches.inverse[p] = patches.doubt[p] = 0.0
+    patches.elapsed_s[p] = patches.depth_m[p] = patches.inverse[p] = patches.inverse_sigma[p] = 0.0
     return True
 
 

@@ -33,7 +33,7 @@ cdef class Verdicts:
     cdef public Py_ssize_t count
     cdef readonly int[::1] row, slot, near
     cdef int[::1] oldest
-    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, doubt
+    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, inverse_sigma
     cdef double[::1] near_x, near_y, weight
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count

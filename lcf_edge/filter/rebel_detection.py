@@ -48,7 +48,7 @@ class Verdicts:
     ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
 
     ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
-    (``inverse``, 1/m) and the sigma of these (``doubt``; ``weight``: 1/σ²). ``shared``, ``ground``, ``total``: result
+    (``inverse``, 1/m) with 1 sigma (``inverse_sigma``; ``weight``: 1/σ²). ``shared``, ``ground``, ``total``: result
     of ``ask_neighbours``.
     """
 
@@ -58,7 +58,7 @@ class Verdicts:
         self.x, self.y, self.r, self.drift = [doubles(capacity) for _ in range(4)]
         self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
         self.mover, self.incoming = [octets(capacity) for _ in range(2)]
-        self.sigma, self.inverse, self.doubt = [doubles(capacity) for _ in range(3)]
+        self.sigma, self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(3)]
         self.near_x, self.near_y, self.weight = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
@@ -147,8 +147,8 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
         lever = lever_of(verdicts, j, baselines)
         verdicts.near[a] = j
         verdicts.inverse[a] = verdicts.outward[j] / lever
-        verdicts.doubt[a] = sigma_px(verdicts, j, around) / lever
-        verdicts.weight[a] = 1 / (verdicts.doubt[a] * verdicts.doubt[a])
+        verdicts.inverse_sigma[a] = sigma_px(verdicts, j, around) / lever
+        verdicts.weight[a] = 1 / (verdicts.inverse_sigma[a] * verdicts.inverse_sigma[a])
         verdicts.near_x[a], verdicts.near_y[a] = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
 
 
@@ -157,7 +157,8 @@ def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Sett
 
     ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
     """
-    x, y, inverse, doubt = verdicts.near_x[a], verdicts.near_y[a], verdicts.inverse[a], verdicts.doubt[a]
+    x, y = verdicts.near_x[a], verdicts.near_y[a]
+    inverse, inverse_sigma = verdicts.inverse[a], verdicts.inverse_sigma[a]
     lowest_y = around.horizon_y - around.pinhole.focal * around.horizon_sigma_rad
     reach2 = settings.neighbour_px * settings.neighbour_px
     total = shared = ground = 0.0
@@ -165,7 +166,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Sett
         dx, dy = x - verdicts.near_x[b], y - verdicts.near_y[b]
         if dx * dx + dy * dy >= reach2:
             continue
-        if math.fabs(inverse - verdicts.inverse[b]) >= ALIKE_SIGMAS * (doubt + verdicts.doubt[b]):
+        if math.fabs(inverse - verdicts.inverse[b]) >= ALIKE_SIGMAS * (inverse_sigma + verdicts.inverse_sigma[b]):
             continue
         total += verdicts.weight[b]
         shared += verdicts.weight[b] * verdicts.inverse[b]
@@ -182,7 +183,7 @@ def will_be_met(
     focal = around.pinhole.focal
     reach_m = around.speed_mps * around.horizon_s
     shared_px = verdicts.sigma[j] + max(around.noise_px - COMMON_NOISE_PX, 0.0)  # errors that neighbours share
-    doubt = 1 / math.sqrt(verdicts.total) + shared_px / lever_of(verdicts, j, baselines)
+    inverse_sigma = 1 / math.sqrt(verdicts.total) + shared_px / lever_of(verdicts, j, baselines)
     range_m = 1 / max(shared, MIN_INVERSE_RANGE)
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
     excess = shared
@@ -193,9 +194,9 @@ def will_be_met(
         path.way_to(right_m, range_m, around) < soon_m
         and math.fabs(path.miss(right_m, range_m, around)) < around.half_width_m
         and around.camera_height_m - (edges.y[i] - around.horizon_y) / focal * range_m < around.height_m
-        and (shared - doubt) * SLOWER_HORIZONS * reach_m > 1
-        and shared > RANGE_SIGMAS * doubt
-        and excess > GROUND_SIGMAS * doubt
+        and (shared - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1
+        and shared > RANGE_SIGMAS * inverse_sigma
+        and excess > GROUND_SIGMAS * inverse_sigma
     )
 
 

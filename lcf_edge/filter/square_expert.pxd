@@ -24,7 +24,7 @@ cdef double TOWER_GAP
 cdef double LIKE_SIGMAS
 cdef double LIKE_SHARE
 cdef double VERY_LIKE_SHARE
-cdef double DOUBT_SHARE
+cdef double MAX_SIGMAS_SHARE
 cdef double LIKE_SHARE_OF_LINK
 cdef double STRAY_SIGMAS
 cdef double STRAY_SHARE
@@ -64,7 +64,7 @@ cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
 cdef double REMNANT_SHARE
-cdef double USUAL_S
+cdef double RECENT_S
 cdef double LEAVES_S
 cdef double LOSES_HZ
 cdef double FOOT_PX

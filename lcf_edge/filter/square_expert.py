@@ -32,7 +32,7 @@ TOWER_GAP = 2.0  # and vertical
 LIKE_SIGMAS = 3.0  # tolerance for motions of one object,
 LIKE_SHARE = 0.25  # plus this share of the speed, since limbs swing,
 VERY_LIKE_SHARE = 0.1  # or this one, for close agreement;
-DOUBT_SHARE = 0.5  # bounds the sigmas, as a share of the speed: an uncertain object would absorb its surroundings
+MAX_SIGMAS_SHARE = 0.5  # bounds the sigmas, as a share of the speed: an uncertain object would absorb its surroundings
 LIKE_SHARE_OF_LINK = 0.2  # plus this share of the link distance of rebels, per second
 STRAY_SIGMAS = 4.0  # of noise, plus
 STRAY_SHARE = 0.35  # this share of its speed: tolerance for the motion of an object's edge,
@@ -67,7 +67,7 @@ COMING_S = 3.0  # and out of view, but moving towards the path;
 NEAR_S = 1.0  # nearer than ``NEAR_M``, at least,
 NEAR_M = 1.5
 REMNANT_SHARE = 0.33  # fewer edges of such a near object, as a share of its recent number, do not measure its motion;
-USUAL_S = 3.0  # time constant with which that number decays;
+RECENT_S = 3.0  # time constant with which that number decays;
 LEAVES_S = 0.5  # unless it leaves the image within this time
 RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
 LINGERS_S = 6.0  # and near, not seen through;
@@ -268,10 +268,10 @@ def moves_alike(
     variance_x = own + fx * fx * max(sideways, 0.0)
     variance_y = own + fy * fy * down * down * objects.mm[o]
     like = share * lengths.of(vx, vy) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
-    doubt = DOUBT_SHARE * max(lengths.of(vx, vy), lengths.of(vx - dx, vy - dy))
+    largest = MAX_SIGMAS_SHARE * max(lengths.of(vx, vy), lengths.of(vx - dx, vy - dy))
     return (
-        math.fabs(dx) < min(LIKE_SIGMAS * math.sqrt(variance_x), doubt) + like
-        and math.fabs(dy) < min(LIKE_SIGMAS * math.sqrt(variance_y), doubt) + like
+        math.fabs(dx) < min(LIKE_SIGMAS * math.sqrt(variance_x), largest) + like
+        and math.fabs(dy) < min(LIKE_SIGMAS * math.sqrt(variance_y), largest) + like
     )
 
 
@@ -368,7 +368,7 @@ def least_row(objects: ObjectColumns) -> int:
 def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> None:
     """Initialise a new object. It is not reported in its first frames, in which few edges would determine it."""
     objects.active[o] = 1
-    objects.usual[o] = 0.0
+    objects.recent_edges[o] = 0.0
     objects.id[o] = shared.new_id(ids)
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
@@ -778,7 +778,7 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
     seem to grow while it comes closer. Not if it is about to leave the image, which explains the loss, nor before a
     vehicle at rest, where few edges are expected.
     """
-    if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.usual[o]:
+    if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.recent_edges[o]:
         return False
     if math.fabs(around.speed_mps) < RESTS_MPS:
         return False
@@ -1042,7 +1042,7 @@ def update(
         count = squares.wholes.count[o]
         remnant = False
         if count >= MIN_EDGES:
-            objects.usual[o] = max(objects.usual[o] * math.exp(-around.dt_s / USUAL_S), count)
+            objects.recent_edges[o] = max(objects.recent_edges[o] * math.exp(-around.dt_s / RECENT_S), count)
             remnant = is_remnant(objects, o, count, plane, around)
             objects.unseen_s[o], objects.state[o] = 0.0, SEEN
             objects.support[o] = count

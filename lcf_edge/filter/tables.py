@@ -179,7 +179,7 @@ OBJECT_COLUMNS = (
     Column("class_id", "`messages.ObjectClass`", "", ("square_expert",), np.uint8),
     Column("state", "`messages.ObjectState`", "", ("square_expert",), np.uint8),
     Column("support", "edges behind it", "1", ("square_expert",), np.int32),
-    Column("usual", "edges that lately showed it", "1", ("square_expert",)),
+    Column("recent_edges", "edges that lately showed it", "1", ("square_expert",)),
     Column("trust", "Tr", "1", ("square_expert",)),
     Column("age_s", "since it was founded", "s", ("square_expert",)),
     Column("unseen_s", "since edges last showed it", "s", ("square_expert",)),

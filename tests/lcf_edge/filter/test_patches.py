@@ -154,4 +154,4 @@ def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situati
         follow(patches, grown(image, 5 / (5 - ahead_m), right_px, down_px))
     assert patches.depth_m[0] == pytest.approx(1.0)
     assert 1 / patches.inverse[0] == pytest.approx(4.0, rel=0.1)
-    assert abs(patches.inverse[0] - 0.25) < 3 * patches.doubt[0]
+    assert abs(patches.inverse[0] - 0.25) < 3 * patches.inverse_sigma[0]
