@@ -82,7 +82,7 @@ def _parts(pipeline: Pipeline) -> dict[str, list[float]]:
     parts["_stillness"] = SimpleNamespace(look=parts["_stillness"].look)  # nothing can be set on what is compiled
     steps = (
         (parts["_repeats"], "is_repeat", "whether the image repeats the last one"),
-        (parts["_small_image"], "of", "image in small"),
+        (parts["_small_image"], "of", "downscaled image"),
         (parts["_detector"], "detect", "corners"),
         (parts["_quality"], "notes", "what is wrong with the image"),
         (parts["_stillness"], "look", "whether the image stands still"),

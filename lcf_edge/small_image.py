@@ -1,4 +1,4 @@
-"""An image in small: halved until little of it is left, so that noise averages out and only outlines stay."""
+"""A downscaled image: halved until little of it is left, so that noise averages out and only outlines stay."""
 
 from math import log2
 from typing import Any
@@ -13,7 +13,7 @@ Grey = npt.NDArray[np.uint8]
 
 
 class SmallImage:
-    """For images of one size. ``side``: px of the image that are one in small; ``width``, ``height``: small px."""
+    """For images of one size. ``side``: px of the image for each small px; ``width``, ``height``: small px."""
 
     def __init__(self, width: int, height: int) -> None:
         halvings = max(0, round(log2(width * height / AREA_PX) / 2))
@@ -22,7 +22,7 @@ class SmallImage:
         self.width, self.height = width // self.side, height // self.side
 
     def of(self, image: Grey) -> Grey:
-        """Return an image, uint8 (height, width), in small, without what fills no small px at its right and foot."""
+        """Return an image, uint8 (height, width), downscaled, less what fills no small px at its right and bottom."""
         small: npt.NDArray[Any] = image[: self.height * self.side, : self.width * self.side]
         for _ in range(self._halvings):
             small = cv2.resize(small, (small.shape[1] // 2, small.shape[0] // 2), interpolation=cv2.INTER_AREA)

@@ -17,7 +17,7 @@ _LEVEL_GRAVITY_ERROR_MPS2 = 0.03  # if the force differs from gravity by no more
 _SIGMA_ACCEL_MPS2 = 0.05  # 1 sigma of the forward acceleration just after a rest
 _SIGMA_GAP_MPS2 = 3.0  # 1 sigma of the acceleration while no sample comes, or saturated ones
 _SIGMA_ODOMETRY_MPS = 0.05
-_ZERO_MPS = 0.15
+_ZERO_MPS = 0.15  # largest speed, with 2 sigma, that counts as 0
 _LATE_S = 0.3  # delay with which the end of a rest is noticed
 _SIGMA_LIMIT_MPS = 1.5  # beyond, the speed is unknown: about 7 s of driving with the default gyro noise
 

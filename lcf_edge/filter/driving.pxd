@@ -18,7 +18,9 @@ cdef class DrivingTest:
     cdef readonly int edges, left, right, astray
     cdef readonly bint drives
 
-@cython.locals(too_near=bint, outward=double, drift=double)
+@cython.locals(r=double)
+cdef bint is_away(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
+@cython.locals(i=cython.Py_ssize_t, outward=double, drift=double)
 cdef void look(DrivingTest test, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(flow=int, i=cython.Py_ssize_t, j=cython.Py_ssize_t)
 cpdef void measure(DrivingTest test, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

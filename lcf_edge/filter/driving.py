@@ -20,7 +20,7 @@ MAX_DRIFT_SHARE = 0.5  # of the outward motion; with more an edge is astray
 class DrivingTest:
     """What one frame shows. ``drives``: the verdict.
 
-    ``edges``: those with a history, away from O, and own parts; of these ``left`` and ``right`` of O flow outward,
+    ``edges``: those away from O with a history, and own parts; of these ``left`` and ``right`` of O flow outward,
     ``astray`` move otherwise.
     """
 
@@ -29,12 +29,18 @@ class DrivingTest:
         self.drives = False
 
 
+def is_away(edges: EdgeColumns, i: int, around: Situation) -> bool:
+    """Whether an edge is far enough from O to flow."""
+    r = lengths.of(edges.x[i] - around.focus_x, edges.y[i] - around.focus_y)
+    return r >= MIN_R_SHARE * around.pinhole.focal
+
+
 def look(
     test: DrivingTest, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
 ) -> None:
     """Count one edge."""
-    too_near = verdicts.r[j] < MIN_R_SHARE * around.pinhole.focal
-    if too_near or baselines.elapsed_s[verdicts.slot[j]] < MIN_BASELINE_S:
+    i = verdicts.row[j]
+    if not is_away(edges, i, around) or baselines.elapsed_s[verdicts.slot[j]] < MIN_BASELINE_S:
         return
     test.edges += 1
     outward, drift = verdicts.outward[j], math.fabs(verdicts.drift[j])
@@ -42,7 +48,7 @@ def look(
         return
     if drift > MAX_DRIFT_SHARE * outward:
         test.astray += 1
-    elif edges.x[verdicts.row[j]] < around.focus_x:
+    elif edges.x[i] < around.focus_x:
         test.left += 1
     else:
         test.right += 1
@@ -55,7 +61,7 @@ def measure(test: DrivingTest, verdicts: Verdicts, edges: EdgeColumns, baselines
     """
     test.edges = test.left = test.right = test.astray = 0
     for i in range(edges.count):
-        test.edges += edges.matched[i] != 0 and edges.is_own_part(i)
+        test.edges += edges.matched[i] != 0 and edges.is_own_part(i) and is_away(edges, i, around)
     for j in range(verdicts.count):
         look(test, verdicts, j, edges, baselines, around)
     flow = test.left + test.right

@@ -344,6 +344,19 @@ class TestBias:
             assert np.isnan(motion.speed_mps)
             assert "no speed" in motion.notes
 
+    @pytest.mark.parametrize(("flows_s", "is_known"), [(0.4, True), (0.7, False)])
+    def test_the_speed_0_of_a_rest_is_discarded_after_half_a_second_of_flow(
+        self, flows_s: float, is_known: bool
+    ) -> None:
+        """What comes close to a stationary vehicle may flow outward for a moment."""
+        ego = calibrated()
+        feed(ego, np.arange(0, 2, 0.01))
+        for t in np.arange(0.1, 1.0 + flows_s, 0.05):
+            motion = ego.advance(ns(t))
+            ego.see_driving(bool(t > 1.0))
+        motion = ego.advance(ns(1.0 + flows_s))
+        assert np.isfinite(motion.speed_mps) == is_known
+
     @pytest.mark.parametrize(("speed", "yaw"), [(0.5, 0.0), (0.0, 0.05)], ids=["drives", "turns on the spot"])
     def test_is_not_learnt_while_odometry_moves(self, speed: float, yaw: float) -> None:
         ego = estimator()

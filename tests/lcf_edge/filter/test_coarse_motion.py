@@ -1,4 +1,4 @@
-"""What crosses fast, and has no corner that is found again, is found in the image in small."""
+"""What crosses fast, and has no corner that is found again, is found in the downscaled image."""
 
 import math
 from collections.abc import Iterator

@@ -53,3 +53,19 @@ def test_who_stands_is_not_though_traffic_passes_on_both_sides(drive: Drive, box
     comes = drive(box((-3.0, -0.4, 12.0), (2.0, 1.6, 4.0), landmarks=120), np.array([0.0, 0.0, -4.0]))
     goes = drive(box((3.0, -0.4, 5.0), (2.0, 1.6, 4.0), landmarks=120), np.array([0.0, 0.0, 4.0]))
     assert not any(verdicts(replace(comes + goes, speed_mps=0.0), 0.0))
+
+
+def test_who_drives_is_seen_to_drive_though_most_of_the_scene_is_far_ahead(
+    street: Any, drive: Drive, box: Landmarks
+) -> None:
+    """Near O it hardly flows at any speed."""
+    skyline = drive(box((0.0, -2.0, 200.0), (24.0, 12.0, 0.0), landmarks=600))
+    assert all(list(verdicts(street + skyline, 0.0))[SOON:])
+
+
+def test_who_stands_is_not_though_some_come_on_both_sides_if_others_cross(drive: Drive, box: Landmarks) -> None:
+    left, right = (
+        drive(box((x, -0.4, 9.0), (2.0, 1.6, 3.0), landmarks=150), np.array([0.0, 0.0, -3.0])) for x in (-3.0, 3.0)
+    )
+    crosses = drive(box((-1.2, -0.4, 6.0), (1.6, 1.6, 0.3), landmarks=260), np.array([1.0, 0.0, 0.0]))
+    assert not any(verdicts(replace(left + right + crosses, speed_mps=0.0), 0.0))

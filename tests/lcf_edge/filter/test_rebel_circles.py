@@ -41,7 +41,7 @@ Floats = npt.NDArray[np.float32]
 
 
 def coarse() -> tuple[CoarseMotion, CoarseGroups]:
-    """Nothing is seen in small."""
+    """Nothing is seen in the downscaled image."""
     return CoarseMotion(Lens(640, 480, 500.0, 500.0, 319.5, 239.5), 640), CoarseGroups(0)
 
 

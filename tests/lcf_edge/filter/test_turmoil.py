@@ -310,8 +310,8 @@ def test_a_full_table_counts_it(calm: Any) -> None:
 
 
 @pytest.mark.parametrize("changes", [True, False])
-def test_fine_texture_that_keeps_no_corner_is_none_if_the_image_in_small_stands(calm: Any, changes: bool) -> None:
-    """As foliage, gravel or a row of parked bicycles; what tumbles changes there too."""
+def test_fine_texture_that_keeps_no_corner_is_none_if_the_downscaled_image_stands(calm: Any, changes: bool) -> None:
+    """As tree tops or a row of parked motorcycles; what tumbles changes there too."""
     random, tiles = np.random.default_rng(4), np.ones((6, 6), np.uint8)
     small = np.kron(random.integers(0, 256, (10, 14), np.uint8), tiles)[:, :80].copy()
     column, row = (round(each * 80 / 640) - 9 for each in AHEAD)
