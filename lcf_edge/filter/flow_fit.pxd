@@ -8,6 +8,7 @@ from lcf_edge.filter.flow cimport Pinhole
 from lcf_edge.filter.key_frames cimport KeyFrames
 from lcf_edge.filter.least_squares cimport NormalEquations
 from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
 
 cdef int KEYS
 cdef int MIN_EDGES
@@ -41,6 +42,7 @@ cdef double SCALE_SHARE
 cdef double SCALE_SIGMAS
 cdef int BINS
 cdef double BIN_PX
+cdef double RESTS_MPS
 cdef int UNKNOWNS
 cdef int FOCUS_X
 cdef int FOCUS_Y
@@ -54,8 +56,8 @@ cdef class FlowFit:
     cdef int[::1] cell, bins
     cdef public NormalEquations equations
 
-cdef bint shows_flow(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Settings settings) noexcept nogil
-cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, Settings settings) noexcept nogil
+cdef bint shows_flow(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Situation around, Settings settings) noexcept nogil
+cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
 cdef bint shows_turn(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double quantile(FlowFit fit, double share, bint only_turned, double turn_share) noexcept nogil
@@ -68,4 +70,4 @@ cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pin
 cdef int slot_edges(FlowFit fit, int k) noexcept nogil
 cdef void apply(FlowFit fit, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
 cdef void learn_turn_share(FlowFit fit, double dt_s) noexcept nogil
-cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, double dt_s, Settings settings) noexcept nogil
+cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around, Settings settings) noexcept nogil

@@ -25,6 +25,7 @@ from lcf_edge.filter.key_frames import KeyFrames
 from lcf_edge.filter.least_squares import NormalEquations
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
 
 MIN_EDGES = 15
 MAX_EDGES = 320
@@ -57,6 +58,7 @@ SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do 
 SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
 BINS = 256  # of the histogram of residuals,
 BIN_PX = 0.05  # and their width
+RESTS_MPS = 0.05  # a slower vehicle is at rest
 UNKNOWNS = 5
 FOCUS_X = 3
 FOCUS_Y = 4
@@ -88,33 +90,36 @@ class FlowFit:
         self.equations = NormalEquations()
 
 
-def shows_flow(edges: EdgeColumns, i: int, keys: KeyFrames, settings: Settings) -> bool:
-    """Whether an edge shows the flow: found in this frame, trusted, and seen for long enough."""
+def shows_flow(edges: EdgeColumns, i: int, keys: KeyFrames, around: Situation, settings: Settings) -> bool:
+    """Whether an edge shows the flow: found in this frame, trusted, and seen for long enough.
+
+    Own parts do not; but from a vehicle at rest everything stationary looks like one.
+    """
     return (
         edges.matched[i] != 0
         and edges.trust[i] >= settings.tr_new
-        and not edges.is_own_part(i)
+        and (math.fabs(around.speed_mps) < RESTS_MPS or not edges.is_own_part(i))
         and key_frames.has_history(edges, i, keys, MIN_ELAPSED_S)
     )
 
 
 def gather(
-    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, settings: Settings
+    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, around: Situation, settings: Settings
 ) -> None:
     """Gather the edges that show the flow, evenly thinned to at most ``MAX_EDGES``."""
     fit.count = 0
     telling = 0
     for i in range(edges.count):
-        if shows_flow(edges, i, keys, settings):
+        if shows_flow(edges, i, keys, around, settings):
             telling += 1
     stride = 1 + telling // MAX_EDGES
     telling = 0
     for c in range(COLUMNS * ROWS):
         fit.cells[c] = 0
     for i in range(edges.count):
-        if shows_flow(edges, i, keys, settings):
+        if shows_flow(edges, i, keys, around, settings):
             if telling % stride == 0:
-                note(fit, edges, i, key_frames.oldest_key(edges, i, keys) % KEYS, baselines, pinhole)
+                note(fit, edges, i, key_frames.oldest_key(edges, i, keys) % KEYS, baselines, around.pinhole)
             telling += 1
     for k in range(fit.count):
         fit.share[k] = min(1.0, CELL_EDGES / fit.cells[fit.cell[k]])
@@ -314,18 +319,17 @@ def measure(
     edges: EdgeColumns,
     keys: KeyFrames,
     baselines: Baselines,
-    pinhole: Pinhole,
-    dt_s: float,
+    around: Situation,
     settings: Settings,
 ) -> None:
     """Fit this frame and correct the baselines. ``prior_x``, ``prior_y`` must be set."""
     fit.focus_x = fit.focus_y = fit.scale_px = 0.0
     fit.focus_sigma_x, fit.focus_sigma_y = fit.prior_x, fit.prior_y
-    gather(fit, edges, keys, baselines, pinhole, settings)
+    gather(fit, edges, keys, baselines, around, settings)
     if fit.count < MIN_EDGES:
         fit.count = 0
         return
-    sigma_radps = rate_sigma(fit, baselines, pinhole.focal)
+    sigma_radps = rate_sigma(fit, baselines, around.pinhole.focal)
     solve(fit, sigma_radps)
-    apply(fit, keys, baselines, pinhole, sigma_radps)
-    learn_turn_share(fit, dt_s)
+    apply(fit, keys, baselines, around.pinhole, sigma_radps)
+    learn_turn_share(fit, around.dt_s)

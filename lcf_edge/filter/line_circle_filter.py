@@ -425,7 +425,7 @@ class LineCircleFilter:
         fit.prior_x = headings.focus_sigma_rad(headings.sideways_sigma_rad(heading)) * pinhole.fx
         fit.prior_y = headings.focus_sigma_rad(heading.sigma_y) * pinhole.fy
         edges, settings = self.edges.columns, self._settings
-        flow_fit.measure(fit, edges, self._keys, self._baselines, pinhole, around.dt_s, settings)
+        flow_fit.measure(fit, edges, self._keys, self._baselines, around, settings)
         around.turn_share = fit.turn_share
         of_flow_rad = math.hypot(fit.focus_sigma_y / pinhole.fy, GROUND_SLOPE_RAD)
         around.horizon_sigma_rad = min(settings.pitch_sigma_rad, of_flow_rad)

@@ -1,6 +1,7 @@
 from libc cimport math
 from lcf_edge.filter.flow cimport Pinhole
 
+cdef double SLOWEST_MPS
 cdef double INFINITY
 cdef double NAN
 

@@ -5,6 +5,7 @@ import math
 from lcf_edge.config import Config
 from lcf_edge.filter.flow import Pinhole
 
+SLOWEST_MPS = 0.05  # a slower vehicle's scene does not flow, and would bound all motion by 0
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -13,14 +14,14 @@ class Situation:
     """State of this frame that the experts share.
 
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
-    unknown. ``scene_flow_pxps``: image speed at V_ν of a point at the configured scene depth, one focal length from O,
-    which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown. ``dt_s``: t_f. ``noise_px``:
-    1 sigma of an edge's position. ``delta_px``: δ over a chain of key frames. Both as configured, or as measured by
-    ``flow_fit`` if more. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it. ``pitch_sigma_rad``:
-    1 sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance
-    of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``:
-    enough of the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is
-    found again: something covers it.
+    unknown. ``scene_flow_pxps``: image speed at V_ν, or ``SLOWEST_MPS`` if more, of a point at the configured scene
+    depth, one focal length from O, which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown.
+    ``dt_s``: t_f. ``noise_px``: 1 sigma of an edge's position. ``delta_px``: δ over a chain of key frames. Both as
+    configured, or as measured by ``flow_fit`` if more. ``turn_share``: 1 sigma of the image motion by a turn, as a
+    share of it. ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where
+    that is less. ``lever_m``: distance of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must
+    flow (``rest``). ``flow_is_seen``: enough of the static scene is in view to show its flow. ``is_blind``: it is not,
+    and hardly an edge of the image is found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -48,7 +49,7 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
     around.noise_px, around.delta_px = around.min_noise_px, around.min_delta_px
     around.scene_flow_pxps = INFINITY
     if math.isfinite(speed_mps):
-        around.scene_flow_pxps = math.fabs(speed_mps) * around.pinhole.focal / around.scene_depth_m
+        around.scene_flow_pxps = max(math.fabs(speed_mps), SLOWEST_MPS) * around.pinhole.focal / around.scene_depth_m
 
 
 def ground_range_m(around: Situation, y: float) -> float:

@@ -57,9 +57,10 @@ class Seen:
         edges.append(number)
         self._look(edges, self.keys, number)
         around = Situation(Config(), PINHOLE)
+        around.dt_s = 0.05
         lines.measure(self.baselines, self.keys, Homography(), PINHOLE, around)
         self.fit.prior_x = self.fit.prior_y = PRIOR_PX
-        flow_fit.measure(self.fit, edges.columns, self.keys, self.baselines, PINHOLE, 0.05, SETTINGS)
+        flow_fit.measure(self.fit, edges.columns, self.keys, self.baselines, around, SETTINGS)
         return self
 
     def _look(self, edges: EdgeTable, keys: KeyFrames, n: int) -> None:

@@ -526,6 +526,20 @@ def test_what_crosses_is_crossing_to_the_side_it_goes_to(
         assert np.sign(math.cos(tables.rebel.beta[row])) == side
 
 
+@pytest.mark.parametrize("velocity_mps", [(0.6, 0.0, -0.6), (0.6, 0.0, 0.0)], ids=["comes nearer", "crosses"])
+def test_a_vehicle_that_stands_sees_who_walks_ever_faster_in_the_image(
+    drive: Drive, box: Landmarks, clutter: Landmarks, velocity_mps: tuple[float, float, float]
+) -> None:
+    """The paper's bounds of speeds are multiples of the vehicle's, which is 0."""
+    walker = drive(box((-1.2, -0.55, 5.0), (0.4, 1.7, 0.2), landmarks=60), np.array(velocity_mps))
+    way = replace(drive(clutter(150)) + walker, frames=40, speed_mps=0.0)
+    tables, seen = LineCircleFilter(Config(), way.lens), []
+    for corners, motion in way:
+        tables.step(corners, motion)
+        seen.append(bool((tables.rebel.active & (tables.rebel.trust >= TR_S)).any()))
+    assert all(seen[12:])
+
+
 def test_what_drives_ahead_of_us_is_leading(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     """On a ground that is seen to flow: else only what keeps station would show whether the vehicle stands."""
     leader = drive(box((0.0, 0.1, 2.5), (0.6, 0.35, 0.0), landmarks=40), np.array([0, 0, 2.0]))
