@@ -19,8 +19,8 @@ cdef double LIKE_GROUND
 
 cdef class MotionSums:
     cdef readonly int[::1] count
-    cdef readonly double[::1] x, y, vx, vy, focus_x, focus_y, forward
-    cdef double[::1] weight, elapsed, common
+    cdef readonly double[::1] weight, x, y, vx, vy, focus_x, focus_y, forward
+    cdef double[::1] elapsed, common
     cdef double[::1] b2v0, b4v0, b1v1, b2v1, b0v2
     cdef readonly double[::1] left, top, right, bottom
     cdef double[::1] xx, yy, xvx, yvy

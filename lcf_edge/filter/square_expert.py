@@ -232,7 +232,8 @@ def belongs(
 ) -> bool:
     """Whether a circle is a part of an object: near its box, with the same motion.
 
-    A large object may have few corners, so a wider gap is allowed if the motions agree closely.
+    A large object may have few corners, so a wider gap is allowed if the motions agree closely, and there is one: in
+    standing still, everything agrees.
     """
     width, tall = max(objects.width[o], circles.width[c]), max(objects.height[o], circles.height[c])
     extent = max(width, tall)
@@ -241,9 +242,16 @@ def belongs(
     near_px = settings.rebel_link_px
     if side < max(near_px, SIDE_GAP * extent) and stack < max(near_px, STACK_GAP * extent):
         return moves_alike(objects, o, parts, c, LIKE_SHARE, around, settings)
-    if side < WIDE_GAP * width and stack < TOWER_GAP * extent:
+    if side < WIDE_GAP * width and stack < TOWER_GAP * extent and is_moving(parts, c, settings):
         return moves_alike(objects, o, parts, c, VERY_LIKE_SHARE, around, settings)
     return False
+
+
+def is_moving(parts: MotionSums, c: int, settings: Settings) -> bool:
+    """Whether a circle moves in the image, beyond its noise."""
+    weight = parts.weight[c]
+    speed = lengths.of(parts.vx[c] / weight, parts.vy[c] / weight)
+    return speed > LIKE_SIGMAS / math.sqrt(weight) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
 
 
 def moves_alike(

@@ -11,11 +11,15 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Config, Filter, Memory
-from lcf_edge.filter import Corners, LineCircleFilter, Motion
-from lcf_edge.filter.tables import ObjectTable
+from lcf_edge.filter import Corners, LineCircleFilter, Motion, square_expert
+from lcf_edge.filter.flow import Pinhole
+from lcf_edge.filter.group_motion import MotionSums
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.tables import CircleTable, ObjectTable
 from lcf_edge.messages import ObjectClass, ObjectState
 
 TR_S = Config().filter.tr_s
+SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
 SPEED_MPS, FPS = 2.0, 20.0
 
 Drive = Callable[..., Any]
@@ -104,6 +108,23 @@ def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clu
     rows = published(tables.objects)
     assert len(rows) == 2
     assert sorted(np.sign(tables.objects.right[rows])) == [-1, 1]
+
+
+@pytest.mark.parametrize(("gap_px", "pxps", "one"), [(10, 0, True), (10, 60, True), (60, 0, False), (60, 60, True)])
+def test_across_a_wide_gap_only_motion_shows_that_two_are_one(
+    situation: Callable[..., Any], gap_px: float, pxps: float, one: bool
+) -> None:
+    """An object and a circle beside it, each 100 px wide, seen from a vehicle that stands."""
+    objects, circles, parts = ObjectTable(1), CircleTable(1), MotionSums(1)
+    around = situation(speed_mps=0.0)
+    objects.x[0], objects.y[0], objects.width[0], objects.height[0] = 200.0, 240.0, 100.0, 100.0
+    objects.sideways[0], objects.mm[0], objects.qq[0] = pxps / around.pinhole.fx, 1e-4, 1e-4
+    x = 300.0 + gap_px
+    circles.x[0], circles.y[0], circles.width[0], circles.height[0] = x, 240.0, 100.0, 100.0
+    weight = 0.1
+    parts.count[0], parts.weight[0], parts.x[0], parts.y[0] = 10, weight, weight * x, weight * 240.0
+    parts.vx[0] = weight * pxps
+    assert bool(square_expert.belongs(objects.columns, 0, circles.columns, 0, parts, around, SETTINGS)) == one
 
 
 @pytest.mark.parametrize(("speed_mps", "aside_mps", "ahead_m"), [(0.5, 0.3, 5.0), (1.0, 0.3, 6.0), (0.3, 0.25, 5.0)])
@@ -325,7 +346,7 @@ def test_who_was_lost_right_before_a_vehicle_that_stands_is_there_until_it_sees_
 def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, about_s: float
 ) -> None:
-    walker = drive(box((-0.38 * range_m, -0.35, range_m), (0.4, 1.2, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
+    walker = drive(box((-0.38 * range_m, -0.3, range_m), (0.4, 1.2, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
     way = replace(drive(clutter(150)) + walker, frames=60, speed_mps=0.6)
     mine, lost_s, last_s = {looks.tobytes() for looks in way.looks[150:]}, 24 / FPS, 0.0
     tables = LineCircleFilter(Config(), way.lens)
