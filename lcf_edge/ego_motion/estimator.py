@@ -94,6 +94,7 @@ class _Interval:
     odometry_yaw_radps: float
     path_yaw_before_radps: float
     notes: list[str] = field(default_factory=list)
+    rests: bool = False  # without a gyro, by odometry that measures no turn either
     mean_radps: Sequence[float] = (0.0, 0.0, 0.0)  # of the rates
 
 
@@ -187,7 +188,9 @@ class EgoMotionEstimator:
             self.bias.advance(span.dt_s, (sigma_radps, sigma_radps, sigma_radps), True)
         else:
             self._guess(interval)
-            self.bias.advance(span.dt_s, [sqrt(variance) for variance in self._guess_variance], False)
+            interval.rests = abs(odometry_mps) <= _REST_SPEED_MPS and abs(odometry_yaw_radps) <= _REST_YAW_RADPS
+            variances = [_REST_TURN_RADPS**2] * 3 if interval.rests else self._guess_variance
+            self.bias.advance(span.dt_s, [sqrt(variance) for variance in variances], False)
         rest_mps2 = self._learn_rest(span, gap_limit_s, odometry_mps, still) if interval.measured else None
         rotation = self._rotation()
         if not interval.measured:
@@ -239,6 +242,8 @@ class EgoMotionEstimator:
     def needs_image_rotation(self, sigma_rad: float) -> bool:
         """Whether the rotation from the images, with ``sigma_rad``, would help in the present interval."""
         interval = self._interval
+        if interval.rests:
+            return False  # somebody who passes close by would be taken for a turn
         if not interval.measured or interval.span.dt_s == 0:
             return True
         return max(self.bias.error_sigmas()[:2]) * interval.span.dt_s > _MIN_BIAS_SHARE * sigma_rad

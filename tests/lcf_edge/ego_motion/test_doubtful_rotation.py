@@ -166,3 +166,28 @@ def knocked(pipeline: Pipeline, drive: scenes.Drive, shift_px: int) -> tuple[flo
         trusted = edges.trust[:n] >= Config().filter.tr_s
         shares.append(float(np.count_nonzero(trusted & edges.matched[:n])) / max(np.count_nonzero(trusted), 1))
     return shares[19], shares[20], shares[22]
+
+
+STANDS = scenes.Profile(((0.0, 0.0),))
+PASSES_CLOSE = scenes.Box("walker", 0.45, 1.7, 0.3, ((0.0, -1.2, 0.9), (3.0, 1.2, 0.9)))
+
+
+def test_a_vehicle_that_stands_without_a_gyro_takes_nobody_who_passes_close_for_a_turn() -> None:
+    """Its odometry measures neither motion nor turn; somebody covers a third of the image, in front of few things."""
+    drive = scenes.make("passing", 3, seconds=3.0)
+    drive = replace(drive, speed=STANDS, yaw_rate=STANDS, boxes=(*drive.boxes[:3], PASSES_CLOSE))
+    config = config_of(drive)
+    pipeline = Pipeline(config, Lens.from_config(config.camera, 640, 480))
+    turned_mrad = []
+    step = pipeline.filter.step
+
+    def watched(corners: object, motion: Motion, *images: object) -> object:
+        turned_mrad.append(1e3 * np.abs(cv2.Rodrigues(motion.rotation)[0]).max())
+        return step(corners, motion, *images)  # type: ignore[arg-type]
+
+    pipeline.filter.step = watched  # type: ignore[method-assign, assignment]
+    for frame, _ in scenes.frames(drive):
+        for late_ns in range(-50_000_000, LATE_NS, 10_000_000):
+            pipeline.add(SpeedSample(frame.stamp_ns + late_ns, 0.0, 0.0))
+        pipeline.process(frame)
+    assert max(turned_mrad[10:]) < 3.0
