@@ -43,12 +43,16 @@ def test_noise_of_single_images_is_averaged() -> None:
     assert np.std(told) < 0.07
 
 
-def test_a_vehicle_that_speeds_up_is_followed() -> None:
-    belief = GroundBelief()
-    for frame in range(60):
+@pytest.mark.parametrize("accel_mps2", [1.0, -1.0], ids=["speeds up", "brakes"])
+def test_a_vehicle_that_speeds_up_or_brakes_is_followed_though_the_ground_shows_the_middle_of_a_window(
+    accel_mps2: float,
+) -> None:
+    belief, window_s = GroundBelief(), 0.2
+    for frame in range(30):
         belief.advance(FRAME_S)
-        belief.see(shown(0.5 + frame * FRAME_S), FRAME_S)
-    assert belief.speed_mps == pytest.approx(0.5 + 59 * FRAME_S, abs=0.4)
+        now_mps = 2.0 + accel_mps2 * frame * FRAME_S
+        belief.see(shown(now_mps - accel_mps2 * window_s / 2), FRAME_S)
+    assert belief.speed_mps == pytest.approx(now_mps, abs=0.12)
 
 
 def test_without_ground_it_is_held_for_a_moment_and_then_unknown() -> None:
