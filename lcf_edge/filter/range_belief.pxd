@@ -23,15 +23,18 @@ cdef double SUNK_FOOT
 cdef double SMALL_M
 cdef double SMALL_RATIO
 cdef double SPEED_SHARE
+cdef double STANDS_SHARE
 cdef double MIN_SIGMA_HZ
 cdef double MAX_HORIZONS
 cdef double FRONT_SHARE
+cdef double SIDE_SHARE
 cdef double MAX_HALF_WIDTH
 cdef double DEPTH_SHARE
 cdef double MIN_DEPTH
 cdef double MIN_WEIGHT
 cdef double MIN_SHARE
-cdef double WIDER
+cdef double CALIBRATION
+cdef double RANGE_SHARE
 cdef int RANGE
 cdef int FORWARD
 cdef int RIGHT
@@ -60,7 +63,8 @@ cdef double small_log(Evidence evidence, double inverse) noexcept nogil
 cdef double walking_mps(Situation around) noexcept nogil
 @cython.locals(most=double, stands=double, moves=double, inverse=double, place=double)
 cdef void weigh(Belief belief, Evidence evidence, Situation around) noexcept nogil
-cdef void suppose_standing(Belief belief, double inverse, Situation around) noexcept nogil
+@cython.locals(expected=double, wrong=double, expected_var=double, measured=double, gain=double)
+cdef void suppose_standing(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef void suppose_moving(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef double lateral_at(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef double lateral_var(Belief belief, Evidence evidence, double inverse) noexcept nogil

@@ -35,14 +35,17 @@ ODDS = 1.4  # prior log odds that an object stands
 ALONG_MPS = 0.2  # σ of the sideways motion of movers along the path,
 ALONG = 0.5  # which are this share of movers
 SPEED_SHARE = 0.05  # 1 sigma of the vehicle's speed, as a share
+STANDS_SHARE = 0.5  # 1 sigma of V/Z of what seems to stand, as a share
 MIN_SIGMA_HZ = 0.003  # noise floor of looming and sideways rate
 MAX_HORIZONS = 3.0  # later contacts do not enter the means
-FRONT_SHARE = 0.3  # distance of the front before the mean of the edges, as a share of half the width,
+FRONT_SHARE = 0.1  # distance of the front before the mean of the edges, as a share of half the width,
+SIDE_SHARE = 0.5  # plus this share where it shows a side too,
 MAX_HALF_WIDTH = 1.0  # which counts up to this share of the range: a wider box contains more than one thing
-DEPTH_SHARE = 0.4  # 1 sigma of that distance, as a share of half the width,
-MIN_DEPTH = 0.03  # plus this share of the range
+DEPTH_SHARE = 0.2  # 1 sigma of that distance, as a share of half the width,
+MIN_DEPTH = 0.015  # plus this share of the range
 MIN_WEIGHT = 0.2  # total weight of the pairs that a mean needs
-WIDER = 1.15  # inflates all sigmas: both cases are simpler than the world
+CALIBRATION = 0.9  # of all sigmas: they hold the truth as often as they should in worlds of the closed loop
+RANGE_SHARE = 0.18  # 1 sigma of the range, as a share, that images of one object have in common
 MIN_SHARE = 1e-5  # pairs with less weight are left out
 RANGE, FORWARD, RIGHT, RATE, LATERAL, CLOSEST, QUANTITIES = 0, 1, 2, 3, 4, 5, 6
 TINY = 1e-300
@@ -176,12 +179,19 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
     belief.log_odds = math.log(max(stands, 1e-12)) - math.log(max(moves, 1e-12))
 
 
-def suppose_standing(belief: Belief, inverse: float, around: Situation) -> None:
-    """Set the motion of an object that stands at a range."""
+def suppose_standing(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> None:
+    """Set the motion of an object that stands at a range.
+
+    Its looming tells when it is met, whatever its range; V/Z counts less, since it may move slowly after all.
+    """
     belief.inner_forward = belief.inner_right = belief.inner_forward_var = belief.inner_right_var = 0.0
-    belief.inner_rate = inverse * around.speed_mps
-    wrong = SPEED_SHARE * belief.inner_rate
-    belief.inner_rate_var = wrong * wrong
+    expected = inverse * around.speed_mps
+    wrong = STANDS_SHARE * expected
+    expected_var = wrong * wrong + MIN_SIGMA_HZ * MIN_SIGMA_HZ
+    measured = evidence.looming + inverse * (around.speed_mps - evidence.reference)
+    gain = expected_var / (expected_var + evidence.mm)
+    belief.inner_rate = expected + gain * (measured - expected)
+    belief.inner_rate_var = gain * evidence.mm
 
 
 def suppose_moving(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> None:
@@ -259,7 +269,7 @@ def conclude(belief: Belief) -> None:
         else:
             mean = belief.mean[quantity] / weight
             belief.mean[quantity] = mean
-            belief.sigma[quantity] = WIDER * math.sqrt(max(belief.sigma[quantity] / weight - mean * mean, 0.0))
+            belief.sigma[quantity] = CALIBRATION * math.sqrt(max(belief.sigma[quantity] / weight - mean * mean, 0.0))
 
 
 def set_front(belief: Belief, evidence: Evidence) -> None:
@@ -268,11 +278,11 @@ def set_front(belief: Belief, evidence: Evidence) -> None:
     The mean of ``RANGE`` is that of the logarithm until then.
     """
     half_width = min(evidence.half_width, MAX_HALF_WIDTH)
-    nearer = 1 - FRONT_SHARE * half_width
+    nearer = 1 - FRONT_SHARE * half_width - SIDE_SHARE * min(math.fabs(evidence.across), half_width)
     deep = DEPTH_SHARE * half_width + MIN_DEPTH
     belief.middle, belief.middle_sigma = math.exp(belief.mean[RANGE]), belief.sigma[RANGE]
     range_m = belief.middle * nearer
-    belief.sigma[RANGE] = range_m * lengths.of(belief.sigma[RANGE], deep)
+    belief.sigma[RANGE] = range_m * lengths.of(belief.sigma[RANGE], lengths.of(RANGE_SHARE, deep))
     belief.mean[RANGE] = range_m
     belief.mean[RATE] /= nearer
     belief.sigma[RATE] = lengths.of(belief.sigma[RATE], deep * belief.mean[RATE])
@@ -289,7 +299,7 @@ def consider(belief: Belief, evidence: Evidence, around: Situation) -> None:
     for k in range(RANGES):
         inverse = belief.inverse[k]
         if belief.standing[k] > MIN_SHARE:
-            suppose_standing(belief, inverse, around)
+            suppose_standing(belief, evidence, inverse, around)
             suppose(belief, belief.standing[k], evidence, inverse, around)
         if belief.moving[k] > MIN_SHARE:
             suppose_moving(belief, evidence, inverse, around)

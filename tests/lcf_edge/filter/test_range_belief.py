@@ -114,6 +114,24 @@ def test_a_wide_thing_is_met_with_its_front_and_sooner(situation: Situation) -> 
     assert wide.sigma[RATE] > narrow.sigma[RATE]
 
 
+def test_straight_ahead_the_front_alone_is_seen_and_farther_aside_a_side_too(situation: Situation) -> None:
+    around = situation(speed_mps=2.0)
+    shares = []
+    for across in (0.0, 0.1, 0.4, -0.4):
+        belief = belief_of(evidence_of(5.0, 0, 0, across, 2.0, half_width=0.2), around)
+        shares.append(belief.mean[RANGE] / belief.middle)
+    ahead, beside, aside, other_side = shares
+    assert 0.95 < ahead < 1
+    assert ahead > beside > aside == other_side > 0.8
+
+
+def test_who_comes_so_slowly_that_he_seems_to_stand_is_met_when_his_looming_tells(situation: Situation) -> None:
+    evidence = evidence_of(4.0, -0.4, 0.0, 0.0, 1.5, mm=0.08**2, foot_sigma=0.01)
+    belief = belief_of(evidence, situation(speed_mps=1.5))
+    assert belief.stands > 0.5
+    assert 1 / belief.mean[RATE] == pytest.approx(4.0 / 1.9, rel=0.08)
+
+
 def test_looming_belongs_to_the_speed_at_which_it_was_measured(situation: Situation) -> None:
     """The vehicle has braked since from 2 m/s to 1: contact takes twice as long, the range is the same."""
     evidence = evidence_of(5.0, 0, 0, 0.0, 2.0)
