@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport baselines as lines
-from lcf_edge.filter cimport flow, key_frames, least_squares, lengths, rounding
+from lcf_edge.filter cimport flow, key_frames, least_squares, lengths, rounding, situation
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.flow cimport Pinhole
@@ -42,7 +42,6 @@ cdef double SCALE_SHARE
 cdef double SCALE_SIGMAS
 cdef int BINS
 cdef double BIN_PX
-cdef double RESTS_MPS
 cdef int UNKNOWNS
 cdef int FOCUS_X
 cdef int FOCUS_Y

@@ -16,7 +16,7 @@ it (``turn_share``).
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow, key_frames, least_squares, lengths, rounding
+from lcf_edge.filter import flow, key_frames, least_squares, lengths, rounding, situation
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.flow import Pinhole
@@ -58,7 +58,6 @@ SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do 
 SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
 BINS = 256  # of the histogram of residuals,
 BIN_PX = 0.05  # and their width
-RESTS_MPS = 0.05  # a slower vehicle is at rest
 UNKNOWNS = 5
 FOCUS_X = 3
 FOCUS_Y = 4
@@ -98,7 +97,7 @@ def shows_flow(edges: EdgeColumns, i: int, keys: KeyFrames, around: Situation, s
     return (
         edges.matched[i] != 0
         and edges.trust[i] >= settings.tr_new
-        and (math.fabs(around.speed_mps) < RESTS_MPS or not edges.is_own_part(i))
+        and (situation.is_at_rest(around) or not edges.is_own_part(i))
         and key_frames.has_history(edges, i, keys, MIN_ELAPSED_S)
     )
 

@@ -13,5 +13,6 @@ cdef class Situation:
     cdef public double noise_px, delta_px, min_noise_px, min_delta_px
 
 cpdef void follow(Situation around, double ray_x, double ray_y, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil
+cdef bint is_at_rest(Situation around) noexcept nogil
 cpdef double ground_range_m(Situation around, double y) noexcept nogil
 cpdef double ground_inverse(Situation around, double y) noexcept nogil

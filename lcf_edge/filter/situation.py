@@ -5,7 +5,7 @@ import math
 from lcf_edge.config import Config
 from lcf_edge.filter.flow import Pinhole
 
-SLOWEST_MPS = 0.05  # a slower vehicle's scene does not flow, and would bound all motion by 0
+SLOWEST_MPS = 0.05  # a slower vehicle is at rest: its scene does not flow, and would bound all motion by 0
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -50,6 +50,11 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
     around.scene_flow_pxps = INFINITY
     if math.isfinite(speed_mps):
         around.scene_flow_pxps = max(math.fabs(speed_mps), SLOWEST_MPS) * around.pinhole.focal / around.scene_depth_m
+
+
+def is_at_rest(around: Situation) -> bool:
+    """Whether the vehicle is known to be at rest."""
+    return math.fabs(around.speed_mps) < SLOWEST_MPS
 
 
 def ground_range_m(around: Situation, y: float) -> float:

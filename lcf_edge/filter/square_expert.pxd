@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, turmoil
+from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, situation, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.coarse_circles cimport CoarseGroups
@@ -75,7 +75,6 @@ cdef double PASSED_M
 cdef double MOVES_SIGMAS
 cdef double SLOW_MPS
 cdef double INTO_PATH
-cdef double RESTS_MPS
 cdef double STILL_HZ
 cdef double RATE_SIGMAS
 cdef double EVEN

@@ -7,7 +7,17 @@ new ones. Objects keep their identity while they are occluded, or not seen for a
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, turmoil
+from lcf_edge.filter import (
+    edge_equations,
+    flow,
+    group_motion,
+    image_plane,
+    lengths,
+    path,
+    range_belief,
+    situation,
+    turmoil,
+)
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.coarse_circles import CoarseGroups
@@ -83,8 +93,7 @@ PASSED_M = 0.1  # an unseen object nearer than this is passed
 MOVES_SIGMAS = 1.5  # a velocity above this is significant
 SLOW_MPS = 0.15
 INTO_PATH = 0.2  # least sideways motion of an object that cuts in, as a share of its forward motion
-RESTS_MPS = 0.05  # a slower vehicle is at rest,
-STILL_HZ = 0.05  # and so is an object before it with a smaller looming and sideways rate
+STILL_HZ = 0.05  # before a vehicle at rest, an object with a smaller looming and sideways rate is at rest too
 RATE_SIGMAS = 1.0  # a time to contact is reported for a looming above this
 EVEN = 0.5
 MAX_RANGE_M = 1000.0  # larger ranges are not reported
@@ -232,8 +241,8 @@ def belongs(
 ) -> bool:
     """Whether a circle is a part of an object: near its box, with the same motion.
 
-    A large object may have few corners, so a wider gap is allowed if the motions agree closely, and there is one: in
-    standing still, everything agrees.
+    A large object may have few corners, so a wider gap is allowed if the circle moves, and closely as the object does;
+    whatever stands still in the image agrees with everything else that does.
     """
     width, tall = max(objects.width[o], circles.width[c]), max(objects.height[o], circles.height[c])
     extent = max(width, tall)
@@ -702,7 +711,7 @@ def class_of(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence)
 
 def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
     """Whether neither an object nor the vehicle moves; the image then holds no new information about its range."""
-    if not math.fabs(around.speed_mps) < RESTS_MPS or objects.log_odds[o] < 0 or not objects.range[o] > 0:
+    if not situation.is_at_rest(around) or objects.log_odds[o] < 0 or not objects.range[o] > 0:
         return False
     return math.fabs(objects.looming[o]) < STILL_HZ and math.fabs(objects.sideways[o]) < STILL_HZ
 
@@ -788,7 +797,7 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
     """
     if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.recent_edges[o]:
         return False
-    if math.fabs(around.speed_mps) < RESTS_MPS:
+    if situation.is_at_rest(around):
         return False
     way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
     return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
@@ -957,7 +966,7 @@ def count_members(
         squares.members[o] = squares.resting[o] = 0
     for i in range(edges.count):
         edges.square[i] = o = square_of(objects, circles, edges, i)
-        if o >= 0 and edges.matched[i] and math.fabs(around.speed_mps) < RESTS_MPS:
+        if o >= 0 and edges.matched[i] and situation.is_at_rest(around):
             squares.resting[o] += 1
     for j in range(verdicts.count):
         o = edges.square[verdicts.row[j]]
