@@ -80,6 +80,13 @@ class Peer:
         """Answer whatever is asked there."""
         self.kept.append(self.session.declare_queryable(key, lambda query: query.reply(key, bytes.fromhex(payload))))
 
+    def finds(self, key: str) -> bool:
+        """Whether somebody who answers there is known in time: a query before that has no reply."""
+        matched = threading.Event()
+        with self.session.declare_querier(key) as querier:
+            querier.declare_matching_listener(lambda status: matched.set() if status.matching else None)
+            return querier.matching_status.matching or matched.wait(PATIENCE_S)
+
     def announce(self, key: str) -> None:
         """Declare a liveliness token."""
         self.kept.append(self.session.liveliness().declare_token(key))

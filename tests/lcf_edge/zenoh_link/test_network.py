@@ -341,6 +341,7 @@ def test_a_party_that_says_much_keeps_no_other_out(link: Link, rover: zenoh.Sess
     for _ in range(3):
         planner = party("planner")
         assert planner.ask("connected", timeout_s=2.0)
+        assert planner.ask("finds", key="lcf/query/config")
         assert len(planner.get("lcf/query/config")) == 1
 
 
