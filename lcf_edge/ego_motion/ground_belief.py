@@ -20,7 +20,7 @@ class GroundBelief:
     """
 
     def __init__(self) -> None:
-        self.speed_mps = nan  # mean over the last interval
+        self.speed_mps = nan  # mean over the last interval; as soon as the ground is seen, that of now
         self.sigma_mps = inf
         self._now_mps = self._accel_mps2 = 0.0
         self._covariance = 0.0  # of speed and acceleration

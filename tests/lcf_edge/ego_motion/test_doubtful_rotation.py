@@ -178,11 +178,12 @@ def test_a_vehicle_that_stands_without_a_gyro_takes_nobody_who_passes_close_for_
     drive = replace(drive, speed=STANDS, yaw_rate=STANDS, boxes=(*drive.boxes[:3], PASSES_CLOSE))
     config = config_of(drive)
     pipeline = Pipeline(config, Lens.from_config(config.camera, 640, 480))
-    turned_mrad = []
+    turned_mrad, sigma_mrad = [], []
     step = pipeline.filter.step
 
     def watched(corners: object, motion: Motion, *images: object) -> object:
         turned_mrad.append(1e3 * np.abs(cv2.Rodrigues(motion.rotation)[0]).max())
+        sigma_mrad.append(1e3 * motion.rotation_sigma_rad)
         return step(corners, motion, *images)  # type: ignore[arg-type]
 
     pipeline.filter.step = watched  # type: ignore[method-assign, assignment]
@@ -191,3 +192,4 @@ def test_a_vehicle_that_stands_without_a_gyro_takes_nobody_who_passes_close_for_
             pipeline.add(SpeedSample(frame.stamp_ns + late_ns, 0.0, 0.0))
         pipeline.process(frame)
     assert max(turned_mrad[10:]) < 3.0
+    assert max(sigma_mrad[10:]) < 1.5  # 0.04 rad/s, the least of a guess while it drives, would be 2

@@ -55,6 +55,16 @@ def test_a_vehicle_that_speeds_up_or_brakes_is_followed_though_the_ground_shows_
     assert belief.speed_mps == pytest.approx(now_mps, abs=0.12)
 
 
+def test_between_images_it_is_the_mean_speed_since_the_last() -> None:
+    belief = GroundBelief()
+    for frame in range(30):
+        belief.advance(FRAME_S)
+        belief.see(shown(2.0 + frame * FRAME_S), FRAME_S)
+    before_mps = belief.speed_mps
+    belief.advance(0.2)
+    assert 0.02 < belief.speed_mps - before_mps < 0.1  # of 0.2 at 1 m/s², or less as the acceleration is forgotten
+
+
 def test_without_ground_it_is_held_for_a_moment_and_then_unknown() -> None:
     belief = GroundBelief()
     belief.see(shown(1.5), FRAME_S)
