@@ -308,6 +308,13 @@ DEEP = [["/".join("a" * 40)], ["**/a/" * 10 + "b"]]
 MAX_GROWN_MIB = 20.0
 
 
+def is_answered(planner: Any, connects_s: float = 2.0) -> bool:
+    """Whether it connects in time, and the daemon then answers it."""
+    assert planner.ask("connected", timeout_s=connects_s)
+    assert planner.ask("finds", key="lcf/query/config")
+    return len(planner.get("lcf/query/config")) == 1
+
+
 def resident_mib() -> float:
     return int(Path("/proc/self/statm").read_text().split()[1]) * resource.getpagesize() / 2**20
 
@@ -324,9 +331,7 @@ def test_a_party_whose_keys_are_too_much_is_cut_before_the_daemon_hears_of_them(
         assert attacker.ask("connected")
         attacker.ask("offer", keys=keys)
     assert gate.until_told("of wheels")
-    planner = party("planner")
-    assert planner.ask("connected", timeout_s=PATIENCE_S)
-    assert len(planner.get("lcf/query/config")) == 1
+    assert is_answered(party("planner"), PATIENCE_S)
     assert resident_mib() < before_mib + MAX_GROWN_MIB
 
 
@@ -339,10 +344,7 @@ def test_a_party_that_says_much_keeps_no_other_out(link: Link, rover: zenoh.Sess
     for talker in talkers:
         talker.tell("put_forever", keys=["lcf/none"])
     for _ in range(3):
-        planner = party("planner")
-        assert planner.ask("connected", timeout_s=2.0)
-        assert planner.ask("finds", key="lcf/query/config")
-        assert len(planner.get("lcf/query/config")) == 1
+        assert is_answered(party("planner"))
 
 
 def test_a_party_of_many_words_is_understood(link: Link, rover: zenoh.Session, party: Any, velocity: Velocity) -> None:
@@ -409,9 +411,7 @@ def test_strangers_keep_no_planner_out_and_take_a_bounded_number_of_descriptors(
     try:
         strangers.until(400)
         for _ in range(3):
-            planner = party("planner")
-            assert planner.ask("connected", timeout_s=2.0)
-            assert len(planner.get("lcf/query/config")) == 1
+            assert is_answered(party("planner"))
         assert gate.descriptors < MAX_STRANGERS + 2 * 3 + 20
         assert gate.resident_mib < 80
     finally:
