@@ -18,6 +18,8 @@ cdef double JUMPS_HZ
 cdef double ODDS
 cdef double ALONG_MPS
 cdef double ALONG
+cdef double SLOW_MPS
+cdef double SLOW
 cdef double TINY
 cdef double SUNK_FOOT
 cdef double SMALL_M

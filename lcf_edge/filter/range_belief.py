@@ -33,7 +33,9 @@ MEMORY_SHARE = 0.3  # least 1 sigma of ln(range) that is kept from frame to fram
 JUMPS_HZ = 0.1  # rate at which the belief turns out wrong
 ODDS = 1.4  # prior log odds that an object stands
 ALONG_MPS = 0.2  # σ of the sideways motion of movers along the path,
-ALONG = 0.5  # which are this share of movers
+ALONG = 0.4  # which are this share of movers
+SLOW_MPS = 0.5  # σ_w of those who walk slowly,
+SLOW = 0.45  # which are this share
 SPEED_SHARE = 0.05  # 1 sigma of the vehicle's speed, as a share
 STANDS_SHARE = 0.5  # 1 sigma of V/Z of what seems to stand, as a share
 MIN_SIGMA_HZ = 0.003  # noise floor of looming and sideways rate
@@ -160,10 +162,13 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
         mm, qq = evidence.mm + wrong * wrong + floor, evidence.qq + floor
         belief.standing[k] = place + ODDS + evidence.log_odds + log_normal2(dm, evidence.sideways, mm, qq, evidence.mq)
         free, along = inverse * walks, inverse * ALONG_MPS
+        slow = inverse * SLOW_MPS
+        slow_log = log_normal2(dm, evidence.sideways, mm + slow * slow, qq + slow * slow, evidence.mq)
         mm += free * free
         free_log = log_normal2(dm, evidence.sideways, mm, qq + free * free, evidence.mq)
         along_log = log_normal2(dm, evidence.sideways, mm, qq + along * along, evidence.mq)
-        belief.moving[k] = place + math.log((1 - ALONG) * math.exp(free_log) + ALONG * math.exp(along_log) + TINY)
+        likelihood = ALONG * math.exp(along_log) + SLOW * math.exp(slow_log) + (1 - ALONG - SLOW) * math.exp(free_log)
+        belief.moving[k] = place + math.log(likelihood + TINY)
         most = max(most, belief.standing[k], belief.moving[k])
         inverse *= ratio
     stands = moves = 0.0

@@ -58,6 +58,7 @@ cdef double OUTSIDE_S
 cdef double COMING_S
 cdef double NEAR_S
 cdef double LINGERS_S
+cdef double SAME_PLACE_M
 cdef double THROUGH_S
 cdef int MIN_THROUGH
 cdef double THROUGH_SHARE
@@ -107,9 +108,11 @@ cdef double velocity_y(double y, double looming, Situation around) noexcept nogi
 cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 @cython.locals(y=double)
 cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
+cdef bint is_outside(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
 cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(through=int)
 cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
@@ -154,6 +157,9 @@ cdef void coast(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situatio
 cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
 @cython.locals(across=bint)
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(apart_m=double, across=bint)
+cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
 cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
 cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil

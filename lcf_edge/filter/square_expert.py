@@ -81,6 +81,7 @@ RECENT_S = 3.0  # time constant with which that number decays;
 LEAVES_S = 0.5  # unless it leaves the image within this time
 RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
 LINGERS_S = 6.0  # and near, not seen through;
+SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
 THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
 MIN_THROUGH = 3  # at least so many,
 THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
@@ -194,6 +195,11 @@ def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
     return image_plane.project(plane, right, y) or (left < 0 and right > plane.width)
 
 
+def is_outside(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
+    """Whether the middle of an object's box is beside the image."""
+    return not image_plane.project(plane, objects.x[o], min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1))
+
+
 def is_passed(objects: ObjectColumns, o: int) -> bool:
     """Whether an unseen object would by now be nearer than is possible."""
     return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
@@ -207,13 +213,19 @@ def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Setti
 
 def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
     """Returns for how long an object is kept that left the image, s: longer if it moves towards the path."""
-    comes_mps = objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]
-    return COMING_S if comes_mps > SLOW_MPS else OUTSIDE_S
+    return COMING_S if comes(objects, o, around) else OUTSIDE_S
+
+
+def comes(objects: ObjectColumns, o: int, around: Situation) -> bool:
+    """Whether an object moves towards the path from the side."""
+    return (objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]) > SLOW_MPS
 
 
 def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether an object was lost near a stationary vehicle; its motion is then unknown."""
-    return objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < SLOW_MPS and objects.range[o] < NEAR_M
+    """Whether an object was lost near a stationary vehicle, which it does not leave; its motion is then unknown."""
+    if not objects.unseen_s[o] > 0 or math.fabs(around.speed_mps) >= SLOW_MPS or not objects.range[o] < NEAR_M:
+        return False
+    return not objects.left[o] or comes(objects, o, around)
 
 
 def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
@@ -389,7 +401,7 @@ def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> 
     objects.id[o] = shared.new_id(ids)
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
-    objects.class_id[o], objects.state[o], objects.support[o] = UNKNOWN, SEEN, 0
+    objects.class_id[o], objects.state[o], objects.support[o], objects.left[o] = UNKNOWN, SEEN, 0, 0
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
     objects.probability[o] = 0.0
     forget_motion(objects, o)
@@ -788,6 +800,34 @@ def is_behind(objects: ObjectColumns, o: int) -> bool:
     return False
 
 
+def object_in_place_of(objects: ObjectColumns, o: int) -> int:
+    """Returns the object that is seen, by more than a few edges, in the place of an unseen one; -1: none.
+
+    Somebody who stops or turns at once breaks the motion of his object, and another one is founded on him. Two things
+    cannot be in one place, so they are one.
+    """
+    for other in range(objects.capacity):
+        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
+            continue
+        if objects.support[other] < SURE_EDGES:
+            continue
+        apart_m = math.fabs(objects.range[o] - objects.range[other])
+        if not apart_m < min(lengths.of(objects.range_sigma[o], objects.range_sigma[other]), SAME_PLACE_M):
+            continue
+        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * objects.width[other]
+        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * objects.height[other]:
+            return other
+    return -1
+
+
+def take_over(objects: ObjectColumns, o: int, by: int) -> None:
+    """End an unseen object; the seen one in its place has its trust and, if younger, its identity."""
+    objects.trust[by] = max(objects.trust[by], objects.trust[o])
+    if objects.age_s[by] < objects.age_s[o]:
+        objects.id[by], objects.age_s[by] = objects.id[o], objects.age_s[o]
+    objects.active[o] = 0
+
+
 def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, around: Situation) -> bool:
     """Whether too few of a near object's recent edges are left to measure its motion.
 
@@ -817,10 +857,16 @@ def go_on(
     of view.
     """
     objects.unseen_s[o] += around.dt_s
+    by = object_in_place_of(objects, o)
+    if by >= 0:
+        take_over(objects, o, by)
+        return
     hidden = is_behind(objects, o)
     objects.state[o] = HIDDEN if hidden else COASTING
     patience_s = HIDDEN_S if hidden else COAST_S
-    if not is_in_sight(objects, o, plane):
+    if is_outside(objects, o, plane) and objects.unseen_s[o] <= COAST_S:
+        objects.left[o] = 1
+    if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
     elif lingers(objects, o, around):
         patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
@@ -844,7 +890,8 @@ def go_on_in_turmoil(
     """
     for c in range(circles.capacity):
         if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
-            objects.unseen_s[o], objects.state[o], objects.support[o] = 0.0, SEEN, circles.support[c]
+            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
+            objects.support[o] = circles.support[c]
             objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
             if objects.looming[o] * around.dt_s > MAX_LAG:
                 take_place(objects, o, circles, c, around)
@@ -1061,7 +1108,7 @@ def update(
         if count >= MIN_EDGES:
             objects.recent_edges[o] = max(objects.recent_edges[o] * math.exp(-around.dt_s / RECENT_S), count)
             remnant = is_remnant(objects, o, count, plane, around)
-            objects.unseen_s[o], objects.state[o] = 0.0, SEEN
+            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
             objects.support[o] = count
             believed = belief_in(objects, o, squares.wholes, around, settings)
             objects.trust[o] = edge_equations.change_trust(objects.trust[o], believed, settings.tr_max)
@@ -1074,11 +1121,13 @@ def update(
                     forget_motion(objects, o)
                 observe(objects, o, squares.wholes, around)
         elif squares.resting[o] >= MIN_EDGES:
-            objects.unseen_s[o], objects.state[o] = 0.0, SEEN
+            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
             objects.looming[o] = objects.sideways[o] = 0.0
             objects.reference[o] = around.speed_mps
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
             go_on(objects, o, edges, plane, around, settings)
+            if not objects.active[o]:
+                continue
         renew_numbers(
             objects, o, squares, remnant or objects.unseen_s[o] > 0 or rests(objects, o, around), plane, around
         )

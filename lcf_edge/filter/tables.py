@@ -183,6 +183,7 @@ OBJECT_COLUMNS = (
     Column("trust", "Tr", "1", ("square_expert",)),
     Column("age_s", "since it was founded", "s", ("square_expert",)),
     Column("unseen_s", "since edges last showed it", "s", ("square_expert",)),
+    Column("left", "it left the image at the side, and was not seen since", "", ("square_expert",), np.bool_),
     Column("ttc", "time to contact, inf: none", "s", ("square_expert",)),
     Column("ttc_sigma", "1 sigma of it, NaN: unknown", "s", ("square_expert",)),
     Column("middle", "Z of the middle of its edges, NaN: unknown", "m", ("square_expert",)),

@@ -80,6 +80,18 @@ def test_what_keeps_its_distance_goes_ahead(situation: Situation) -> None:
     assert belief.met < 0.05
 
 
+@pytest.mark.parametrize(("range_m", "speed_mps"), [(3.2, 1.4), (4.0, 2.0), (5.0, 3.0)])
+def test_without_a_foot_he_walks_slowly_rather_than_coming_fast_from_afar(
+    situation: Situation, range_m: float, speed_mps: float
+) -> None:
+    """Far and fast explains what is seen as well: most who walk do so at less than a metre a second."""
+    evidence = evidence_of(range_m, 0.2, 0.4, -0.4, speed_mps, mm=0.03**2, qq=0.02**2)
+    belief = belief_of(evidence, situation(speed_mps=speed_mps, camera_height_m=0.0))
+    assert belief.mean[RANGE] == pytest.approx(range_m, rel=0.15)
+    assert belief.mean[FORWARD] > -0.3
+    assert belief.sigma[RANGE] < 0.6 * range_m
+
+
 def test_nothing_stands_deep_under_the_ground(situation: Situation) -> None:
     """It looms as what stands at 12 m, but its foot is seen where the ground is 3 m off: it goes ahead there."""
     evidence = evidence_of(3.0, 1.5, 0.0, 0.0, 2.0)

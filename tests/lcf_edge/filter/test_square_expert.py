@@ -342,6 +342,36 @@ def test_who_was_lost_right_before_a_vehicle_that_stands_is_there_until_it_sees_
     assert remembered_s(way, slice(150, 210), 0.1) == pytest.approx(about_s, abs=0.4)
 
 
+@pytest.mark.parametrize("right_mps", [0.5, -0.8])
+def test_who_walks_out_of_the_image_before_a_vehicle_at_rest_is_not_waited_for(
+    drive: Drive, box: Landmarks, clutter: Landmarks, right_mps: float
+) -> None:
+    """He did not stop at its border: nothing is missed there."""
+    walker = drive(box((0.0, -0.3, 1.3), (0.35, 1.5, 0.15), landmarks=80), np.array([right_mps, 0, 0]))
+    way = replace(drive(clutter(150)) + walker, frames=50, speed_mps=0.0)
+    assert remembered_s(way, slice(150, None), 0.0) == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 0.5])
+@pytest.mark.parametrize("right_mps", [0.5, -0.5])
+def test_who_stops_going_ahead_and_turns_aside_at_once_stays_one_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks, right_mps: float, speed_mps: float
+) -> None:
+    """His edges break the motion of his object, and found another one: nobody is left behind where he was."""
+    leads = drive(box((0.05, -0.3, 1.2), (0.35, 1.5, 0.15), landmarks=80), np.array([0, 0, 0.25]))
+    way = replace(drive(clutter(150)) + leads, frames=30, speed_mps=0.5)
+    velocity = np.concatenate([np.zeros((150, 3)), np.tile([right_mps, 0, 0.33], (80, 1))])
+    turned = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30, speed_mps=speed_mps)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (before,) = tables.objects.id[published(tables.objects)]
+    for corners, motion in list(turned)[1:]:
+        tables.step(corners, motion)
+        assert tables.objects.id[published(tables.objects)].tolist() == [before]
+    assert tables.objects.right[published(tables.objects)] * right_mps > 0
+
+
 @pytest.mark.parametrize(("range_m", "about_s"), [(1.3, 1.8), (3.5, 0.4)], ids=["near", "farther off"])
 def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, about_s: float
