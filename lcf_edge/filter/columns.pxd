@@ -39,6 +39,7 @@ cdef class ObjectColumns:
     cdef int[::1] support
     cdef double[::1] x, y, width, height, looming, sideways, mm, qq, mq, log_odds, foot, trust, age_s, unseen_s
     cdef double[::1] reference, middle, middle_sigma, recent_edges
+    cdef double[::1] inverse, inverse_var, steady, steady_speed, steady_var, steady_inverse
     cdef double[::1] ttc, ttc_sigma, range, range_sigma, lateral, lateral_sigma, forward, forward_sigma
     cdef double[::1] right, right_sigma, closest, closest_sigma, probability
 

@@ -27,8 +27,8 @@ cpdef void turn_aside(Heading heading, double speed_mps, double yaw_rate_radps) 
 cpdef double sideways_sigma_rad(Heading heading) noexcept nogil
 cpdef void learn_mounting(Heading heading, Situation around, FlowFit fit) noexcept nogil
 cpdef double unpulled(double shift_rad, double prior_rad, double sigma_rad) noexcept nogil
-cpdef bint knows_curvature(Situation around) noexcept nogil
-cpdef void learn_sideways(Heading heading, double shift_rad, double noise, double dt_s) noexcept nogil
+cdef bint knows_curvature(Situation around) noexcept nogil
+cdef void learn_sideways(Heading heading, double shift_rad, double noise, double dt_s) noexcept nogil
 cpdef double fit_noise(double prior_rad, double sigma_rad, double dt_s) noexcept nogil
 cpdef double mounting_gain(double mounting_rad, double noise) noexcept nogil
 cpdef double drifted(double sigma_rad, double gain, double dt_s) noexcept nogil

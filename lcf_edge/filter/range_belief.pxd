@@ -49,7 +49,7 @@ cdef double INFINITY
 cdef double NAN
 
 cdef class Evidence:
-    cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, half_extent, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt
+    cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, half_extent, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt, inverse, inverse_var
     cdef public bint is_cut
 
 cdef class Belief:
@@ -61,6 +61,7 @@ cdef class Belief:
 cdef double log_normal2(double dm, double dq, double mm, double qq, double mq) noexcept nogil
 cdef double foot_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef double memory_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil
+cdef double speed_change_log(Evidence evidence, double inverse) noexcept nogil
 cdef double small_log(Evidence evidence, double inverse) noexcept nogil
 cdef double walking_mps(Situation around) noexcept nogil
 @cython.locals(most=double, stands=double, moves=double, inverse=double, place=double)

@@ -70,7 +70,7 @@ class Evidence:
     def __init__(self) -> None:
         self.looming = self.sideways = self.mm = self.qq = self.mq = 0.0
         self.reference = self.across = self.across_sigma = self.half_width = self.half_extent = 0.0
-        self.foot = self.foot_sigma = self.log_odds = 0.0
+        self.foot = self.foot_sigma = self.log_odds = self.inverse = self.inverse_var = 0.0
         self.hidden, self.is_cut = HIDDEN_FOOT, False
         self.range_before = self.range_doubt = NAN
 
@@ -133,6 +133,14 @@ def memory_likelihood(evidence: Evidence, inverse: float, around: Situation) -> 
     return JUMPS_HZ * around.dt_s + math.exp(-0.5 * apart * apart) / sigma
 
 
+def speed_change_log(evidence: Evidence, inverse: float) -> float:
+    """Log likelihood of an inverse range by how the looming changed with the vehicle's speed."""
+    if not evidence.inverse > 0:
+        return 0.0
+    apart = inverse - evidence.inverse
+    return -0.5 * apart * apart / evidence.inverse_var
+
+
 def small_log(evidence: Evidence, inverse: float) -> float:
     """Log likelihood of the size that the object would have at an inverse range."""
     small = math.log(max(2 * evidence.half_extent / (SMALL_M * inverse), TINY)) / SMALL_RATIO
@@ -153,7 +161,8 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
     most = -INFINITY
     for k in range(RANGES):
         belief.inverse[k] = inverse
-        place = math.log(memory_likelihood(evidence, inverse, around)) + small_log(evidence, inverse)
+        place = math.log(memory_likelihood(evidence, inverse, around))
+        place += small_log(evidence, inverse) + speed_change_log(evidence, inverse)
         if around.camera_height_m > 0:
             place += math.log(foot_likelihood(evidence, inverse, around))
         dm = evidence.looming - inverse * evidence.reference

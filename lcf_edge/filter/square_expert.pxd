@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, situation, turmoil
+from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, situation, speed_change, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.coarse_circles cimport CoarseGroups

@@ -16,6 +16,7 @@ from lcf_edge.filter import (
     path,
     range_belief,
     situation,
+    speed_change,
     turmoil,
 )
 from lcf_edge.filter.baselines import Baselines
@@ -167,6 +168,7 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
         objects.foot[o] *= growth
         objects.looming[o] *= growth
         objects.sideways[o] *= growth
+        speed_change.predict(objects, o, growth, around.dt_s)
         inverse = 0.0
         if objects.middle[o] > 0:
             objects.middle[o] /= growth
@@ -446,6 +448,7 @@ def take_place(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, a
     objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
     objects.mm[o] = objects.qq[o] = TURMOIL_HZ * TURMOIL_HZ
     objects.reference[o] = around.speed_mps
+    speed_change.forget(objects, o)
 
 
 def forget_motion(objects: ObjectColumns, o: int) -> None:
@@ -453,6 +456,7 @@ def forget_motion(objects: ObjectColumns, o: int) -> None:
     objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
     objects.mm[o] = objects.qq[o] = INFINITY
     objects.reference[o] = NAN
+    speed_change.forget(objects, o)
 
 
 def gather(
@@ -608,6 +612,7 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
     lag = 1 - min(max(0.5 * elapsed_s * rate, -MAX_LAG), MAX_LAG)
     speed_mps = wholes.forward[o] / weight if math.isfinite(around.speed_mps) else NAN
     update_rate(objects, o, 1.0, 0.0, rate / lag, repeated * variance / (lag * lag), speed_mps)
+    speed_change.observe(objects, o, rate / lag, repeated * variance / (lag * lag), speed_mps)
     across = (x - focus_x) / fx
     aside = wholes.vx[o] / weight / fx
     aside_var = (1 / weight + common * common) / (fx * fx)
@@ -673,6 +678,7 @@ def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: 
         evidence.foot_sigma /= around.camera_height_m
     evidence.is_cut = not image_plane.project(plane, around.focus_x, bottom + BORDER_PX)
     evidence.reference = objects.reference[o]
+    evidence.inverse, evidence.inverse_var = objects.inverse[o], objects.inverse_var[o]
     evidence.range_before, evidence.range_doubt = objects.middle[o], objects.middle_sigma[o]
     kept = math.exp(-around.dt_s / PERSISTS_S)
     evidence.log_odds = min(max(kept * objects.log_odds[o], -MAX_ODDS), MAX_ODDS)
