@@ -18,7 +18,8 @@ LEAST_SHARE = 0.25  # and its least, since things are deep
 
 def forget(objects: ObjectColumns, o: int) -> None:
     """Reset an object's 1/Z to unknown."""
-    objects.inverse[o] = 0.0
+    objects.inverse[o] = objects.inverse_var[o] = 0.0
+    objects.steady[o] = objects.steady_var[o] = objects.steady_inverse[o] = 0.0
 
 
 def predict(objects: ObjectColumns, o: int, growth: float, dt_s: float) -> None:
@@ -40,7 +41,7 @@ def begin(objects: ObjectColumns, o: int, rate: float, variance: float, speed_mp
 def observe(objects: ObjectColumns, o: int, rate: float, variance: float, speed_mps: float) -> None:
     """Kalman update by m = ``rate`` 1/s, measured at V = ``speed_mps``; 1/Z starts with the range believed so far."""
     if not math.isfinite(speed_mps):
-        objects.inverse[o] = 0.0
+        forget(objects, o)
         return
     if not objects.inverse[o] > 0:
         if not objects.middle[o] > 0:

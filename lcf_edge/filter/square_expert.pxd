@@ -113,6 +113,7 @@ cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
 cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(is_lost=bint)
 cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(through=int)
 cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil

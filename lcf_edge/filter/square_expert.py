@@ -225,9 +225,8 @@ def comes(objects: ObjectColumns, o: int, around: Situation) -> bool:
 
 def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
     """Whether an object was lost near a stationary vehicle, which it does not leave; its motion is then unknown."""
-    if not objects.unseen_s[o] > 0 or math.fabs(around.speed_mps) >= SLOW_MPS or not objects.range[o] < NEAR_M:
-        return False
-    return not objects.left[o] or comes(objects, o, around)
+    is_lost = objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < SLOW_MPS and objects.range[o] < NEAR_M
+    return is_lost and (not objects.left[o] or comes(objects, o, around))
 
 
 def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
@@ -851,6 +850,8 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
 
 def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
     """Returns for how long an object lost nearby is kept, s: until the vehicle is there."""
+    if not math.isfinite(around.speed_mps):
+        return NEAR_S
     return min(max(objects.range[o] / max(math.fabs(around.speed_mps), SLOW_MPS), NEAR_S), LINGERS_S)
 
 

@@ -388,6 +388,24 @@ def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     assert last_s - lost_s == pytest.approx(about_s, abs=0.11)
 
 
+def test_without_a_speed_who_is_lost_nearby_is_remembered_for_a_second(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """Nobody knows then whether the vehicle stands before him, or when it is there."""
+    walker = drive(box((-0.38, -0.05, 1.0), (0.4, 0.6, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
+    way = replace(drive(clutter(150)) + walker, frames=70, speed_mps=0.6)
+    mine, seen_last, last = {looks.tobytes() for looks in way.looks[150:]}, 23, 0
+    tables = LineCircleFilter(Config(), way.lens)
+    for seq, (corners, motion) in enumerate(way):
+        keep = np.array([seq <= seen_last or looks.tobytes() not in mine for looks in corners.appearance])
+        seen = Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep])
+        tables.step(seen, replace(motion, speed_mps=math.nan))
+        if published(tables.objects):
+            last = seq
+            assert tables.objects.range[published(tables.objects)][0] < 1.5
+    assert seen_last < last <= seen_last + 1.2 * FPS
+
+
 def test_the_few_corners_left_of_what_is_near_do_not_show_how_it_moves(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
