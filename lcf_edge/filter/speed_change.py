@@ -12,7 +12,6 @@ from lcf_edge.filter.columns import ObjectColumns
 STEADY_MPS = 0.6  # 1 sigma of the change of an object's velocity in one second
 SUDDEN_SIGMAS = 3.0  # an innovation above this is a sudden change of it
 FIRST_SHARE = 1.0  # 1 sigma of 1/Z at first, as a share,
-DRIFT_SHARE = 0.2  # its growth in one second,
 LEAST_SHARE = 0.25  # and its least, since things are deep
 
 
@@ -24,12 +23,13 @@ def forget(objects: ObjectColumns, o: int) -> None:
 
 def predict(objects: ObjectColumns, o: int, growth: float, dt_s: float) -> None:
     """Propagate m and 1/Z, which grow as the object comes nearer."""
+    squared = growth * growth
     objects.steady[o] *= growth
     objects.inverse[o] *= growth
     wander = STEADY_MPS * objects.inverse[o]
-    drift = DRIFT_SHARE * objects.inverse[o]
-    objects.steady_var[o] += wander * wander * dt_s
-    objects.inverse_var[o] += drift * drift * dt_s
+    objects.steady_var[o] = squared * objects.steady_var[o] + wander * wander * dt_s
+    objects.steady_inverse[o] *= squared
+    objects.inverse_var[o] *= squared
 
 
 def begin(objects: ObjectColumns, o: int, rate: float, variance: float, speed_mps: float) -> None:

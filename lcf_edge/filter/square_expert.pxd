@@ -106,9 +106,9 @@ cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double loo
 cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
 @cython.locals(inverse=double)
 cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil
-@cython.locals(y=double)
+cdef bint is_in_image(ObjectColumns objects, Py_ssize_t o, double x, ImagePlane plane) noexcept nogil
+@cython.locals(left=double, right=double)
 cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
-cdef bint is_outside(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
 cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil

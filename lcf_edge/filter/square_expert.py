@@ -188,18 +188,17 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
             objects.active[o] = 0
 
 
+def is_in_image(objects: ObjectColumns, o: int, x: float, plane: ImagePlane) -> bool:
+    """Whether a point ``x`` of the middle row of an object's box is in the image, above and below left aside."""
+    return image_plane.project(plane, x, min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1))
+
+
 def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
     """Whether a part of the middle row of an object's box is in the image."""
     left, right = objects.x[o] - 0.5 * objects.width[o], objects.x[o] + 0.5 * objects.width[o]
-    y = min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1)
-    if image_plane.project(plane, objects.x[o], y) or image_plane.project(plane, left, y):
+    if is_in_image(objects, o, objects.x[o], plane) or is_in_image(objects, o, left, plane):
         return True
-    return image_plane.project(plane, right, y) or (left < 0 and right > plane.width)
-
-
-def is_outside(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
-    """Whether the middle of an object's box is beside the image."""
-    return not image_plane.project(plane, objects.x[o], min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1))
+    return is_in_image(objects, o, right, plane) or (left < 0 and right > plane.width)
 
 
 def is_passed(objects: ObjectColumns, o: int) -> bool:
@@ -871,7 +870,7 @@ def go_on(
     hidden = is_behind(objects, o)
     objects.state[o] = HIDDEN if hidden else COASTING
     patience_s = HIDDEN_S if hidden else COAST_S
-    if is_outside(objects, o, plane) and objects.unseen_s[o] <= COAST_S:
+    if objects.unseen_s[o] <= COAST_S and not is_in_image(objects, o, objects.x[o], plane):
         objects.left[o] = 1
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)

@@ -39,6 +39,17 @@ def published(objects: ObjectTable) -> list[int]:
     return np.flatnonzero(objects.active & (objects.trust >= TR_S)).tolist()
 
 
+def without(corners: Corners, hidden: set[bytes]) -> Corners:
+    """The corners but for those of landmarks with these looks."""
+    keep = np.array([looks.tobytes() not in hidden for looks in corners.appearance])
+    return Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep])
+
+
+def looks_of(way: Any, landmarks: slice) -> set[bytes]:
+    """Of some landmarks of a drive."""
+    return {looks.tobytes() for looks in way.looks[landmarks]}
+
+
 def test_a_wall_ahead_is_one_object_that_stands(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     way = drive(clutter(150)) + drive(box((0.0, -0.4, 7.0), (0.5, 0.9, 0.0), landmarks=40))
     *_, tables = steps(replace(way, frames=30))
@@ -158,9 +169,7 @@ def test_an_object_that_is_not_seen_coasts_keeps_its_id_and_ends(
     states, before = [], None
     for seq, (corners, motion) in enumerate(way):
         gone = 20 <= seq < 25 or seq >= 32
-        walkers = {looks.tobytes() for looks in way.looks[150:]}
-        keep = np.array([not gone or looks.tobytes() not in walkers for looks in corners.appearance])
-        tables.step(type(corners)(corners.pixel[keep], corners.position[keep], corners.appearance[keep]), motion)
+        tables.step(without(corners, looks_of(way, slice(150, None))) if gone else corners, motion)
         rows = published(tables.objects)
         if seq == 19:
             before = tables.objects.id[rows].tolist()
@@ -378,11 +387,10 @@ def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
 ) -> None:
     walker = drive(box((-0.38 * range_m, -0.3, range_m), (0.4, 1.2, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
     way = replace(drive(clutter(150)) + walker, frames=60, speed_mps=0.6)
-    mine, lost_s, last_s = {looks.tobytes() for looks in way.looks[150:]}, 24 / FPS, 0.0
+    mine, lost_s, last_s = looks_of(way, slice(150, None)), 24 / FPS, 0.0
     tables = LineCircleFilter(Config(), way.lens)
     for seq, (corners, motion) in enumerate(way):
-        keep = np.array([seq / FPS < lost_s or looks.tobytes() not in mine for looks in corners.appearance])
-        tables.step(Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep]), motion)
+        tables.step(corners if seq / FPS < lost_s else without(corners, mine), motion)
         if published(tables.objects):
             last_s = (seq + 1) / FPS
     assert last_s - lost_s == pytest.approx(about_s, abs=0.11)
@@ -394,12 +402,10 @@ def test_without_a_speed_who_is_lost_nearby_is_remembered_for_a_second(
     """Nobody knows then whether the vehicle stands before him, or when it is there."""
     walker = drive(box((-0.38, -0.05, 1.0), (0.4, 0.6, 0.1), landmarks=60), np.array([0.5, 0, 0.6]))
     way = replace(drive(clutter(150)) + walker, frames=70, speed_mps=0.6)
-    mine, seen_last, last = {looks.tobytes() for looks in way.looks[150:]}, 23, 0
+    mine, seen_last, last = looks_of(way, slice(150, None)), 23, 0
     tables = LineCircleFilter(Config(), way.lens)
     for seq, (corners, motion) in enumerate(way):
-        keep = np.array([seq <= seen_last or looks.tobytes() not in mine for looks in corners.appearance])
-        seen = Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep])
-        tables.step(seen, replace(motion, speed_mps=math.nan))
+        tables.step(corners if seq <= seen_last else without(corners, mine), replace(motion, speed_mps=math.nan))
         if published(tables.objects):
             last = seq
             assert tables.objects.range[published(tables.objects)][0] < 1.5
@@ -414,11 +420,10 @@ def test_the_few_corners_left_of_what_is_near_do_not_show_how_it_moves(
     hand = drive(box((0.2, -0.1, 1.7), (0.35, 0.2, 0.05), landmarks=4, seed=5), np.array([0.0, 0, 0.45]))
     way = replace(drive(clutter(150)) + walker, frames=34, speed_mps=0.5)
     way = replace(way + hand, from_s=20 / FPS)
-    mine = {looks.tobytes() for looks in way.looks[150:206]}
+    mine = looks_of(way, slice(150, 206))
     tables, ranges_m = LineCircleFilter(Config(), way.lens), []
     for seq, (corners, motion) in enumerate(way):
-        keep = np.array([seq < 20 or looks.tobytes() not in mine for looks in corners.appearance])
-        tables.step(Corners(corners.pixel[keep], corners.position[keep], corners.appearance[keep]), motion)
+        tables.step(corners if seq < 20 else without(corners, mine), motion)
         ranges_m.append([float(tables.objects.range[row]) for row in published(tables.objects)])
     assert len(ranges_m[19]) == 1
     assert all(len(each) == 1 for each in ranges_m[20:])
