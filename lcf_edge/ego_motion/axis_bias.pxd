@@ -9,8 +9,8 @@ cdef double MIN_VARIANCE
 
 @cython.final
 cdef class AxisBias:
-    cdef readonly double bias
-    cdef double measured, flow_radps, flow, noise
+    cdef readonly double bias, measured
+    cdef double flow_radps, flow, noise
     cdef double bias_bias, flow_flow, noise_noise, bias_flow, bias_noise, flow_noise
     cdef double with_bias, with_flow, with_noise, off, variance
 

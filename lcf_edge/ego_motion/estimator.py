@@ -55,6 +55,7 @@ _GUESS_TIME_S = 0.5  # averaging time of the sigma of a guess
 _GUESS_MIN_RADPS, _GUESS_MAX_RADPS = 0.04, 2.0
 _STUCK_S, _STUCK_SAMPLES = 0.1, 8  # a gyro that had noise, and repeats one value this long and this often, is stuck
 _NOISY_SHARE = 0.5  # largest share of repeated samples of a gyro with noise
+_SILENT_SAMPLES = 16  # an axis that is exactly 0 while another has shown this many other values is not measured
 _MIN_BIAS_SHARE = 0.5  # of the image's uncertainty: a rotation known better than that gains nothing from it
 _LAG_SHARE = 0.5  # of the correction by the flow that may belong to earlier intervals: tracks lag
 _TURN_SHARE = 0.05  # of the rate: error by the gyro's scale and time, and a shaken focus
@@ -121,6 +122,7 @@ class EgoMotionEstimator:
         self._path_yaw_radps = 0.0
         self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
         self._noisy = False  # as a real gyro; synthetic samples have no noise
+        self._turned = [0, 0, 0]  # samples other than 0, by axis
         self._speed_mps = nan
         self._stamp_ns: int | None = None
         self._samples = Track(IMU_CAPACITY + 2, self._imu.columns)
@@ -139,6 +141,8 @@ class EgoMotionEstimator:
                 self._imu.refuse("saturated")
             if self._axes:
                 gyro, accel = _in_camera_axes(self._axes, gyro), _in_camera_axes(self._axes, accel)
+            for k, rate in enumerate(gyro):
+                self._turned[k] += rate != 0
             self._imu.add(sample.stamp_ns + self._offset_ns, (*gyro, *accel, sample.saturated))
         else:
             self._imu.refuse("out of range" if all(map(isfinite, (*gyro, *accel))) else "not finite")
@@ -185,12 +189,16 @@ class EgoMotionEstimator:
         else:
             interval.notes.append("no imu")
         if interval.measured:
-            self.bias.advance(span.dt_s, (sigma_radps, sigma_radps, sigma_radps), True)
+            measured = self._measured_axes()
+            if not all(measured):
+                interval.notes.append("gyro lacks an axis")
+            guesses = zip(measured, self._guess_variance, strict=True)
+            self.bias.advance(span.dt_s, [sigma_radps if each else sqrt(guess) for each, guess in guesses], measured)
         else:
             self._guess(interval)
             interval.rests = abs(odometry_mps) <= _REST_SPEED_MPS and abs(odometry_yaw_radps) <= _REST_YAW_RADPS
             variances = [_REST_TURN_RADPS**2] * 3 if interval.rests else self._guess_variance
-            self.bias.advance(span.dt_s, [sqrt(variance) for variance in variances], False)
+            self.bias.advance(span.dt_s, [sqrt(variance) for variance in variances], (False, False, False))
         rest_mps2 = self._learn_rest(span, gap_limit_s, odometry_mps, still) if interval.measured else None
         rotation = self._rotation()
         if not interval.measured:
@@ -229,6 +237,10 @@ class EgoMotionEstimator:
         if not interval.measured:
             interval.notes.append("gyro stuck")
         return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
+
+    def _measured_axes(self) -> list[bool]:
+        """Whether the gyro measures each axis: drivers of a gyro for yaw alone report 0 for the others."""
+        return [turned > 0 or max(self._turned) < _SILENT_SAMPLES for turned in self._turned]
 
     def _guess(self, interval: _Interval) -> None:
         """Guess the rates without a gyro: odometry's yaw rate, or else the last rates."""
@@ -291,6 +303,8 @@ class EgoMotionEstimator:
             self.bias.see_flow(error_radps, sigma_radps, expansion_hz)
         else:
             self._follow_path(error_radps)
+        guessed = not all(self._measured_axes()) if interval.measured else True
+        if guessed:
             kept = exp(-dt_s / _GUESS_TIME_S)
             for k, error in enumerate(error_radps):
                 variance = kept * self._guess_variance[k] + (1 - kept) * error**2

@@ -35,7 +35,7 @@ class GyroBias:
 
     def __init__(self) -> None:
         self._axes = [AxisBias(_FLOW_RADPS) for _ in range(3)]
-        self._measured = True
+        self._measures: Sequence[bool] = (True, True, True)
         self._dt_s = 0.0
         self._against_s = 0.0
 
@@ -73,8 +73,8 @@ class GyroBias:
 
     @property
     def known(self) -> bool:
-        """Whether all axes are known to ``KNOWN_RADPS``."""
-        return max(self.sigmas()) <= KNOWN_RADPS
+        """Whether all axes that the gyro measures are known to ``KNOWN_RADPS``."""
+        return all(sigma <= KNOWN_RADPS for sigma, measured in zip(self.sigmas(), self._measures, strict=True) if measured)
 
     def forget(self) -> None:
         """Forget the bias: it may have any value."""
@@ -82,11 +82,16 @@ class GyroBias:
             axis.forget()
         self._against_s = 0.0
 
-    def advance(self, dt_s: float, noise_radps: Three, measured: bool) -> None:
-        """Begin a new interval. ``noise_radps``: (3,), 1 sigma of w. ``measured``: whether a gyro gives its rate."""
-        self._measured, self._dt_s = measured, dt_s
-        for axis, noise in zip(self._axes, noise_radps, strict=True):
-            axis.advance(dt_s, noise, measured)
+    def advance(self, dt_s: float, noise_radps: Three, measured: Sequence[bool]) -> None:
+        """Begin a new interval. ``noise_radps``: (3,), 1 sigma of w. ``measured``: (3,), whether a gyro gives the rate.
+
+        An axis once measured remains so for ``known`` while the gyro is absent.
+        """
+        self._dt_s = dt_s
+        if any(measured):
+            self._measures = measured
+        for axis, noise, is_measured in zip(self._axes, noise_radps, measured, strict=True):
+            axis.advance(dt_s, noise, is_measured)
 
     def doubt(self) -> None:
         """Let the gyro's error over the present interval be unknown."""
@@ -101,7 +106,7 @@ class GyroBias:
     def add_image_rotation(self, error_radps: Three, sigma_radps: Three) -> bool:
         """Take the gyro's rate less the whole image's, (3,), with its sigmas. Return False for an outlier, not used."""
         axes = zip(self._axes, error_radps, sigma_radps, strict=True)
-        return self._learn([axis.compare(self._measured, 0.0, 1.0, error, sigma) for axis, error, sigma in axes])
+        return self._learn([axis.compare(axis.measured, 0.0, 1.0, error, sigma) for axis, error, sigma in axes])
 
     def see_flow(self, error_radps: Three, sigma_radps: Three, expansion_hz: float) -> bool:
         """Take the gyro's rate less the flow's, (3,), with its sigmas. Return False for an outlier, not used.
@@ -111,7 +116,7 @@ class GyroBias:
         for axis in self._axes:
             axis.set_flow(max(_FLOW_RADPS, _FOCUS_RAD * expansion_hz))
         axes = zip(self._axes, error_radps, sigma_radps, strict=True)
-        return self._learn([axis.compare(self._measured, 1.0, 1.0, error, sigma) for axis, error, sigma in axes])
+        return self._learn([axis.compare(axis.measured, 1.0, 1.0, error, sigma) for axis, error, sigma in axes])
 
     def _learn(self, fits: Iterable[bool]) -> bool:
         """Update all axes, or none."""

@@ -28,7 +28,7 @@ def drive(
     errors, sigmas = [], []
     for frame in range(round(seconds / dt_s)):
         true = truth_radps + drift_radps2 * frame * dt_s
-        bias.advance(dt_s, np.full(3, NOISE_RADPS), measured=True)
+        bias.advance(dt_s, np.full(3, NOISE_RADPS), measured=(True, True, True))
         seen = true + random.normal(0, NOISE_RADPS, 3) + random.normal(0, flow_sigma_radps, 3)
         bias.see_flow(seen, np.full(3, flow_sigma_radps), 0.0)
         errors.append(bias.mean_radps - true)
@@ -56,7 +56,7 @@ def test_a_bias_is_found_within_the_stated_sigma(size_radps: float) -> None:
 
 def test_the_first_observation_weighs_as_variances_say() -> None:
     bias = GyroBias()
-    bias.advance(DT_S, np.full(3, 0.03), measured=True)
+    bias.advance(DT_S, np.full(3, 0.03), measured=(True, True, True))
     assert bias.add_image_rotation(np.full(3, 0.1), np.full(3, 0.04))
     weight = PRIOR_RADPS**2 / (PRIOR_RADPS**2 + 0.03**2 + 0.04**2)
     assert bias.mean_radps == pytest.approx(np.full(3, 0.1 * weight), rel=1e-3)
@@ -76,7 +76,7 @@ def test_truth_lies_within_two_sigma_nine_times_in_ten() -> None:
             truth = truth + random.normal(0, 1e-3 * np.sqrt(DT_S), 3)
             kept = np.exp(-DT_S / 10)
             shared = kept * shared + random.normal(0, 0.002 * np.sqrt(1 - kept**2), 3)
-            bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
+            bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=(True, True, True))
             bias.see_flow(truth + shared + random.normal(0, np.hypot(NOISE_RADPS, 0.02), 3), np.full(3, 0.02), 0.2)
             within.append(np.abs(bias.mean_radps - truth) <= 2 * bias.sigma_radps)
     assert 0.9 <= np.mean(within) <= 0.99
@@ -99,7 +99,7 @@ def test_flow_shows_the_less_the_nearer_things_pass() -> None:
     far, near = GyroBias(), GyroBias()
     for bias, expansion_hz in ((far, 0.1), (near, 2.0)):
         for _ in range(200):
-            bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
+            bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=(True, True, True))
             bias.see_flow(np.full(3, 0.02), np.full(3, 0.005), expansion_hz)
     assert (near.sigma_radps > 4 * far.sigma_radps).all()
     assert (np.abs(near.mean_radps) < 2 * near.sigma_radps).all()
@@ -108,7 +108,7 @@ def test_flow_shows_the_less_the_nearer_things_pass() -> None:
 def test_rest_shows_more_than_flow() -> None:
     bias = GyroBias()
     drive(bias, np.full(3, 0.05), 5.0, np.random.default_rng(0))
-    bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
+    bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=(True, True, True))
     assert bias.see_rest(np.full(3, 0.05), 0.001)
     assert bias.mean_radps == pytest.approx(np.full(3, 0.05), abs=5e-4)
     assert (bias.sigma_radps < 0.0011).all()
@@ -119,7 +119,7 @@ def test_one_outlier_changes_nothing_and_a_second_of_them_all() -> None:
     drive(bias, np.zeros(3), 5.0, np.random.default_rng(0))
     before = bias.mean_radps
     for frame in range(25):
-        bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=True)
+        bias.advance(DT_S, np.full(3, NOISE_RADPS), measured=(True, True, True))
         used = bias.see_flow(np.array([0.0, 0.3, 0.0]), np.full(3, 0.01), 0.0)
         if frame == 0:
             assert not used
@@ -130,7 +130,7 @@ def test_one_outlier_changes_nothing_and_a_second_of_them_all() -> None:
 
 def test_without_a_gyro_nothing_is_learnt_of_its_bias() -> None:
     bias = GyroBias()
-    bias.advance(DT_S, np.full(3, 0.1), measured=False)
+    bias.advance(DT_S, np.full(3, 0.1), measured=(False, False, False))
     bias.add_image_rotation(np.full(3, 0.2), np.full(3, 0.01))
     assert not bias.mean_radps.any()
     assert bias.sigma_radps == pytest.approx(np.full(3, PRIOR_RADPS))
@@ -149,7 +149,7 @@ def test_whatever_is_reported_numbers_stay_finite_and_sigmas_positive_and_bounde
 ) -> None:
     bias = GyroBias()
     for what, rate, sigma, measured in inputs:
-        bias.advance(dt_s, np.full(3, sigma / 7), measured)
+        bias.advance(dt_s, np.full(3, sigma / 7), (measured, measured, measured))
         if what == "doubt":
             bias.doubt()
         elif what == "rest":
