@@ -49,6 +49,7 @@ _REST_SIGMA_RADPS = 1e-3  # 1 sigma of the true rate at rest
 
 # Rotation, 1 sigma of the rate where nothing measures it.
 _SIGMA_HELD_RADPS = 0.05  # the last sample is held
+_SIGMA_LACKING_RADPS = 0.0175  # of an axis that the gyro lacks, 1 °/s: on wheels, a vehicle hardly pitches or rolls
 _SIGMA_UNKNOWN_RADPS = 0.1  # at first: without a gyro, the flow soon shows how much it turns
 _SIGMA_SATURATED_RADPS = 1.0  # of the rate beyond the gyro's full scale
 _GUESS_TIME_S = 0.5  # averaging time of the sigma of a guess
@@ -90,11 +91,12 @@ class _Interval:
 
     span: Span
     rates: Track  # of the gyro, or of odometry in its place, in the first columns
-    measured: bool  # by a working gyro
+    measured: bool  # by a working gyro,
     odometry_mps: float
     odometry_yaw_radps: float
     path_yaw_before_radps: float
     notes: list[str] = field(default_factory=list)
+    axes: Sequence[bool] = (False, False, False)  # which of its axes
     rests: bool = False  # without a gyro, by odometry that measures no turn either
     mean_radps: Sequence[float] = (0.0, 0.0, 0.0)  # of the rates
 
@@ -185,20 +187,16 @@ class EgoMotionEstimator:
         gap_limit_s = max(_GAP_S, 5 * self._imu.period_s())
         if self._imu.covers(span, gap_limit_s):
             may_rest = still is not False and self._stands(stamp_ns, odometry_mps, still) is not False
-            force_mps2, gap_s, sigma_radps = self._measure(interval, gap_limit_s, may_rest)
+            force_mps2, gap_s, sigmas_radps = self._measure(interval, gap_limit_s, may_rest)
         else:
             interval.notes.append("no imu")
         if interval.measured:
-            measured = self._measured_axes()
-            if not all(measured):
-                interval.notes.append("gyro lacks an axis")
-            guesses = zip(measured, self._guess_variance, strict=True)
-            self.bias.advance(span.dt_s, [sigma_radps if each else sqrt(guess) for each, guess in guesses], measured)
+            self.bias.advance(span.dt_s, sigmas_radps, interval.axes)
         else:
             self._guess(interval)
             interval.rests = abs(odometry_mps) <= _REST_SPEED_MPS and abs(odometry_yaw_radps) <= _REST_YAW_RADPS
             variances = [_REST_TURN_RADPS**2] * 3 if interval.rests else self._guess_variance
-            self.bias.advance(span.dt_s, [sqrt(variance) for variance in variances], (False, False, False))
+            self.bias.advance(span.dt_s, [sqrt(variance) for variance in variances], interval.axes)
         rest_mps2 = self._learn_rest(span, gap_limit_s, odometry_mps, still) if interval.measured else None
         rotation = self._rotation()
         if not interval.measured:
@@ -215,8 +213,10 @@ class EgoMotionEstimator:
         self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
         return self._answer(rotation)
 
-    def _measure(self, interval: _Interval, gap_limit_s: float, may_rest: bool) -> tuple[list[float], float, float]:
-        """Take in the IMU's samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates."""
+    def _measure(
+        self, interval: _Interval, gap_limit_s: float, may_rest: bool
+    ) -> tuple[list[float], float, list[float]]:
+        """Take in samples. Return specific force (3,), time without samples, s, and 1 sigma of the rates (3,)."""
         span, imu, period_s = interval.span, self._imu, self._imu.period_s()
         held_s, gap_s = imu.held_s(span), imu.gap_s(span, gap_limit_s)
         if held_s > gap_limit_s:
@@ -236,7 +236,13 @@ class EgoMotionEstimator:
         interval.measured = not self._stuck(span.end_ns, gap_limit_s, period_s, may_rest)
         if not interval.measured:
             interval.notes.append("gyro stuck")
-        return whole[3:6], gap_s + saturated_s, sigma_rad / max(span.dt_s, 1e-9)
+            return whole[3:6], gap_s + saturated_s, []
+        interval.axes = self._measured_axes()
+        if not all(interval.axes):
+            interval.notes.append("gyro lacks an axis")
+        sigma_radps = sigma_rad / max(span.dt_s, 1e-9)
+        sigmas_radps = [sigma_radps if measured else _SIGMA_LACKING_RADPS for measured in interval.axes]
+        return whole[3:6], gap_s + saturated_s, sigmas_radps
 
     def _measured_axes(self) -> list[bool]:
         """Whether the gyro measures each axis: drivers of a gyro for yaw alone report 0 for the others."""
@@ -303,8 +309,6 @@ class EgoMotionEstimator:
             self.bias.see_flow(error_radps, sigma_radps, expansion_hz)
         else:
             self._follow_path(error_radps)
-        guessed = not all(self._measured_axes()) if interval.measured else True
-        if guessed:
             kept = exp(-dt_s / _GUESS_TIME_S)
             for k, error in enumerate(error_radps):
                 variance = kept * self._guess_variance[k] + (1 - kept) * error**2

@@ -35,7 +35,7 @@ class GyroBias:
 
     def __init__(self) -> None:
         self._axes = [AxisBias(_FLOW_RADPS) for _ in range(3)]
-        self._measures: Sequence[bool] = (True, True, True)
+        self._measured: Sequence[bool] = (True, True, True)
         self._dt_s = 0.0
         self._against_s = 0.0
 
@@ -74,7 +74,8 @@ class GyroBias:
     @property
     def known(self) -> bool:
         """Whether all axes that the gyro measures are known to ``KNOWN_RADPS``."""
-        return all(sigma <= KNOWN_RADPS for sigma, measured in zip(self.sigmas(), self._measures, strict=True) if measured)
+        axes = zip(self._axes, self._measured, strict=True)
+        return all(axis.sigma() <= KNOWN_RADPS for axis, measured in axes if measured)
 
     def forget(self) -> None:
         """Forget the bias: it may have any value."""
@@ -85,11 +86,11 @@ class GyroBias:
     def advance(self, dt_s: float, noise_radps: Three, measured: Sequence[bool]) -> None:
         """Begin a new interval. ``noise_radps``: (3,), 1 sigma of w. ``measured``: (3,), whether a gyro gives the rate.
 
-        An axis once measured remains so for ``known`` while the gyro is absent.
+        While none does, ``known`` is about the axes that one measured last.
         """
         self._dt_s = dt_s
         if any(measured):
-            self._measures = measured
+            self._measured = measured
         for axis, noise, is_measured in zip(self._axes, noise_radps, measured, strict=True):
             axis.advance(dt_s, noise, is_measured)
 

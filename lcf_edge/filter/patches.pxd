@@ -15,6 +15,7 @@ cdef double MAX_HALF_PX
 cdef double HALF_WIDTH_SHARE
 cdef double BESIDE
 cdef double BESIDE_HALVES
+cdef double KEPT_REACHES
 cdef double NEAREST_S
 cdef double ROW_SHARE
 cdef double APART
@@ -35,6 +36,7 @@ cdef int MAX_MISSES
 cdef double MIN_SCALE
 cdef double MAX_SCALE
 cdef double LIFE_S
+cdef double SUCCESSOR_SHARE
 cdef double MIN_SPEED_MPS
 
 cdef class Patches:
@@ -65,6 +67,10 @@ cdef double step(Patches patches, Py_ssize_t p, double gain) noexcept nogil
 cdef bint find(Patches patches, Py_ssize_t p, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
 cpdef void follow(Patches patches, const unsigned char[::1] image, ImagePlane plane) noexcept nogil
 cdef double half_side(Situation around) noexcept nogil
+cdef double reach_px(double half, Situation around) noexcept nogil
+cdef double beside_px(double x, Situation around) noexcept nogil
+@cython.locals(reach=double, away=double, p=int)
+cdef void retire(Patches patches, double half, Situation around) noexcept nogil
 cdef int free_row(Patches patches) noexcept nogil
 cdef bint is_covered(Patches patches, double x, double y, double half) noexcept nogil
 @cython.locals(best=int, least=double, i=int)

@@ -24,6 +24,7 @@ MAX_HALF_PX = 16.0  # and at most
 HALF_WIDTH_SHARE = 0.4  # half-side, as a share of the vehicle's half width at the range of half a horizon
 BESIDE = 1.2  # half widths from the path at that range, within which patches start,
 BESIDE_HALVES = 1.5  # or half-sides, if more
+KEPT_REACHES = 2.0  # that distance, times this and its growth, beyond which a patch ends
 NEAREST_S = 1.0  # ground reached sooner is too low in the image
 ROW_SHARE = 1.0  # weight of vertical distance from the horizon in choosing the place nearest to the path
 APART = 1.1  # half-sides between the centres of patches
@@ -44,6 +45,7 @@ MAX_MISSES = 4
 MIN_SCALE = 0.8
 MAX_SCALE = 2.2
 LIFE_S = 2.5  # later the surroundings have changed too much
+SUCCESSOR_SHARE = 0.5  # of it, after which another patch may start at the same place
 MIN_SPEED_MPS = 0.05
 
 
@@ -267,6 +269,29 @@ def half_side(around: Situation) -> float:
     return min(max(half, MIN_HALF_PX), MAX_HALF_PX)
 
 
+def reach_px(half: float, around: Situation) -> float:
+    """Distance from the path within which patches start, px."""
+    halfway_m = 0.5 * around.speed_mps * around.horizon_s
+    return max(BESIDE * around.half_width_m * around.pinhole.fx / halfway_m, BESIDE_HALVES * half)
+
+
+def beside_px(x: float, around: Situation) -> float:
+    """Distance from the path at the range of half a horizon, px."""
+    halfway_m = 0.5 * around.speed_mps * around.horizon_s
+    right_m = (x - around.focus_x) / around.pinhole.fx * halfway_m
+    return math.fabs(path.least_miss(right_m, halfway_m, around)) / halfway_m * around.pinhole.fx
+
+
+def retire(patches: Patches, half: float, around: Situation) -> None:
+    """End patches that the vehicle passes well aside, on its arc and straight on, in favour of places in its way."""
+    reach = KEPT_REACHES * reach_px(half, around)
+    for p in range(patches.capacity):
+        if patches.active[p]:
+            away = min(beside_px(patches.x[p], around), math.fabs(patches.x[p] - around.focus_x))
+            if away > reach * max(patches.scale[p], 1.0):
+                patches.active[p] = 0
+
+
 def free_row(patches: Patches) -> int:
     """The first row not in use, -1: none."""
     for p in range(patches.capacity):
@@ -276,9 +301,9 @@ def free_row(patches: Patches) -> int:
 
 
 def is_covered(patches: Patches, x: float, y: float, half: float) -> bool:
-    """Whether a patch already covers a position."""
+    """Whether a patch covers a position, and will long enough: an old one soon needs a successor that has grown."""
     for p in range(patches.capacity):
-        if not patches.active[p]:
+        if not patches.active[p] or patches.elapsed_s[p] > SUCCESSOR_SHARE * LIFE_S:
             continue
         if math.fabs(patches.x[p] - x) < APART * half and math.fabs(patches.y[p] - y) < APART * half:
             return True
@@ -291,9 +316,8 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
     In the image that is around the path at the range of half a horizon, from the vehicle's height there down to the
     ground reached in ``NEAREST_S``.
     """
-    fx, fy = around.pinhole.fx, around.pinhole.fy
-    halfway_m = 0.5 * around.speed_mps * around.horizon_s
-    reach = max(BESIDE * around.half_width_m * fx / halfway_m, BESIDE_HALVES * half)
+    fy = around.pinhole.fy
+    halfway_m, reach = 0.5 * around.speed_mps * around.horizon_s, reach_px(half, around)
     top = around.horizon_y - max(around.height_m - around.camera_height_m, 0.0) / halfway_m * fy - half
     bottom = around.horizon_y + fy * around.camera_height_m / (around.speed_mps * NEAREST_S)
     if not around.camera_height_m > 0:
@@ -303,8 +327,7 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
         x, y = edges.x[i], edges.y[i]
         if y <= top or y >= bottom or not edges.matched[i]:
             continue
-        right_m = (x - around.focus_x) / fx * halfway_m
-        away = math.fabs(path.least_miss(right_m, halfway_m, around)) / halfway_m * fx
+        away = beside_px(x, around)
         if away >= reach:
             continue
         away += ROW_SHARE * math.fabs(y - around.horizon_y)
@@ -402,6 +425,7 @@ def renew(patches: Patches, edges: EdgeColumns, image: Bytes, plane: ImagePlane,
     if not around.speed_mps > MIN_SPEED_MPS:
         return
     half = half_side(around)
+    retire(patches, half, around)
     patches.tried = -1.0
     for _ in range(BIRTHS):
         p = free_row(patches)

@@ -397,6 +397,41 @@ class TestBias:
         assert motion.rotation_sigma_rad < 0.05 * 0.015
 
 
+class TestGyroForYawAlone:
+    """Its driver reports 0 about the other axes, since the message has three."""
+
+    def gyro(self, t: float) -> tuple[float, float, float]:
+        return (0.0, 0.3 + 0.01 * np.sin(50 * t), 0.0)
+
+    def turning(self, gyro: Callable[[float], tuple[float, float, float]]) -> tuple[EgoMotionEstimator, EgoMotion]:
+        ego = calibrated()
+        feed(ego, np.arange(0, 1, 0.01), gyro=gyro)
+        ego.advance(ns(0.5))
+        return ego, ego.advance(ns(0.6))
+
+    def test_what_it_does_not_measure_is_noted_and_uncertain(self) -> None:
+        _, yaw_alone = self.turning(self.gyro)
+        _, whole = self.turning(lambda t: (1e-6, self.gyro(t)[1], -1e-6))
+        assert "gyro lacks an axis" in yaw_alone.notes
+        assert "gyro lacks an axis" not in whole.notes
+        np.testing.assert_allclose(yaw_alone.rotation, whole.rotation, atol=1e-6)
+        assert yaw_alone.rotation_sigma_rad == pytest.approx(np.deg2rad(1.0) * 0.1, rel=0.01)
+        assert yaw_alone.rotation_sigma_rad > 1.5 * whole.rotation_sigma_rad
+
+    def test_the_image_shows_it(self) -> None:
+        ego, _ = self.turning(self.gyro)
+        pitch_rad, sigma_rad = 0.005, 0.0005
+        seen = ego.add_image_rotation(np.array([pitch_rad, -0.03, 0.0]), np.full(3, sigma_rad))
+        share = 1 / (1 + (sigma_rad / np.deg2rad(0.1)) ** 2)  # by their variances
+        np.testing.assert_allclose(seen.rotation, turned_by((-share * pitch_rad, 0.03, 0.0)), atol=2e-4)
+        assert ego.bias.known
+        assert ego.bias.mean_radps[0] == 0.0  # no bias of what it does not measure
+
+    def test_at_rest_all_axes_may_be_0(self) -> None:
+        _, motion = self.turning(lambda _: (0.0, 0.0, 0.0))
+        assert "gyro lacks an axis" not in motion.notes
+
+
 class TestBrokenGyro:
     def alive(self, t: float) -> tuple[float, float, float]:
         return (0.0, 0.6 + 0.001 * np.sin(997 * t), 0.0)
@@ -464,7 +499,7 @@ class Drive:
 
     def gyro(self, t: float) -> tuple[float, float, float]:
         moving = 1 <= t < 6
-        return (self.nod_rad * 3 * np.sin(6 * (t - 1)) * moving, 0.0, 0.0)  # about x: looking up is positive
+        return (self.nod_rad * 3 * np.sin(6 * (t - 1)) * moving, 1e-9, 1e-9)  # about x: looking up is positive
 
     def accel(self, t: float) -> tuple[float, float, float]:
         c, s = np.cos(self.pitch(t)), np.sin(self.pitch(t))

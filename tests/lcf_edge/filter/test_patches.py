@@ -12,6 +12,7 @@ from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import memory_of
 from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.situation import Situation
+from lcf_edge.filter.tables import EdgeTable
 from lcf_edge.lens import Lens
 from tests.lcf_edge.filter.boards import pattern
 
@@ -155,3 +156,43 @@ def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situati
     assert patches.depth_m[0] == pytest.approx(1.0)
     assert 1 / patches.inverse[0] == pytest.approx(4.0, rel=0.1)
     assert abs(patches.inverse[0] - 0.25) < 3 * patches.inverse_sigma[0]
+
+
+def renew(patches: Patches, image: Grey, around: Situation, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> None:
+    """With one edge in the image, at ``x``, ``y``."""
+    edges = EdgeTable(1, 1, 1)
+    row = edges.append(1).start
+    edges.x[row], edges.y[row], edges.matched[row] = x, y, True
+    functions.renew(patches, edges.columns, memory_of(image.reshape(-1)), ImagePlane(LENS), around)
+
+
+@pytest.mark.parametrize(
+    ("focus_x", "yaw_rate_radps", "is_kept"),
+    [(MIDDLE[0], 0.0, True), (MIDDLE[0], 0.5, True), (MIDDLE[0] - 200, 0.0, False), (MIDDLE[0] - 200, -0.5, True)],
+    ids=["straight ahead", "straight ahead, in a turn", "beside the path", "on the arc of a turn"],
+)
+def test_a_patch_that_is_passed_well_aside_makes_room(
+    situation: type[Situation], focus_x: float, yaw_rate_radps: float, is_kept: bool
+) -> None:
+    """A vehicle that weaves keeps the patches straight ahead: its turn is soon over."""
+    image = pattern(640, 480, 1)
+    patches = born(image)
+    assert patches is not None
+    renew(patches, image, situation(focus_x=focus_x, yaw_rate_radps=yaw_rate_radps), y=0.0)
+    assert bool(patches.active[0]) == is_kept
+
+
+@pytest.mark.parametrize(("age_s", "has_successor"), [(0.4 * LIFE_S, False), (0.6 * LIFE_S, True)])
+def test_an_old_patch_gets_a_successor_that_has_grown_when_it_ends(
+    situation: type[Situation], age_s: float, has_successor: bool
+) -> None:
+    image, around = pattern(640, 480, 1), situation(speed_mps=0.1, focus_x=MIDDLE[0], focus_y=MIDDLE[1])
+    patches = born(image)
+    assert patches is not None
+    while patches.elapsed_s[0] < age_s:
+        functions.predict(patches, around)
+        follow(patches, image)
+    renew(patches, image, around)
+    assert bool(patches.active[1]) == has_successor
+    if has_successor:
+        assert (patches.x[1], patches.y[1]) == MIDDLE
