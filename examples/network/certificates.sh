@@ -1,7 +1,7 @@
 #!/bin/sh
 # Certificates for a rover whose port is open to others, into this folder: sh certificates.sh rover.local planner wheels
 # The first argument is the name or address by which others reach the rover, the rest are parties that may connect.
-# Authorities that are here already are kept, and sign further parties.
+# Authorities and a rover's certificate that are here already are kept: run it again for further parties.
 set -eu
 
 host=$1
