@@ -126,10 +126,10 @@ def owners() -> str:
         written: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for column in columns:
             written[column.writers].append(f"`{column.name}`")
-        lines += [f"**{name}**", "", "| written by | columns |", "|---|---|"]
+        lines += [f"**{name}**", ""]
         for writers, names in written.items():
             modules = ", ".join(f"`{writer}`" for writer in writers)
-            lines.append(f"| {modules} | {'all' if len(written) == 1 else ', '.join(names)} |")
+            lines.append(f"- {'all' if len(written) == 1 else ', '.join(names)}: {modules}")
         lines.append("")
     return "\n".join(lines)
 
