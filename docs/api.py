@@ -67,29 +67,26 @@ def _signature(name: str, function: Callable[..., Any]) -> str:
 
 
 def _fields_of_class(thing: type) -> Iterator[str]:
-    """Rows of a table: members of an enumeration, or annotated fields whose comment says what they are."""
+    """Lines on members of an enumeration, or on annotated fields, whose comment says what they are."""
     source = inspect.getsource(thing)
     (definition,) = ast.parse(source).body
     assert isinstance(definition, ast.ClassDef)
-    rows = []
+    fields = []
     for node in definition.body:
         comment = _comment(source.splitlines()[node.lineno - 1])
         if isinstance(node, ast.Assign) and issubclass(thing, IntEnum):
-            rows.append(f"| `{ast.unparse(node.targets[0])}` | {ast.unparse(node.value)} | {comment} |")
+            fields.append((f"`{ast.unparse(node)}`", comment))
         elif isinstance(node, ast.AnnAssign):
-            rows.append(
-                f"| `{ast.unparse(node.target)}` | `{ast.unparse(node.annotation)}` | {comment} |".replace("npt.", "")
-            )
-    if rows:
-        yield from (
-            "| name | value |  |" if issubclass(thing, IntEnum) else "| name | type |  |",
-            "|---|---|---|",
-            *rows,
-        )
+            kind = ast.unparse(node.annotation).replace("npt.", "")
+            fields.append((f"`{ast.unparse(node.target)}: {kind}`", comment))
+    if any(comment for _, comment in fields):
+        yield from (f"- {field}: {comment}" if comment else f"- {field}" for field, comment in fields)
+    elif fields:
+        yield ", ".join(field for field, _ in fields)
 
 
 def _comment(line: str) -> str:
-    return line.partition("  # ")[2].strip().replace("|", "\\|")
+    return line.partition("  # ")[2].strip()
 
 
 def _doc_of_constant(module: ModuleType, name: str) -> str:

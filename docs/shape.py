@@ -120,16 +120,16 @@ def svg() -> str:
 
 
 def owners() -> str:
-    """Return the tables of columns as Markdown; of a table with one writer only its name."""
+    """Return the tables of columns as Markdown: of each table a line for all columns that the same modules write."""
     lines = []
     for name, columns in TABLES.items():
-        if len(writers := {writer for column in columns for writer in column.writers}) == 1:
-            lines += [f"**{name}**: only `{writers.pop()}`.", ""]
-            continue
-        lines += [f"**{name}**", "", "| column | meaning | unit | written by |", "|---|---|---|---|"]
+        written: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for column in columns:
-            modules = ", ".join(f"`{writer}`" for writer in column.writers)
-            lines.append(f"| `{column.name}` | {column.meaning} | {column.unit} | {modules} |")
+            written[column.writers].append(f"`{column.name}`")
+        lines += [f"**{name}**", ""]
+        for writers, names in written.items():
+            modules = ", ".join(f"`{writer}`" for writer in writers)
+            lines.append(f"- {'all' if len(written) == 1 else ', '.join(names)}: {modules}")
         lines.append("")
     return "\n".join(lines)
 

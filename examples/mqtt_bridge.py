@@ -3,11 +3,13 @@
 Needs ``pip install lcf-edge paho-mqtt``. Objects go to ``lcf/<robot>/objects`` as JSON, at most ``RATE_HZ`` times a
 second and with what is unknown as null; each part's health goes to ``lcf/<robot>/health/<part>``, retained, so that who
 comes later learns it too. ``lcf/<robot>/online`` is ``true`` while this program runs: the broker itself changes it.
+A broker that is away is tried again, from the start on.
 """
 
 import argparse
 import json
 import math
+import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing
@@ -59,7 +61,9 @@ def bridge(endpoint: str, broker: str, port: int, robot: str) -> None:
     online = f"lcf/{robot}/online"
     client.will_set(online, b"false", retain=True)
     client.on_connect = lambda *_: client.publish(online, b"true", retain=True)
-    client.connect(broker, port)
+    away = f"{broker}:{port}: no broker there; trying again\n"
+    client.on_connect_fail = lambda *_: sys.stderr.write(away)
+    client.connect_async(broker, port)
     client.loop_start()
 
     def pass_on_health(sample: zenoh.Sample) -> None:

@@ -94,8 +94,9 @@ def pack(machine: str, wheel: Path, wheels: Path, lock: str, folder: Path) -> Pa
 
 
 def documents(folder: Path) -> None:
-    """What there is to read, into ``folder``."""
+    """What there is to read and to copy, into ``folder``."""
     shutil.copytree(PROJECT / "docs", folder / "docs", ignore=shutil.ignore_patterns("*.py", "__pycache__"))
+    shutil.copytree(PROJECT / "examples", folder / "examples", ignore=shutil.ignore_patterns("__*__*"))
     for name in ("README.md", "CHANGELOG.md", "SECURITY.md"):
         shutil.copy(PROJECT / name, folder)
 

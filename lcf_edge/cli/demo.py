@@ -31,6 +31,7 @@ from lcf_edge.cli.findings import FoundThreat, findings, trusted_rebels
 from lcf_edge.cli.replay import frame_rate
 from lcf_edge.cli.summary import Summary
 from lcf_edge.config import Camera, Config, Vehicle, Zenoh, to_toml
+from lcf_edge.doctor.program import SYSTEM_PATH, program
 from lcf_edge.errors import LcfError, PublishError, UsageError
 from lcf_edge.messages import Cause
 from lcf_edge.pipeline import run
@@ -117,9 +118,7 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         f"received {received.scenes} of {publisher.sent} scenes in the second process, "
         f"{received.bytes / 1e3:.0f} kB, {counted(received.circles, 'circle')}, {received.broken} broken",
         "",
-        "To see it live, publish in one terminal and subscribe in another:",
-        *([] if endpoint == default else [f"(after you have stopped what has {default} now)"]),
-        *_live_lines(folder, default),
+        *_next_lines(folder, default, endpoint == default),
     ):
         say(line)
 
@@ -230,13 +229,23 @@ def _found_line(threat: FoundThreat) -> str:
     return f"found    {threat.name}, {cause.name.lower()}, {threat.latency_s:.2f} s after it became a threat"
 
 
-def _live_lines(folder: Path, endpoint: str) -> tuple[str, str]:
-    """Return the two commands that show the demo live."""
-    python = min(sys.executable, os.path.relpath(sys.executable), key=len)
+def _next_lines(folder: Path, endpoint: str, free: bool) -> list[str]:
+    """Return the commands that show the demo in a browser, and at a subscriber to ``endpoint``, which may be taken."""
+    called = program(Path(_shorter(sys.prefix)), os.environ.get("PATH", SYSTEM_PATH))
+    what = f"{shlex.quote(str(folder / 'recording'))} -c {shlex.quote(str(folder / 'config.toml'))}"
     code = (
         "from lcf_edge.client import scenes; "
         f"[print(s.seq, s.circles[['cause', 'x', 'y', 'ttc']]) for s in scenes('{endpoint}')]"
     )
-    command = (python, "-m", "lcf_edge", "replay", str(folder / "recording"))
-    options = ("-c", str(folder / "config.toml"), "--publish", "--realtime")
-    return f"  {shlex.join(command + options)}", f'  {shlex.quote(python)} -c "{code}"'
+    return [
+        "To look at it in a browser:",
+        f"  {called} view {what}",
+        "To publish it in one terminal and subscribe in another:",
+        *([] if free else [f"(after you have stopped what has {endpoint} now)"]),
+        f"  {called} replay {what} --publish --realtime",
+        f'  {shlex.quote(_shorter(sys.executable))} -c "{code}"',
+    ]
+
+
+def _shorter(path: str) -> str:
+    return min(path, os.path.relpath(path), key=len)

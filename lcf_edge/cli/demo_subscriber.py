@@ -4,8 +4,10 @@
 were sent, then one JSON line with a ``Received`` goes to standard output.
 """
 
+import os
 import sys
 import threading
+from contextlib import suppress
 
 import msgspec
 import zenoh
@@ -54,4 +56,6 @@ def receive(endpoint: str, key: str) -> Received:
 
 
 if __name__ == "__main__":
-    sys.stdout.write(msgspec.json.encode(receive(*sys.argv[1:])).decode() + "\n")
+    report = msgspec.json.encode(receive(*sys.argv[1:])) + b"\n"
+    with suppress(BrokenPipeError):  # the demo has ended before
+        os.write(sys.stdout.fileno(), report)

@@ -2,6 +2,7 @@
 
 import json
 import re
+import runpy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from lcf_edge.sinks.results import encode_line
 from lcf_edge.zenoh_link import ATTACHMENT, SCENE_ENCODING
 
 ROOT = Path(__file__).parents[2]
+DECODE = runpy.run_path(str(ROOT / "examples/without_lcf_edge.py"))["decode"]
 CDR_TYPES = {"uint8": "u1", "uint16": "<u2", "uint32": "<u4", "float32": "<f4"}
 
 Text = Callable[[str], str]
@@ -77,16 +79,13 @@ def test_options_of_replay(rows: Rows, capsys: pytest.CaptureFixture[str]) -> No
 
 @given(frame_id=st.text(st.characters(exclude_characters="\0", codec="utf-8"), max_size=12), n=st.integers(0, 3))
 def test_the_wire_format_is_decoded_as_written(frame_id: str, n: int) -> None:
-    text = (ROOT / "docs/wire-format.md").read_text(encoding="utf-8")
-    names: dict[str, Any] = {}
-    exec(re.findall(r"```python\n(.*?)```", text, re.S)[0], names)
     sent = scene(n, 3 - n, n % 3)
     payload = encode_scene(sent, frame_id)
-    stamp_ns, seq, size, speed, circles, psi, objects = names["decode"](payload)
+    stamp_ns, seq, size, speed, circles, psi, objects = DECODE(payload)
     assert (stamp_ns, seq, size, speed) == (sent.stamp_ns, sent.seq, (640, 480), 1.5)
     for got, wanted in ((circles, sent.circles), (psi, sent.psi), (objects, sent.objects)):
         assert all(np.array_equal(got[name], wanted[name]) for name in wanted.dtype.names or ())
-    *_, psi, objects = names["decode"](payload[: -4 - sent.objects.nbytes])
+    *_, psi, objects = DECODE(payload[: -4 - sent.objects.nbytes])
     assert (len(psi), len(objects)) == (len(sent.psi), 0), "one of before objects"
 
 

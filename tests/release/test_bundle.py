@@ -89,6 +89,7 @@ def test_one_command_installs_what_make_install_does(pack: Pack, image: Path, tm
     assert command.readlink() == Path("/opt/lcf-edge/bin/lcf-edge")
     assert str(image) not in (image / "opt/lcf-edge/bin/lcf-edge").read_text(encoding="utf-8")
     assert (image / "opt/lcf-edge/doc/docs/install.md").is_file()
+    assert (image / "opt/lcf-edge/doc/examples/network/zenoh.json5").is_file()
 
 
 def test_an_upgrade_keeps_configuration_and_recordings_and_the_version_before(pack: Pack, image: Path) -> None:

@@ -61,6 +61,8 @@ def test_what_make_install_puts_into_a_system_is_where_packages_have_it(package:
         "usr/share/doc/lcf-edge/changelog.gz",
         "usr/share/doc/lcf-edge/copyright",
         "usr/share/doc/lcf-edge/docs/install.md",
+        "usr/share/doc/lcf-edge/examples/foxglove_layout.json",
+        "usr/share/doc/lcf-edge/examples/network/zenoh.json5",
         "usr/share/fish/vendor_completions.d/lcf-edge.fish",
         "usr/share/man/man1/lcf-edge.1.gz",
         "usr/share/zsh/vendor-completions/_lcf-edge",

@@ -1,6 +1,5 @@
 """The gate's unit before the daemon's: planners with a certificate get scenes through it, strangers get nothing."""
 
-import re
 import socket
 from collections.abc import Iterator
 from contextlib import ExitStack, suppress
@@ -29,8 +28,7 @@ def gated(machine: Machine, daemon: Daemon) -> Iterator[Path]:
         certify(folder, name, authority)
     certify(folder, "inner-ca", "inner-ca")
     certify(folder / "inner", "planner", "../inner-ca")
-    document = (PROJECT / "docs/network.md").read_text(encoding="utf-8")
-    settings = next(re.finditer(r"```json5\n(.*?)```", document, re.DOTALL))[1]
+    settings = (PROJECT / "examples/network/zenoh.json5").read_text(encoding="utf-8")
     settings = settings.replace("/etc/lcf-edge/tls/rover.key", KEY)
     (folder / "zenoh.json5").write_text(settings, encoding="utf-8")
     (folder / "tls.conf").write_text(DROP_IN, encoding="ascii")

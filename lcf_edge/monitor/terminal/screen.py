@@ -47,7 +47,7 @@ def _figure(
         if not math.isfinite(value):
             return "-"
         spread = float(row[f"{field}_sigma"]) * factor if sigma else math.nan
-        return f"{value:{'+' if sign else ''}.{digits}f}" + (f" ±{spread:.{digits}f}" if math.isfinite(spread) else "")
+        return f"{value:{'+' if sign else ''}z.{digits}f}" + (f" ±{spread:.{digits}f}" if math.isfinite(spread) else "")
 
     return text
 

@@ -675,6 +675,28 @@ def test_the_lines_that_the_demo_ends_with_work(shown: tuple[Done, Path], endpoi
         subscriber.kill()
 
 
+def test_the_demo_says_how_to_look_at_it(shown: tuple[Done, Path]) -> None:
+    done, folder = shown
+    (line,) = (line for line in done.stdout.splitlines() if " view " in line)
+    with subprocess.Popen((*shlex.split(line), "--port", "0"), stdout=subprocess.PIPE, cwd=folder.parent) as page:
+        try:
+            assert page.stdout
+            assert page.stdout.readline().startswith(b"open http://127.0.0.1:")
+        finally:
+            page.terminate()
+
+
+def test_a_demo_whose_reader_goes_away_ends_silently(tmp_path: Path) -> None:
+    command = (sys.executable, "-m", "lcf_edge", "demo", "--seconds", "1", "--out", "out")
+    with subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as demo:
+        assert demo.stdout
+        assert demo.stderr
+        assert demo.stdout.readline().startswith("1/5")
+        demo.stdout.close()  # the next line comes when its subscriber has started
+        assert demo.stderr.read() == ""  # of both processes
+    assert demo.returncode == 141
+
+
 def test_the_demo_refuses_a_folder_that_cannot_be_written(refused: Refused, tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("a file")
     refused("demo", "--out", "taken", status=1, parts=("taken: cannot be written (File exists)",))

@@ -5,6 +5,7 @@ import queue
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 from typing import Any
@@ -50,35 +51,58 @@ def test_whatever_a_part_is_called_it_makes_a_topic(bridge: Any) -> None:
 
 
 @pytest.fixture
-def broker(rover: Any) -> Iterator[int]:
-    """The port of a broker: the one after the rover's."""
-    port = int(rover.endpoint.rpartition(":")[2]) % 60000 + 1
+def port(rover: Any) -> int:
+    """Of the broker: the one after the rover's."""
+    return int(rover.endpoint.rpartition(":")[2]) % 60000 + 1
+
+
+@contextmanager
+def broker_at(port: int) -> Iterator[None]:
     command = (sys.executable, str(Path(__file__).with_name("mqtt_broker.py")), str(port))
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True) as process:
         assert process.stdout
         assert process.stdout.readline() == "listens\n"
-        yield port
+        yield
         process.kill()
 
 
-@pytest.fixture
-def messages(broker: int) -> Iterator[queue.Queue[tuple[str, Any]]]:
+@contextmanager
+def messages_at(port: int) -> Iterator[queue.Queue[tuple[str, Any]]]:
     """What a client receives that subscribes to all."""
     received: queue.Queue[tuple[str, Any]] = queue.Queue()
     client = mqtt.Client(mqtt.CallbackAPIVersion.VERSION2)
     client.on_connect = lambda *_: client.subscribe("lcf/#", qos=1)
     client.on_message = lambda _, __, message: received.put((message.topic, json.loads(message.payload)))
-    client.connect("127.0.0.1", broker)
+    client.connect("127.0.0.1", port)
     client.loop_start()
     yield received
     client.disconnect()
     client.loop_stop()
 
 
+@pytest.fixture
+def messages(port: int) -> Iterator[queue.Queue[tuple[str, Any]]]:
+    with broker_at(port), messages_at(port) as received:
+        yield received
+
+
+def test_a_broker_that_comes_later_is_told_too(rover: Any, port: int) -> None:
+    command = (sys.executable, str(BRIDGE), rover.endpoint, "127.0.0.1", "--port", str(port))
+    with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as bridge:
+        try:
+            assert bridge.stderr
+            assert bridge.stderr.readline() == f"127.0.0.1:{port}: no broker there; trying again\n"
+            with broker_at(port), messages_at(port) as received:
+                while received.get(timeout=PATIENCE_S) != ("lcf/rover/online", True):
+                    pass
+        finally:
+            bridge.kill()
+
+
 def test_objects_and_health_arrive_and_its_end_is_reported(
-    rover: Any, broker: int, messages: queue.Queue[tuple[str, Any]]
+    rover: Any, port: int, messages: queue.Queue[tuple[str, Any]]
 ) -> None:
-    command = (sys.executable, str(BRIDGE), rover.endpoint, "127.0.0.1", "--port", str(broker), "--robot", "seven")
+    command = (sys.executable, str(BRIDGE), rover.endpoint, "127.0.0.1", "--port", str(port), "--robot", "seven")
     found: dict[str, Any] = {}
     with subprocess.Popen(command) as bridge:
         wanted = {"lcf/seven/online", "lcf/seven/objects", "lcf/seven/health/camera", "lcf/seven/health/imu"}

@@ -2,7 +2,6 @@
 
 import re
 import resource
-import shlex
 import socket
 import ssl
 import struct
@@ -28,7 +27,9 @@ from lcf_edge.messages import Scene
 from lcf_edge.zenoh_link import opened_session
 from lcf_edge.zenoh_link.link import Link
 
-DOCUMENT = (Path(__file__).parents[3] / "docs/network.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[3]
+DOCUMENT = (ROOT / "docs/network.md").read_text(encoding="utf-8")
+EXAMPLES = ROOT / "examples/network"
 PATIENCE = 20  # silences in which what is sent arrives on a busy computer
 SILENCE_S = 0.3
 PATIENCE_S = 20.0
@@ -43,16 +44,22 @@ def blocks(language: str) -> list[str]:
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The documented files, and the certificates that the documented commands make."""
+    """The documented files, and the certificates that the documented script makes."""
     folder = tmp_path_factory.mktemp("tls")
-    outer, inner = (block.splitlines() for block in blocks("bash"))
-    authority, _, planner, _ = outer
-    guests = [planner.replace("planner", "guest"), inner[2].replace("planner", "guest")]
-    unknown = planner.replace("planner", "unknown")
-    stranger = planner.replace("planner", "stranger").replace("ca.", "other-ca.")
-    for command in (*outer, *inner, *guests, unknown, authority.replace("ca.", "other-ca."), stranger):
-        subprocess.run(shlex.split(command), cwd=folder, check=True, capture_output=True)
-    rover, reader = blocks("json5")
+
+    def certify(place: Path, *parties: str) -> None:
+        script = ("sh", EXAMPLES / "certificates.sh", "rover", *parties)
+        subprocess.run(script, cwd=place, check=True, capture_output=True)
+
+    certify(folder, "planner", "wheels")
+    certify(folder, "guest", "unknown")  # of the same authorities
+    for file in (folder / "inner").glob("unknown.*"):
+        file.unlink()
+    other = tmp_path_factory.mktemp("other")
+    certify(other, "stranger")
+    for file in other.glob("stranger.*"):
+        file.rename(folder / file.name)
+    rover, reader = ((EXAMPLES / name).read_text(encoding="utf-8") for name in ("zenoh.json5", "planner.json5"))
     (folder / "zenoh.json5").write_text(rover.replace("/etc/lcf-edge/tls", str(folder)))
     (folder / "planner.json5").write_text(re.sub(r'"(\w+\.(pem|key))"', rf'"{folder}/\1"', reader))
     return folder

@@ -1,4 +1,4 @@
-"""The programs of docs/planners.md decode what is sent, as far as their compilers are here."""
+"""The programs for planners decode what is sent, as far as their compilers are here."""
 
 import re
 import shutil
@@ -20,7 +20,8 @@ from lcf_edge.config import Config, Publish, Zenoh
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, ObjectClass, Scene
 from lcf_edge.zenoh_link import ScenePublisher
 
-DOCUMENT = (Path(__file__).parents[3] / "docs/planners.md").read_text(encoding="utf-8")
+ROOT = Path(__file__).parents[3]
+DOCUMENT = (ROOT / "docs/planners.md").read_text(encoding="utf-8")
 PATIENCE_S = 20.0
 
 PRINT_CPP = """
@@ -132,7 +133,7 @@ def test_a_program_decodes_scenes(
     compiler, *arguments = command.split()
     if shutil.which(compiler) is None:
         pytest.skip(f"no {compiler} here")
-    (tmp_path / name).write_text(blocks(language)[0])
+    shutil.copy(ROOT / "examples" / language / name, tmp_path)
     (tmp_path / f"main.{language}").write_text(main)
     subprocess.run((compiler, *arguments), cwd=tmp_path, check=True, timeout=120)
     files, said = payloads

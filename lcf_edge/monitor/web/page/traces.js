@@ -4,6 +4,7 @@ const SPAN_S = 300;
 const MIN_S = 5;
 const GAP_S = 5; // no line is drawn across
 const MARGIN = { left: 34, right: 8, top: 8, bottom: 18 }; // px, for what is written beside the axes
+const LABEL_GAP = 12; // px, between two times
 const STEPS_S = [1, 2, 5, 10, 30, 60, 120];
 const field = (name) => (point) => point[name];
 
@@ -88,15 +89,22 @@ export class Traces {
       context.fillText(Number(value.toPrecision(3)), MARGIN.left - 4, y(value) + 4);
     }
     context.textAlign = "center";
-    const step_s = STEPS_S.find((one) => span_s / one <= (width < 240 ? 2.5 : 5)) ?? STEPS_S.at(-1);
     const zero_ns = this.#began_ns ?? 60e9 * Math.floor(newest_ns / 60e9);
-    const first = Math.ceil((newest_ns - span_s * 1e9 - zero_ns) / 1e9 / step_s);
-    for (let at = first; zero_ns + at * step_s * 1e9 <= newest_ns; at += 1) {
+    const label = (at_ns, step_s) =>
+      this.#began_ns === null ? clock(at_ns, step_s) : `${Math.round((at_ns - zero_ns) / 1e9)} s`;
+    const needed = (step_s) => context.measureText(label(newest_ns, step_s)).width + LABEL_GAP;
+    const step_s = STEPS_S.find((one) => x(newest_ns + one * 1e9) - x(newest_ns) >= needed(one)) ?? STEPS_S.at(-1);
+    let free = width; // where the label to the right begins, the first one where the plot ends
+    for (let at = Math.floor((newest_ns - zero_ns) / 1e9 / step_s); ; at -= 1) {
       const at_ns = zero_ns + at * step_s * 1e9;
+      if (at_ns < newest_ns - span_s * 1e9) break;
       line(context, x(at_ns), height - MARGIN.bottom, x(at_ns), height - MARGIN.bottom + 4);
-      const text = this.#began_ns === null ? clock(at_ns, step_s) : `${at * step_s} s`;
+      const text = label(at_ns, step_s);
       const half = context.measureText(text).width / 2;
-      context.fillText(text, Math.min(Math.max(x(at_ns), half), width - half), height - 3);
+      const middle = Math.min(Math.max(x(at_ns), half), width - half);
+      if (middle + half > free) continue;
+      context.fillText(text, middle, height - 3);
+      free = middle - half - LABEL_GAP / 2;
     }
   }
 
@@ -143,5 +151,6 @@ function line(context, ...[fromX, fromY, toX, toY]) {
 
 function clock(at_ns, step_s) {
   const time = new Date(at_ns / 1e6);
-  return time.toLocaleTimeString([], { hour: "2-digit", minute: "2-digit", ...(step_s < 60 && { second: "2-digit" }) });
+  const shown = { hour: "2-digit", minute: "2-digit", ...(step_s < 60 && { second: "2-digit" }), hourCycle: "h23" };
+  return time.toLocaleTimeString([], shown);
 }

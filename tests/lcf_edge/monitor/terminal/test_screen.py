@@ -192,6 +192,15 @@ def test_figures_are_whole_or_not_there() -> None:
     assert len(figures) == len(of_80)
 
 
+def test_nothing_has_no_minus() -> None:
+    known = snapshot(objects=1)
+    assert known.scene
+    known.scene.objects["lateral"] = known.scene.objects["v_right"] = -0.04
+    line = shown(known)[4]
+    assert line.count("+0.0") > 1
+    assert "-0.0" not in line
+
+
 def test_only_a_terminal_has_a_key_to_press() -> None:
     for is_terminal in (False, True):
         console = Console(width=80, height=24, color_system=None, force_terminal=is_terminal)

@@ -25,9 +25,18 @@ PIXEL_AT = "[...document.getElementById('picture').getContext('2d').getImageData
 
 WRITTEN = """
   window.written = new Set();
+  window.gaps = []; // px between neighbouring times below a plot
+  const beside = new Map();
   const [fill, stroke] = [CanvasRenderingContext2D.prototype.fillText, CanvasRenderingContext2D.prototype.strokeText];
   CanvasRenderingContext2D.prototype.fillText = function (text, ...rest) {
     window.written.add(String(text));
+    if (text === 0) beside.set(this.canvas, -Infinity); // an axis begins; its times follow
+    if (/\\d\\d:\\d\\d/.test(text) && beside.has(this.canvas)) {
+      const half = this.measureText(text).width / 2;
+      const before = beside.get(this.canvas);
+      if (before !== -Infinity) window.gaps.push(Math.abs(rest[0] - before) - 2 * half);
+      beside.set(this.canvas, rest[0]);
+    }
     fill.call(this, text, ...rest);
   };
   CanvasRenderingContext2D.prototype.strokeText = function (text, ...rest) {
@@ -95,6 +104,13 @@ def test_plots_have_axes_with_values_and_times_and_each_table_has_its_own(seen: 
     assert captions == [["Objects", "3", "of", "24"], ["Regions", "ψ", "2", "of", "32"]]
     reading.wait_for("['0', '10', '20'].every((text) => window.written.has(text))")  # scenes a second
     reading.wait_for("[...window.written].some((text) => /\\d\\d:\\d\\d/.test(text))")
+
+
+def test_times_below_a_plot_do_not_run_into_each_other(seen: tuple[Any, Any], reading: Any) -> None:
+    """At any second, since they move; each draw of each plot counts."""
+    reading.open(seen[1].address)
+    reading.wait_for("window.gaps.length > 60")
+    assert reading.evaluate("Math.min(...window.gaps)") > 4
 
 
 def test_a_label_has_an_outline(rover: Any, view: Callable[..., Any], reading: Any) -> None:
