@@ -1,8 +1,6 @@
 """``python -m lcf_edge`` is ``lcf-edge``."""
 
-import sys
-
-from lcf_edge.cli.command_line import main
+from lcf_edge.cli.command_line import program
 
 if __name__ == "__main__":
-    sys.exit(main())
+    program()

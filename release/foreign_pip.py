@@ -15,7 +15,7 @@ def options_for(processor: str, python: str, newest_libc: int = OF_TODAY) -> lis
 
 def command_for(python: str) -> str:
     """The script ``lcf-edge`` for that Python; pip would write it for the one that runs it."""
-    return f"#!{python}\nimport sys\n\nfrom lcf_edge.cli.command_line import main\n\nsys.exit(main())\n"
+    return f"#!{python}\nfrom lcf_edge.cli.command_line import program\n\nprogram()\n"
 
 
 def locked_for(lock: str, python: str) -> str:

@@ -5,13 +5,15 @@ of the output went away. What a command needs is imported when it runs, so that 
 """
 
 import argparse
+import atexit
 import io
 import os
 import sys
+import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
 from lcf_edge.cli.arguments import parser
 from lcf_edge.cli.namesake import namesake
@@ -30,6 +32,24 @@ if TYPE_CHECKING:
     from lcf_edge.monitor.live.daemon_address import DaemonAddress
     from lcf_edge.monitor.replay.replayed import Replayed
     from lcf_edge.recording.pace import Pace
+
+
+def program() -> NoReturn:
+    """Be the program: run the command of its arguments, and end."""
+    status = 1
+
+    def end_despite_threads() -> None:
+        """End at once where a thread still runs, such as one that a hanging device keeps.
+
+        Python before 3.14 ends it wherever it is; in the C++ of a library that aborts the program.
+        """
+        if threading.active_count() > 1:
+            sys.stdout.flush()
+            os._exit(status)
+
+    atexit.register(end_despite_threads)  # first, so it is called last
+    status = main()
+    sys.exit(status)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

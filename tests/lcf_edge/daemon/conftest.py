@@ -1,5 +1,6 @@
 """What the daemon is tested with: a drive to replay, a link that keeps what it gets, systemd's end of the socket."""
 
+import select
 import socket
 import threading
 from collections import Counter
@@ -13,8 +14,10 @@ from lcf_edge.config import Camera, Config, Imu, Memory
 from lcf_edge.diagnostics import DeviceStatus
 from lcf_edge.messages import Scene
 from lcf_edge.rendered import scenes
+from tests.emulation import SLOWNESS
+from tests.lcf_edge.daemon.process import Process, wait_for
 
-PATIENCE_S = 20.0
+PATIENCE_S = 20.0 * SLOWNESS
 
 
 class KeptLink:
@@ -83,9 +86,10 @@ class KeptLink:
 
 
 class Manager:
-    """systemd's end of the notification socket."""
+    """systemd's end of the notification socket. ``daemon``: the process at the other end, if it is one."""
 
     def __init__(self, folder: Path) -> None:
+        self.daemon: Process | None = None
         self.environment = {"NOTIFY_SOCKET": str(folder / "notify"), "WATCHDOG_USEC": "3000000"}
         self._socket = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM)
         self._socket.bind(self.environment["NOTIFY_SOCKET"])
@@ -93,7 +97,13 @@ class Manager:
 
     def next(self) -> str:
         """The next message."""
+        if self.daemon is not None:
+            wait_for(self.daemon, self._look)
         return self._socket.recv(4096).decode()
+
+    def _look(self) -> bool | None:
+        """True: there is a message."""
+        return bool(select.select([self._socket], [], [], 0)[0]) or None
 
     def until(self, wanted: str) -> list[str]:
         """Messages up to the first that begins so."""

@@ -17,20 +17,21 @@ from rosbags.interfaces import QosDurability
 from rosbags.rosbag2 import Reader
 
 from lcf_edge.config import load
-from lcf_edge.zenoh_link import scenes
+from tests.emulation import SLOWNESS
+from tests.lcf_edge.daemon.process import PATIENCE_S, Process, end, ended, scenes_of
 
-PATIENCE_S = 30.0
-LOST_S = 1.0  # at most, to a loss of power
+SECONDS = 1.5 * SLOWNESS
+LOST_S = 1.0 * SLOWNESS  # at most, to a loss of power
 
-Start = Callable[..., subprocess.Popen[str]]
+Start = Callable[..., Process]
 
 
 @pytest.fixture
 def start(drive: Path, endpoint: str) -> Iterator[Start]:
     """Start to record the drive."""
-    started: list[subprocess.Popen[str]] = []
+    started: list[Process] = []
 
-    def begin(*arguments: str | Path, camera: str = "") -> subprocess.Popen[str]:
+    def begin(*arguments: str | Path, camera: str = "") -> Process:
         mine = [f'zenoh.listen=["{endpoint}"]', "record.free_mib=0", "camera.height_m=0.77"]
         mine += (
             [f"camera.device={camera}"]
@@ -50,16 +51,7 @@ def start(drive: Path, endpoint: str) -> Iterator[Start]:
 
     yield begin
     for process in started:
-        if process.poll() is None:
-            process.kill()
-        process.communicate()
-
-
-def ended(process: subprocess.Popen[str]) -> tuple[int, str, list[str]]:
-    """Exit status, what it printed, what it said."""
-    out, errors = process.communicate(timeout=PATIENCE_S)
-    assert "Traceback" not in errors
-    return process.returncode, out, errors.splitlines()
+        end(process)
 
 
 def replayed(path: Path, *arguments: str | Path) -> str:
@@ -76,9 +68,9 @@ def messages_in(file: Path) -> int:
 
 def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) -> None:
     file = tmp_path / "drive.mcap"
-    status, out, said = ended(start(file, "--seconds", "1.5"))
+    status, out, said = ended(start(file, "--seconds", str(SECONDS)))
     assert status == 0
-    assert "lcf-edge: stopping: 1.5 s have passed" in said
+    assert f"lcf-edge: stopping: {SECONDS:g} s have passed" in said
     with AnyReader([file]) as reader:
         counts = Counter(connection.topic for connection, _, _ in reader.messages())
     frame_count = counts["/lcf/camera/image_raw/compressed"]
@@ -94,7 +86,7 @@ def test_for_some_seconds_and_the_file_is_whole(start: Start, tmp_path: Path) ->
 
 def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start, tmp_path: Path) -> None:
     folder = tmp_path / "drive"
-    status, out, _ = ended(start(folder, "--seconds", "1.5", "--set", "record.file_s=0.6"))
+    status, out, _ = ended(start(folder, "--seconds", str(SECONDS), "--set", f"record.file_s={0.4 * SECONDS}"))
     assert status == 0
     assert out.startswith(f"{folder}: ")
     files = sorted(path.name for path in folder.glob("*.mcap"))
@@ -114,7 +106,7 @@ def test_without_an_ending_it_is_a_folder_that_is_a_bag_of_rosbag2(start: Start,
 def test_it_publishes_too_and_a_signal_ends_it(start: Start, tmp_path: Path, endpoint: str) -> None:
     file = tmp_path / "drive.mcap"
     process = start(file)
-    seen = iter(scenes(endpoint))
+    seen = scenes_of(process, endpoint)
     published = [next(seen).stamp_ns for _ in range(5)]
     process.send_signal(signal.SIGINT)
     assert ended(process)[0] == 0
@@ -127,10 +119,10 @@ def test_killed_it_leaves_all_but_the_last_second(start: Start, tmp_path: Path, 
     file = tmp_path / "drive.mcap"
     process = start(file)
     last_ns = first_ns = None
-    for scene in scenes(endpoint):
+    for scene in scenes_of(process, endpoint):
         first_ns = first_ns or scene.stamp_ns
         last_ns = scene.stamp_ns
-        if last_ns - first_ns > 3 * 10**9:
+        if last_ns - first_ns > 3e9 * LOST_S:
             break
     process.kill()
     process.wait(PATIENCE_S)

@@ -13,20 +13,18 @@ import pytest
 import zenoh
 
 from lcf_edge.config import Zenoh
-from lcf_edge.zenoh_link import opened_session, scenes
+from lcf_edge.zenoh_link import opened_session
+from tests.lcf_edge.daemon.process import PATIENCE_S, Process, end, ended, scenes_of, wait_for
 
-PATIENCE_S = 30.0
-
-Daemon = subprocess.Popen[str]
-Start = Callable[..., Daemon]
+Start = Callable[..., Process]
 
 
 @pytest.fixture
 def start(drive: Path, endpoint: str, manager: Any, tmp_path: Path) -> Iterator[Start]:
     """Start the daemon on the drive, with more settings."""
-    daemons: list[Daemon] = []
+    daemons: list[Process] = []
 
-    def begin(*settings: str, drives: bool = True, program: tuple[str, ...] = ("-m", "lcf_edge")) -> Daemon:
+    def begin(*settings: str, drives: bool = True, program: tuple[str, ...] = ("-m", "lcf_edge")) -> Process:
         (tmp_path / "config.toml").touch()
         mine = [f'zenoh.listen=["{endpoint}"]']
         if drives:
@@ -39,26 +37,18 @@ def start(drive: Path, endpoint: str, manager: Any, tmp_path: Path) -> Iterator[
             env={**os.environ, **manager.environment},
         )
         daemons.append(daemon)
+        manager.daemon = daemon
         return daemon
 
     yield begin
     for daemon in daemons:
-        if daemon.poll() is None:
-            daemon.kill()
-        daemon.communicate()
-
-
-def ended(daemon: Daemon) -> tuple[int, list[str]]:
-    """Exit status and what it said."""
-    _, errors = daemon.communicate(timeout=PATIENCE_S)
-    assert "Traceback" not in errors
-    return daemon.returncode, errors.splitlines()
+        end(daemon)
 
 
 def test_a_subscriber_receives_scenes_of_now_until_sigterm(start: Start, manager: Any, endpoint: str) -> None:
     daemon = start()
     seen = []
-    for scene in scenes(endpoint):
+    for scene in scenes_of(daemon, endpoint):
         seen.append((time.time_ns(), scene))
         if len(seen) == 10:
             break
@@ -70,7 +60,7 @@ def test_a_subscriber_receives_scenes_of_now_until_sigterm(start: Start, manager
     assert messages[-1] == "READY=1"
     daemon.send_signal(signal.SIGTERM)
     manager.until("STOPPING=1")
-    status, said = ended(daemon)
+    status, _, said = ended(daemon)
     assert status == 0
     assert said[-1] == "lcf-edge: stopping: SIGTERM"
     assert not [line for line in said if "error" in line or "abandoned" in line]
@@ -86,7 +76,7 @@ def test_sigint_ends_it_too_and_sighup_reads_again(start: Start, manager: Any, t
     manager.until("RELOADING=1")  # nobody had to send a signal
     manager.until("READY=1")
     daemon.send_signal(signal.SIGINT)
-    status, said = ended(daemon)
+    status, _, said = ended(daemon)
     assert status == 0
     assert "lcf-edge: reload: changed nothing" in said
     assert "lcf-edge: reload: changed filter.tr_s" in said
@@ -100,19 +90,19 @@ def test_an_uncompiled_filter_is_reported_once_at_the_start(
     daemon = start("camera.device=/dev/no-such-camera", drives=False)
     manager.until("READY=1")
     daemon.terminate()
-    _, said = ended(daemon)
+    _, _, said = ended(daemon)
     assert said[0].startswith("lcf-edge: warning: the filter runs uncompiled, about 100 times slower: LCF_EDGE_PURE")
     assert len([line for line in said if "uncompiled" in line]) == 1
 
 
 def test_after_sigkill_the_next_one_starts(start: Start, manager: Any, endpoint: str) -> None:
     first = start()
-    next(iter(scenes(endpoint)))
+    next(scenes_of(first, endpoint))
     manager.until("READY=1")  # which may come after the first scene
     first.kill()
     first.wait(PATIENCE_S)
     second = start()
-    next(iter(scenes(endpoint)))
+    next(scenes_of(second, endpoint))
     manager.until("READY=1")
     second.terminate()
     assert ended(second)[0] == 0
@@ -124,15 +114,15 @@ def test_without_a_camera_it_lives_and_says_since_when(start: Start, manager: An
     with opened_session(Zenoh(connect=[endpoint], listen=[])) as session:
         handler: Any = zenoh.handlers.RingChannel(4)
         alive: Any = session.liveliness().declare_subscriber("lcf/@alive/*", handler, history=True)
-        assert str(alive.recv().key_expr) == "lcf/@alive/rover"
+        assert str(wait_for(daemon, alive.try_recv).key_expr) == "lcf/@alive/rover"
         alive.undeclare()
         subscriber: Any = session.declare_subscriber("lcf/diagnostics", handler)
-        messages = subscriber.recv().payload.to_bytes()
+        messages = wait_for(daemon, subscriber.try_recv).payload.to_bytes()
         subscriber.undeclare()
     assert b"away since 2" in messages
     assert b"/dev/no-such-camera" in messages
     daemon.terminate()
-    status, said = ended(daemon)
+    status, _, said = ended(daemon)
     assert status == 0
     assert [line for line in said if line.startswith("lcf-edge: error: camera: /dev/no-such-camera")]
 
@@ -147,7 +137,7 @@ def test_without_a_camera_it_lives_and_says_since_when(start: Start, manager: An
     ],
 )
 def test_what_cannot_work_ends_in_one_line(start: Start, settings: tuple[str, ...], status: int, part: str) -> None:
-    code, said = ended(start(*settings))
+    code, _, said = ended(start(*settings))
     assert code == status
     assert part in said[-1]
     assert said[-1].startswith("lcf-edge: ")
@@ -169,9 +159,36 @@ def test_a_clock_that_no_message_can_express_is_no_end(start: Start, manager: An
     for _ in range(3):
         manager.until("STATUS=")
     daemon.terminate()
-    status, said = ended(daemon)
+    status, _, said = ended(daemon)
     assert status == 0
     assert said[-1] == "lcf-edge: stopping: SIGTERM"
+
+
+# A camera that hangs where no clock can stop it, as in a decoder or a broken driver.
+HANGING = """
+import cv2, numpy as np
+from lcf_edge.cli.command_line import program
+from lcf_edge.recording.playback import RecordedCamera
+
+def read_and_hang(camera, read=RecordedCamera.read, seen=[]):
+    while seen:
+        cv2.imdecode(picture, cv2.IMREAD_GRAYSCALE)
+    seen += read(camera)
+    return list(seen)
+
+picture = cv2.imencode(".png", np.random.default_rng(0).integers(0, 256, (600, 800), np.uint8))[1]
+RecordedCamera.read = read_and_hang
+program()
+"""
+
+
+def test_a_device_that_hangs_does_not_keep_it_from_ending_well(start: Start, manager: Any) -> None:
+    daemon = start(program=("-c", HANGING))
+    manager.until("READY=1")
+    daemon.terminate()
+    status, _, said = ended(daemon)
+    assert status == 0
+    assert said[-1] == "lcf-edge: warning: camera: does not end; abandoned"
 
 
 # A stand-in for strangers: whatever opens files in its process once the FIFO is written to, and tries for ever.
@@ -213,8 +230,7 @@ def test_without_descriptors_it_lives_reports_and_reads_its_configuration(
 
 
 def test_two_at_one_port(start: Start, endpoint: str) -> None:
-    start()
-    next(iter(scenes(endpoint)))
-    status, said = ended(start())
+    next(scenes_of(start(), endpoint))
+    status, _, said = ended(start())
     assert status == 1
     assert "already in use" in said[-1]
