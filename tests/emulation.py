@@ -8,7 +8,7 @@ import pytest
 EMULATED = not Path("/proc/self/exe").samefile(sys.executable)
 """Whether the kernel runs another program than this Python: the emulator."""
 
-SLOWNESS = 4 if EMULATED else 1
+SLOWNESS = 10 if EMULATED else 1
 """By how much times are longer there, also in which something must have happened."""
 
 

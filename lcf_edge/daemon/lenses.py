@@ -1,5 +1,6 @@
 """The lens for images of a given size."""
 
+from functools import lru_cache
 from pathlib import Path
 
 from lcf_edge.config import Config
@@ -17,8 +18,14 @@ def known_lens(config: Config, width: int, height: int) -> Lens | None:
     if camera.intrinsics:
         return Lens.from_config(camera, width, height)
     if camera.driver == "recording":
-        from lcf_edge.recording.read import open_recording  # noqa: PLC0415  # a vehicle does not need it
-
-        recorded = open_recording(Path(camera.recording), config).lens
+        recorded = _recorded(camera.recording)
         return recorded and recorded.scaled(width, height)
     return None
+
+
+@lru_cache(maxsize=1)
+def _recorded(recording: str) -> Lens | None:
+    """Read it once: later, when memory is short and half of the corners go, no file may be opened any more."""
+    from lcf_edge.recording.read import open_recording  # noqa: PLC0415  # a vehicle does not need it
+
+    return open_recording(Path(recording), Config()).lens

@@ -15,6 +15,7 @@ import pytest
 from lcf_edge import compilation
 from lcf_edge.compilation import examined, extension, sources, uncompiled
 from release.trial import MAX_EXTENSION_KB
+from tests.emulation import needs_the_processor
 
 ROOT = Path(__file__).parents[2]
 PACKAGE = ROOT / "lcf_edge"
@@ -98,7 +99,7 @@ print(anonymous_kb() - before)
 
 
 @needs_extension
-@pytest.mark.skipif(platform.machine() != "x86_64", reason="an emulator's own memory would count")
+@needs_the_processor("the emulator's own memory counts")
 def test_the_extension_takes_less_than_2_mib_of_memory_besides_the_pages_of_its_file() -> None:
     """Those are the page cache's: shared by all processes, and given up when memory is short."""
     assert int(in_another_process(_MEMORY)) < 2048

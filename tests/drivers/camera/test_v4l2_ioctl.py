@@ -17,6 +17,7 @@ from drivers.errors import (
     UnsupportedSettingError,
     WrongDeviceError,
 )
+from tests.emulation import needs_the_processor
 
 SIZES = {
     v4l2.Capability: 104,
@@ -115,6 +116,7 @@ def test_the_kernels_error_numbers_are_reported_with_a_remedy(number: int, kind:
 class TestLinuxKernel:
     """The real system calls, on files that every Linux has."""
 
+    @needs_the_processor("the emulator itself does not know the request")
     def test_a_request_that_a_file_does_not_know_is_an_error(self) -> None:
         fd = v4l2.LINUX.open("/dev/null")
         with pytest.raises(OSError, match="ioctl") as caught:

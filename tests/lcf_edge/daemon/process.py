@@ -48,6 +48,17 @@ def scenes_of(process: Process, endpoint: str) -> Iterator[Scene]:
     _fail(process)
 
 
+def line_of(process: Process, part: str) -> str:
+    """The next line on its standard error that has ``part`` in it."""
+    assert process.stderr
+    read = []
+    for line in process.stderr:
+        if part in line:
+            return line
+        read.append(line)
+    pytest.fail(f"it has ended without a line with {part!r}: {''.join(read)}")
+
+
 def wait_for(process: Process, look: Callable[[], Found | None]) -> Found:
     """What ``look`` finds, as soon as it finds something."""
     end_s = time.monotonic() + PATIENCE_S

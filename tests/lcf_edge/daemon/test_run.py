@@ -14,7 +14,7 @@ import zenoh
 
 from lcf_edge.config import Zenoh
 from lcf_edge.zenoh_link import opened_session
-from tests.lcf_edge.daemon.process import PATIENCE_S, Process, end, ended, scenes_of, wait_for
+from tests.lcf_edge.daemon.process import PATIENCE_S, Process, end, ended, line_of, scenes_of, wait_for
 
 Start = Callable[..., Process]
 
@@ -144,11 +144,11 @@ def test_what_cannot_work_ends_in_one_line(start: Start, settings: tuple[str, ..
 
 
 LATE = """
-import sys, time
+import time
 now_ns = time.time_ns
 time.time_ns = lambda: now_ns() + {years} * 31_556_952 * 10**9
-from lcf_edge.cli.command_line import main
-sys.exit(main(sys.argv[1:]))
+from lcf_edge.cli.command_line import program
+program()
 """
 
 
@@ -193,8 +193,8 @@ def test_a_device_that_hangs_does_not_keep_it_from_ending_well(start: Start, man
 
 # A stand-in for strangers: whatever opens files in its process once the FIFO is written to, and tries for ever.
 CROWDED = """
-import os, resource, sys, threading
-from lcf_edge.cli.command_line import main
+import os, resource, threading
+from lcf_edge.cli.command_line import program
 
 def crowd():
     open({fifo!r}).close()
@@ -205,8 +205,8 @@ def crowd():
             threading.Event().wait(0.1)
 
 resource.setrlimit(resource.RLIMIT_NOFILE, (256, 256))
-threading.Thread(target=crowd).start()
-sys.exit(main(sys.argv[1:]))
+threading.Thread(target=crowd, daemon=True).start()
+program()
 """
 
 
@@ -218,15 +218,14 @@ def test_without_descriptors_it_lives_reports_and_reads_its_configuration(
     daemon = start(program=("-c", CROWDED.format(fifo=str(fifo))))
     manager.until("READY=1")
     fifo.write_bytes(b"")
-    assert daemon.stderr
-    said = iter(daemon.stderr.readline, "")
-    assert next(line for line in said if "file descriptors" in line)
+    line_of(daemon, "file descriptors")
     written = tmp_path / "config.new"
     written.write_text("[filter]\ntr_s = 3.5\n")
     written.replace(tmp_path / "config.toml")  # at once: half a file would be read, and change nothing
-    assert next(line for line in said if "reload: changed" in line) == "lcf-edge: reload: changed filter.tr_s\n"
+    assert line_of(daemon, "reload: changed") == "lcf-edge: reload: changed filter.tr_s\n"
     manager.until("STATUS=")
-    daemon.send_signal(signal.SIGKILL)  # its crowd never ends
+    daemon.terminate()
+    assert ended(daemon)[0] == 0
 
 
 def test_two_at_one_port(start: Start, endpoint: str) -> None:

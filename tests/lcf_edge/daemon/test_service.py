@@ -21,6 +21,7 @@ from lcf_edge.diagnostics import Level
 from lcf_edge.errors import ConfigError
 from lcf_edge.pipeline import Pipeline
 from lcf_edge.recording.playback import RecordedCamera
+from tests.emulation import needs_the_processor
 
 PATIENCE_S = 20.0
 TICK_S = 0.1
@@ -173,8 +174,6 @@ def test_diagnostics_report_each_part(config: Config, runs: Runs, link: Any) -> 
     assert {"camera", "imu", "speed", "pipeline", "memory", "board", "link"} == set(link.statuses)
     camera, imu, pipeline = (link.statuses[name] for name in ("camera", "imu", "pipeline"))
     assert camera.level is imu.level is Level.OK
-    assert float(camera.values["rate_hz"]) == pytest.approx(20, rel=0.05)
-    assert float(imu.values["rate_hz"]) == pytest.approx(200, rel=0.05)
     assert {"jitter_ms", "age_s", "opened", "overtaken before the pipeline"} <= camera.values.keys()
     assert 0 < float(pipeline.values["latency_p50_ms"]) <= float(pipeline.values["latency_p99_ms"])
     assert pipeline.values["corners_fill"].endswith("/1500")
@@ -185,6 +184,14 @@ def test_diagnostics_report_each_part(config: Config, runs: Runs, link: Any) -> 
     assert abs(float(pipeline.values["camera_yaw_rad"])) < 0.2
     assert pipeline.values["filter"] == ("uncompiled" if uncompiled() else "compiled")
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
+
+
+@needs_the_processor("20 images and 200 samples a second are too many for it")
+def test_diagnostics_report_how_often_devices_deliver(config: Config, runs: Runs, link: Any) -> None:
+    runs.start(config)
+    link.wait_for(lambda: link.statuses and int(link.statuses["pipeline"].values["scenes"]) > 20)
+    assert float(link.statuses["camera"].values["rate_hz"]) == pytest.approx(20, rel=0.05)
+    assert float(link.statuses["imu"].values["rate_hz"]) == pytest.approx(200, rel=0.05)
 
 
 def test_when_no_more_sessions_are_let_in_that_is_reported(config: Config, runs: Runs, link: Any) -> None:

@@ -18,9 +18,11 @@ from lcf_edge.config import Config
 from lcf_edge.errors import RecordingError
 from lcf_edge.recording.read import open_recording
 from lcf_edge.recording.read.images import natural_order
+from tests.emulation import needs_the_processor
 
 Read = Callable[..., tuple[Any, list[Any]]]
 MAX_MIB = 110
+COUNTS_MEMORY = needs_the_processor("the emulator's own memory counts")
 
 
 @pytest.fixture
@@ -135,6 +137,7 @@ def replayed(path: Path) -> tuple[int, int, str]:
     return status, peak_mib, said
 
 
+@COUNTS_MEMORY
 def test_a_header_that_claims_gigabytes_takes_none(video: Path) -> None:
     lying(video, 32_000, 32_000)
     status, peak_mib, said = replayed(video)
@@ -142,6 +145,7 @@ def test_a_header_that_claims_gigabytes_takes_none(video: Path) -> None:
     assert peak_mib < MAX_MIB
 
 
+@COUNTS_MEMORY
 def test_images_larger_than_the_header_says_are_refused_before_they_take_memory(tmp_path: Path) -> None:
     path = tmp_path / "drive.avi"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"MJPG"), 25, (9000, 4000))
@@ -162,6 +166,7 @@ def filmed(path: Path, size: tuple[int, int], frames: int) -> bytes:
     return path.read_bytes()
 
 
+@needs_the_processor("the emulator ignores limits of memory (RLIMIT_DATA)")
 @pytest.mark.parametrize("suffix", [".ts", ".mpg"])
 def test_a_later_image_that_is_larger_than_the_first_takes_no_memory(
     tmp_path: Path, capfd: pytest.CaptureFixture[str], suffix: str
