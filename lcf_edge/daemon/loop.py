@@ -88,8 +88,8 @@ class Loop(threading.Thread):
         self.degradation = Degradation(config)
         self._config = config
         self._pipeline: Pipeline | None = None  # made for the size of the first frame
-        self._shape: tuple[int, int] | None = None
-        self._next: tuple[Config, Pipeline] | None = None
+        self._shape: tuple[int, int] | None = None  # of the images that the pipeline is for
+        self._next: tuple[Config, Pipeline, tuple[int, int]] | None = None
         self._refused_before: Counter[str] = Counter()  # counted by earlier pipelines
         self._mail = mail
         self._link = link
@@ -119,10 +119,10 @@ class Loop(threading.Thread):
 
         If it raises, the old one stays in use. Raises ``LcfError``.
         """
-        height, width = self._shape or (config.camera.height, config.camera.width)
+        height, width = shape = self._shape or (config.camera.height, config.camera.width)
         lens = lens_for(config, width, height)
         try_out(Pipeline(config, lens), width, height)
-        self._next = config, Pipeline(config, lens)
+        self._next = config, Pipeline(config, lens), shape  # meanwhile the images may have become others
 
     def run(self) -> None:
         """Process frames until stopped."""
@@ -165,7 +165,7 @@ class Loop(threading.Thread):
         height, width = frame.image.shape
         pipeline = self._pipeline
         if self._next is not None:
-            (self._config, pipeline), self._next = self._next, None
+            (self._config, pipeline, self._shape), self._next = self._next, None
         if pipeline is None or (height, width) != self._shape:
             pipeline = Pipeline(self._config, lens_for(self._config, width, height))
             self._shape = height, width

@@ -207,6 +207,21 @@ def test_images_of_another_size_get_a_pipeline_of_their_own(start: Start, mail: 
     assert [(scene.image_width, scene.image_height) for scene in link.scenes] == [(640, 480), (320, 240)]
 
 
+def test_a_pipeline_that_was_rebuilt_for_another_size_than_the_images_then_have_is_not_used(
+    plain: Config, start: Start, mail: Mail, link: Any, noise: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def first_image_comes(*_: object) -> None:
+        mail.frames.put(Frame(time.monotonic_ns(), 0, noise(0, 160, 120)))
+        link.wait_for(lambda: len(link.scenes) == 1)
+
+    monkeypatch.setattr("lcf_edge.daemon.loop.try_out", first_image_comes)
+    start(plain).rebuild(plain)
+    for seq in (1, 2):
+        mail.frames.put(Frame(time.monotonic_ns(), seq, noise(seq, 160, 120)))
+        link.wait_for(lambda seq=seq: len(link.scenes) == seq + 1)
+    assert {(scene.image_width, scene.image_height) for scene in link.scenes} == {(160, 120)}
+
+
 def test_a_preview_is_drawn_only_while_somebody_looks(
     plain: Config, start: Start, mail: Mail, link: Any, approach: Any
 ) -> None:
