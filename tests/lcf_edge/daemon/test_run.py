@@ -14,6 +14,7 @@ import zenoh
 
 from lcf_edge.config import Zenoh
 from lcf_edge.zenoh_link import opened_session
+from tests.emulation import EMULATED
 from tests.lcf_edge.daemon.process import PATIENCE_S, Process, end, ended, line_of, scenes_of, wait_for
 
 Start = Callable[..., Process]
@@ -27,6 +28,8 @@ def start(drive: Path, endpoint: str, manager: Any, tmp_path: Path) -> Iterator[
     def begin(*settings: str, drives: bool = True, program: tuple[str, ...] = ("-m", "lcf_edge")) -> Process:
         (tmp_path / "config.toml").touch()
         mine = [f'zenoh.listen=["{endpoint}"]']
+        if EMULATED:
+            mine.append("memory.budget_mib=1000")  # the emulator's own memory counts
         if drives:
             mine += ["camera.driver=recording", f"camera.recording={drive}", "imu.driver=recording"]
         arguments = [argument for setting in (*mine, *settings) for argument in ("--set", setting)]
