@@ -18,6 +18,7 @@ from lcf_edge import __version__
 from release import deb
 from release.bundle import PYTHONS
 from release.debian import MACHINES, run
+from release.foreign_pip import command_for
 
 ROOT = Path(__file__).parents[2]
 PLACE = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["tool"]["lcf-edge"]
@@ -109,6 +110,13 @@ def test_a_python_finds_what_fits_all_and_what_fits_it_alone(tmp_path: Path) -> 
     command = (place / "bin/python", "-P", "-c", "import lcf_edge, mine; lcf_edge.main()")
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     assert done.stdout == "lcf-edge 1.0\n"
+
+
+def test_its_command_is_the_program(tmp_path: Path) -> None:
+    command = tmp_path / "lcf-edge"
+    command.write_text(command_for(sys.executable))
+    command.chmod(0o755)
+    assert run(str(command), "--version") == f"lcf-edge {__version__}\n"
 
 
 def test_a_wheels_name_tells_whether_it_fits_one_python_or_all() -> None:
