@@ -42,6 +42,7 @@ _MAX_CONFIG_BYTES = 2**16
 _ANSWER_S = 5.0
 _FARTHEST = 1e3  # m and s
 _PAUSE_NS = 1_000_000_000  # without scenes; then the rate begins anew
+_LARGEST_LATENCY_S = 60.0  # beyond, a recording is played
 
 
 class Presence(Enum):
@@ -93,7 +94,7 @@ class Snapshot:
     scene: Scene | None
     scene_received_ns: int
     rate_hz: float  # of scenes; NaN: unknown
-    latency_s: float  # from the frame's stamp to its being sent; NaN: unknown
+    latency_s: float  # from the frame's stamp to its being sent; NaN: unknown, or a recording
     diagnostics: DiagnosticArray | None
     diagnostics_received_ns: int
     preview: Preview | None
@@ -279,9 +280,13 @@ def _ahead(toml: bytes) -> Ahead | None:
 
 
 def _latency_s(scene: Scene, sample: zenoh.Sample) -> float:
-    """Latency by the sender's clock alone, s: the attachment has the time of sending."""
+    """Latency by the sender's clock alone, s: the attachment has the time of sending.
+
+    NaN for a recording that is played: its stamps are of when it was made.
+    """
     attachment = sample.attachment
     if attachment is None or len(attachment) != ATTACHMENT.size:
         return math.nan
     sent_ns: int = ATTACHMENT.unpack(attachment.to_bytes())[1]
-    return (sent_ns - scene.stamp_ns) / 1e9
+    latency_s = (sent_ns - scene.stamp_ns) / 1e9
+    return latency_s if abs(latency_s) < _LARGEST_LATENCY_S else math.nan

@@ -19,6 +19,7 @@ from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import MAX_NAME, MAX_ROBOTS, Ahead, Monitor, Presence, Snapshot
 from lcf_edge.zenoh_link import opened_session
+from lcf_edge.zenoh_link.publisher import ATTACHMENT
 
 PATIENCE_S = 20.0
 NOBODY = "tcp/127.0.0.1:1"
@@ -175,6 +176,19 @@ def test_a_scene_too_large_to_be_ours_is_not_kept(endpoint: str) -> None:
             publisher.put(encode_scene(crowd, "camera"))
         assert monitor.snapshot().broken
         assert monitor.snapshot().scene is None
+
+
+@pytest.mark.parametrize(("age_s", "is_live"), [(0.02, True), (30.0, True), (95e6, False), (-95e6, False)])
+def test_a_recording_that_is_played_has_no_latency(endpoint: str, age_s: float, is_live: bool) -> None:
+    sent_ns = time.time_ns()
+    scene = Scene(sent_ns - round(age_s * 1e9), 1, 640, 480, 1.5, np.zeros(0, CIRCLE), np.zeros(0, PSI_REGION))
+    with opened_session(Zenoh(listen=[endpoint])) as session, closing(Watched(endpoint).monitor) as monitor:
+        publisher = session.declare_publisher("lcf/scene")
+        deadline_s = time.monotonic() + PATIENCE_S
+        while monitor.snapshot().scene is None and time.monotonic() < deadline_s:
+            publisher.put(encode_scene(scene, "camera"), attachment=ATTACHMENT.pack(1, sent_ns, 16, bytes(16)))
+        latency_s = monitor.snapshot().latency_s
+    assert latency_s == pytest.approx(age_s) if is_live else math.isnan(latency_s)
 
 
 @pytest.mark.usefixtures("rover")
