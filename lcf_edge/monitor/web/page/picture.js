@@ -76,7 +76,7 @@ export class Picture {
     this.why.hidden = !alone || performance.now() - this.#began < FRESH_MS;
     this.why.textContent = this.#gaveUp
       ? "No images: the daemon gave up the preview to save memory (memory.budget_mib)."
-      : "No images arrive (is publish.preview_hz 0?). Drawn from the scene alone.";
+      : "No images arrive: publish.preview_hz is 0, or a replay publishes, which sends none. Drawn from the scene alone.";
     const behind_s = this.#image && live && !alone ? (this.#scene.stamp_ns - this.#from.stamp_ns) / 1e9 : 0;
     this.behind.hidden = behind_s < BEHIND_S;
     this.behind.textContent = `image ${behind_s.toFixed(1)} s behind`;
