@@ -59,8 +59,7 @@ ALTERATIONS: dict[str, Alteration] = {
 }
 SELECTIONS = {f"from-{first}": slice(first, None) for first in range(10, 61, 10)}
 SELECTIONS |= {"every-second": slice(None, None, 2)}
-ONE_IN = 5  # images dropped, irregularly
-STRIDE = 7919
+DROPPED = 5  # one image in so many
 
 
 def write(recording: Path, into: Path) -> Iterator[str]:
@@ -69,7 +68,7 @@ def write(recording: Path, into: Path) -> Iterator[str]:
     lines = [line for line in source.read_text("utf-8").splitlines() if line.strip()]
     head, rows = [line for line in lines if line.startswith("#")], [line for line in lines if line[0] != "#"]
     selections = {name: rows[chosen] for name, chosen in SELECTIONS.items()}
-    selections["dropped"] = [row for number, row in enumerate(rows) if number * STRIDE % ONE_IN]
+    selections["dropped"] = [row for number, row in enumerate(rows) if number % DROPPED]
     selections |= dict.fromkeys(ALTERATIONS, rows)
     for name, chosen in selections.items():
         copy = into / f"{recording.name}@{name}"

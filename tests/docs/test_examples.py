@@ -122,7 +122,7 @@ def test_the_subscriber_tells_what_the_demo_finds(blocks: Blocks, place: Path, e
 
 def test_a_subscriber_needs_no_more_than_numpy_and_zenoh(endpoint: str) -> None:
     code = (ROOT / "examples/without_lcf_edge.py").read_text(encoding="utf-8")
-    assert not re.search(r"(import|from) lcf_edge", code)
+    assert "lcf_edge" not in code.replace("examples/without_lcf_edge.py", "")
     objects = np.zeros(1, OBJECT)
     objects["class_id"], objects["ttc"], objects["ttc_sigma"] = ObjectClass.CROSSING, 2.5, 0.25
     circles, psi = np.zeros(2, CIRCLE), np.zeros(1, PSI_REGION)
