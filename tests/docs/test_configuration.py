@@ -103,7 +103,7 @@ def test_choices_that_other_pages_list_are_all_there(text: Text, table: str, key
 def four_letters(section: str) -> set[str]:
     """The formats in the first column of a table."""
     cells = (row.split("|")[1] for row in section.splitlines() if row.startswith("| "))
-    return set(re.findall(r"\b(?!MIPI\b)(?:p[A-Za-z]{3}|[A-Z0-9]{3,4})\b", " ".join(cells)))
+    return set(re.findall(r"\b(?:p[A-Za-z]{3}|[A-Z0-9]{3,4})\b", " ".join(cells)))
 
 
 def test_units_of_names_are_explained(text: Text) -> None:
