@@ -29,28 +29,40 @@ Text = Callable[[str], str]
 
 
 def described(kind: inspect.Type) -> str:
-    """A type as the document writes it."""
+    """What a value may be, as the document writes it; empty: anything of its default's type."""
     match kind:
         case inspect.UnionType():
             return next(described(one) for one in kind.types if not isinstance(one, inspect.NoneType))
         case inspect.LiteralType():
             return ", ".join(f"`{value}`" for value in kind.values)
-        case inspect.BoolType():
-            return "boolean"
-        case inspect.StrType():
-            return "text"
+        case inspect.BoolType() | inspect.StrType():
+            return ""
         case inspect.ListType():
-            item = described(kind.item_type)
-            number = isinstance(kind.item_type, inspect.FloatType)
-            return f"list of numbers {item}" if number else "list of " + re.sub(r"^(text|list)", r"\1s", item)
+            return described_list(kind.item_type)
         case inspect.IntType() | inspect.FloatType():
-            if kind.ge is not None and kind.le is not None:
-                limits = f"{kind.ge:g}…{kind.le:g}"
-            else:
-                signs = ((">", kind.gt), ("≥", kind.ge), ("<", kind.lt), ("≤", kind.le))
-                limits = ", ".join(f"{sign} {limit:g}" for sign, limit in signs if limit is not None)
-            return f"integer {limits}".strip() if isinstance(kind, inspect.IntType) else limits
+            return described_range(kind)
     raise AssertionError(kind)
+
+
+def described_list(item: inspect.Type) -> str:
+    if isinstance(item, inspect.ListType):
+        return "list of " + described(item).replace("list", "lists", 1)
+    name = "texts" if isinstance(item, inspect.StrType) else "numbers"
+    return f"list of {name} {described(item)}".strip()
+
+
+def described_range(kind: inspect.IntType | inspect.FloatType) -> str:
+    """Limits as TOML would have them: of integers without a decimal point."""
+
+    def limit(value: float) -> str:
+        if isinstance(kind, inspect.IntType):
+            return str(value)
+        return f"{value:g}" if re.search(r"[.e]", f"{value:g}") else f"{value:g}.0"
+
+    if kind.ge is not None and kind.le is not None:
+        return f"{limit(kind.ge)}…{limit(kind.le)}"
+    signs = ((">", kind.gt), ("≥", kind.ge), ("<", kind.lt), ("≤", kind.le))
+    return ", ".join(f"{sign} {limit(value)}" for sign, value in signs if value is not None)
 
 
 def values(cells: Iterable[tuple[str, str]]) -> dict[str, object]:
@@ -73,7 +85,7 @@ def test_every_key_has_its_type_and_default(rows: Rows, table: str) -> None:
         *_, suffix = key.split("_")
         unit_in_name = "_" in key and suffix in UNITS and key != "tr_s"  # the paper's Tr_s
         units = {""} if unit_in_name else {"", " px", " edges", " grey levels"}
-        assert row[1] in {types[key] + unit for unit in units}, key
+        assert row[1] in {f"{types[key]}{unit}" for unit in units}, key
     defaults = values((key, row[2]) for key, row in written.items() if row[2] != "unset")
     assert defaults == tomllib.loads(to_toml(Config()))[table]
     assert all(row[3] for row in written.values())
