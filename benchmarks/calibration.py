@@ -44,9 +44,11 @@ _QUANTITIES = {  # of an object: the truth's name, whether its error is relative
     "lateral": ("lateral_m", False),
     "closest": ("closest_s", False),
     "bearing": ("bearing_rad", False),
+    "elevation": ("elevation_rad", False),
     "v_forward": ("v_forward_mps", False),
     "v_right": ("v_right_mps", False),
 }
+_SPLIT = ("ttc", "range", "lateral")  # quantities whose sigmas are shown by class and range
 
 Objects = npt.NDArray[np.void]
 
@@ -199,12 +201,14 @@ def _imminent(thing: np.void, half_width_m: float) -> bool:
 
 
 def tables(found: Calibration) -> list[Table]:
-    """Goals first, then errors by class and distance, sigmas, classes, probabilities."""
+    """Goals first, then errors and sigmas by class and distance, classes, probabilities."""
     return [
         _goals(found),
         _errors(found, "class"),
         _errors(found, "range"),
         _sigmas(found),
+        _sigmas_by(found, "class"),
+        _sigmas_by(found, "range"),
         _classes(found),
         _chances(found),
     ]
@@ -263,8 +267,8 @@ def _within(pairs: Iterable[Pair], quantity: str, most: float) -> int:
     return sum(abs(pair.error(quantity)) <= most for pair in pairs)
 
 
-def _errors(found: Calibration, by: str) -> Table:
-    """Median and 90 % of the absolute errors; an infinite one is a contact that the object denies."""
+def _grouped(found: Calibration, by: str) -> dict[str, list[Pair]]:
+    """Return the pairs by their true class or range; no group is empty."""
     groups: dict[str, list[Pair]] = {}
     if by == "class":
         for each in ObjectClass:
@@ -272,8 +276,13 @@ def _errors(found: Calibration, by: str) -> Table:
     else:
         for low, high in pairwise(_BANDS_M):
             groups[f"{low:g} to {high:g} m"] = [pair for pair in found.pairs if low <= pair.body.range_m < high]
+    return {name: pairs for name, pairs in groups.items() if pairs}
+
+
+def _errors(found: Calibration, by: str) -> Table:
+    """Median and 90 % of the absolute errors; an infinite one is a contact that the object denies."""
     rows = []
-    for name, pairs in groups.items():
+    for name, pairs in _grouped(found, by).items():
         cells = []
         for quantity in ("ttc", "range", "lateral", "v_forward", "v_right"):
             chosen = [pair for pair in pairs if pair.near] if quantity in ("ttc", "lateral") else pairs
@@ -281,25 +290,48 @@ def _errors(found: Calibration, by: str) -> Table:
             errors = [error for error in errors if not math.isnan(error)]
             middle, most = np.quantile(errors, (0.5, 0.9), method="lower").tolist() if errors else (math.nan, math.nan)
             cells.append(f"{number(middle, 2)} / {number(most, 2)}")
-        if pairs:
-            rows.append((name, str(len(pairs)), *cells))
+        rows.append((name, str(len(pairs)), *cells))
     heads = (by, "objects", "contact < 4 s, share", "range, share", "lateral < 4 s, m", "forward, m/s", "right, m/s")
     return Table(f"Errors by true {by}, median / 90 %", heads, rows)
 
 
+def _sigmas_off(pairs: Iterable[Pair], quantity: str) -> npt.NDArray[np.float64]:
+    """Errors over their sigmas, of the pairs that have both a truth and a number."""
+    off = np.array([pair.sigmas_off(quantity) for pair in pairs if pair.known(quantity)], dtype=np.float64)
+    return off[np.isfinite(off)]
+
+
+def _inside(off: npt.NDArray[np.float64], most: float) -> str:
+    return _share(int(np.count_nonzero(np.abs(off) <= most)), len(off))
+
+
 def _sigmas(found: Calibration) -> Table:
-    """Shares of the true values within so many sigmas; the median of error over sigma shows a bias."""
+    """Shares of the true values within so many sigmas; the median of error over sigma shows a bias.
+
+    Where an object denies a contact, or does not know a number, there is no sigma to judge: those are counted apart.
+    """
     rows = []
     for quantity in _QUANTITIES:
-        off = np.array([pair.sigmas_off(quantity) for pair in found.pairs if pair.known(quantity)])
-        off = off[np.isfinite(off)]
-        inside = [_share(int(np.count_nonzero(np.abs(off) <= most)), len(off)) for most in (1, 2)]
-        rows.append((quantity, *inside, number(float(np.median(off)) if len(off) else math.nan, 2), str(len(off))))
+        off = _sigmas_off(found.pairs, quantity)
+        known = sum(pair.known(quantity) for pair in found.pairs)
+        bias = number(float(np.median(off)) if len(off) else math.nan, 2)
+        rows.append(
+            (quantity, _inside(off, 1), _inside(off, 2), bias, str(len(off)), _share(known - len(off), known)),
+        )
     return Table(
         "Truths inside (goals: one sigma 60 to 75 %, two 90 to 97 %)",
-        ("", "1 sigma", "2 sigma", "bias, sigma", "of"),
+        ("", "1 sigma", "2 sigma", "bias, sigma", "of", "no number"),
         rows,
     )
+
+
+def _sigmas_by(found: Calibration, by: str) -> Table:
+    """Shares of the true values within one and two sigmas."""
+    rows = []
+    for name, pairs in _grouped(found, by).items():
+        offs = [_sigmas_off(pairs, quantity) for quantity in _SPLIT]
+        rows.append((name, *(f"{_inside(off, 1)}, {_inside(off, 2)} of {len(off)}" for off in offs)))
+    return Table(f"Truths inside one and two sigmas, by true {by}", (by, *_SPLIT), rows)
 
 
 def _classes(found: Calibration) -> Table:

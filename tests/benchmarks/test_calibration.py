@@ -25,6 +25,7 @@ WALKER = Exact(
     visible=1.0,
     range_m=5.0,
     bearing_rad=0.0,
+    elevation_rad=0.0,
     beside_m=0.1,
     v_forward_mps=0.0,
     v_right_mps=1.0,
@@ -77,6 +78,27 @@ def test_honest_sigmas_hold_68_and_95_percent_of_the_truths() -> None:
     one, two, *_ = rows("Truths inside", seen(*frames))["lateral"]
     assert float(one.split()[0]) == pytest.approx(68.3, abs=3)
     assert float(two.split()[0]) == pytest.approx(95.4, abs=1.5)
+
+
+def test_sigmas_are_shown_by_class_and_by_range() -> None:
+    near = replace(WALKER, range_m=2.0, class_id=ObjectClass.ONCOMING)
+    found = seen(
+        (reported(WALKER, range=5.5, range_sigma=0.4), [WALKER]),
+        (reported(near, range=5.5, range_sigma=0.4), [near]),
+    )
+    both = {**rows("Truths inside one and two sigmas, by true class", found)}
+    both |= rows("Truths inside one and two sigmas, by true range", found)
+    assert {name: cells[1] for name, cells in both.items()} == {
+        "crossing": "0.0 %, 100.0 % of 1",
+        "oncoming": "0.0 %, 0.0 % of 1",
+        "3 to 6 m": "0.0 %, 100.0 % of 1",
+        "0 to 3 m": "0.0 %, 0.0 % of 1",
+    }
+
+
+def test_a_contact_denied_has_no_sigma_and_is_counted_apart() -> None:
+    found = seen((reported(WALKER), [WALKER]), (reported(WALKER, ttc=math.inf, ttc_sigma=math.nan), [WALKER]))
+    assert rows("Truths inside", found)["ttc"] == ("100.0 %", "100.0 %", "0.00", "1", "50.0 %")
 
 
 def test_two_objects_on_one_walker_are_several_and_another_id_ends_a_life() -> None:
