@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from tqdm import tqdm
 
+from benchmarks import report
 from benchmarks.drivers import CIRCLES, OBJECTS, TruthDriver, method_of, objects_of_circles, reported_objects
 from benchmarks.methods import FILTER
 from benchmarks.playing import config_of, play_drive
@@ -27,6 +28,7 @@ from hil_mocks.closed_loop.exact import Exact, exact_of_drive
 from hil_mocks.closed_loop.loop import Moment, drive
 from hil_mocks.closed_loop.world import World
 from lcf_edge.messages import ObjectClass, ObjectState, Scene
+from lcf_edge.printable import counted
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.projection import Stage
 
@@ -409,7 +411,7 @@ def play(kinds: Iterable[str], seeds: Sequence[int], found: Calibration, of: str
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables."""
+    """Print the tables, and write them to ``benchmarks/results``."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--worlds", type=int, default=8, help="of the closed loop (default 8)")
     parser.add_argument("--seed", type=int, default=0, help="of the first of them (default 0)")
@@ -430,7 +432,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for done in each:
                 bar.update()
                 bar.set_postfix_str(done)
-    sys.stdout.write("\n\n".join(table.markdown() for table in tables(found)) + "\n")
+    played = [f"worlds {seeds[0]} to {seeds[-1]}"] if seeds else []
+    if kinds:
+        played.append(f"{counted(options.drives, 'rendered drive')} of each of {counted(len(kinds), 'kind')}")
+    title = f"Calibration of {options.of}: {', and '.join(played) or 'nothing'}"
+    name = "calibration" if options.of == OBJECTS else f"calibration_{options.of}"
+    data = {"of": options.of, "worlds": list(seeds), "kinds": kinds, "drives": options.drives}
+    written = tables(found)
+    sys.stdout.write(report.write(name, title, written, {**data, "tables": written}) + "\n")
     return 0
 
 

@@ -1,14 +1,16 @@
 """Whether the calibration counts what it says, with objects made by hand."""
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import calibration
+from benchmarks import calibration, report
 from benchmarks.calibration import Calibration, match, tables
 from benchmarks.drivers import NAMES, TRUTH, driver, objects_of_circles
 from hil_mocks.closed_loop import worlds
@@ -140,13 +142,21 @@ def test_the_tables_of_nothing_are_empty() -> None:
     assert rows("Goals", Calibration())["walkers: one object"][1] == "-"
 
 
-def test_it_runs_on_rendered_drives(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_runs_on_rendered_drives(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(report, "RESULTS", tmp_path)
     make = calibration.scenes.make
     monkeypatch.setattr(
         calibration.scenes, "make", lambda kind, seed: make(kind, seed, seconds=1.0, width=320, height=240)
     )
     assert calibration.main(["--worlds", "0", "--kinds", "crossing", "--drives", "1", "--of", "circles"]) == 0
-    assert "### Goals" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "# Calibration of circles: 1 rendered drive of each of 1 kind" in printed
+    assert "### Goals" in printed
+    assert (tmp_path / "calibration_circles.md").read_text(encoding="utf-8") in printed
+    written = json.loads((tmp_path / "calibration_circles.json").read_text(encoding="utf-8"))
+    assert [table["title"] for table in written["tables"]] == [table.title for table in tables(Calibration())]
 
 
 # What circles tell a planner.
