@@ -18,6 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from tqdm import tqdm
 
+from benchmarks import report
 from benchmarks.drivers import CIRCLES, OBJECTS, TruthDriver, method_of, objects_of_circles, reported_objects
 from benchmarks.methods import FILTER
 from benchmarks.playing import config_of, play_drive
@@ -27,6 +28,7 @@ from hil_mocks.closed_loop.exact import Exact, exact_of_drive
 from hil_mocks.closed_loop.loop import Moment, drive
 from hil_mocks.closed_loop.world import World
 from lcf_edge.messages import ObjectClass, ObjectState, Scene
+from lcf_edge.printable import counted
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.projection import Stage
 
@@ -44,9 +46,11 @@ _QUANTITIES = {  # of an object: the truth's name, whether its error is relative
     "lateral": ("lateral_m", False),
     "closest": ("closest_s", False),
     "bearing": ("bearing_rad", False),
+    "elevation": ("elevation_rad", False),
     "v_forward": ("v_forward_mps", False),
     "v_right": ("v_right_mps", False),
 }
+_SPLIT = ("ttc", "range", "lateral")  # quantities whose sigmas are shown by class and range
 
 Objects = npt.NDArray[np.void]
 
@@ -199,12 +203,14 @@ def _imminent(thing: np.void, half_width_m: float) -> bool:
 
 
 def tables(found: Calibration) -> list[Table]:
-    """Goals first, then errors by class and distance, sigmas, classes, probabilities."""
+    """Goals first, then errors and sigmas by class and distance, classes, probabilities."""
     return [
         _goals(found),
         _errors(found, "class"),
         _errors(found, "range"),
         _sigmas(found),
+        _sigmas_by(found, "class"),
+        _sigmas_by(found, "range"),
         _classes(found),
         _chances(found),
     ]
@@ -263,8 +269,8 @@ def _within(pairs: Iterable[Pair], quantity: str, most: float) -> int:
     return sum(abs(pair.error(quantity)) <= most for pair in pairs)
 
 
-def _errors(found: Calibration, by: str) -> Table:
-    """Median and 90 % of the absolute errors; an infinite one is a contact that the object denies."""
+def _grouped(found: Calibration, by: str) -> dict[str, list[Pair]]:
+    """Return the pairs by their true class or range; no group is empty."""
     groups: dict[str, list[Pair]] = {}
     if by == "class":
         for each in ObjectClass:
@@ -272,8 +278,13 @@ def _errors(found: Calibration, by: str) -> Table:
     else:
         for low, high in pairwise(_BANDS_M):
             groups[f"{low:g} to {high:g} m"] = [pair for pair in found.pairs if low <= pair.body.range_m < high]
+    return {name: pairs for name, pairs in groups.items() if pairs}
+
+
+def _errors(found: Calibration, by: str) -> Table:
+    """Median and 90 % of the absolute errors; an infinite one is a contact that the object denies."""
     rows = []
-    for name, pairs in groups.items():
+    for name, pairs in _grouped(found, by).items():
         cells = []
         for quantity in ("ttc", "range", "lateral", "v_forward", "v_right"):
             chosen = [pair for pair in pairs if pair.near] if quantity in ("ttc", "lateral") else pairs
@@ -281,25 +292,48 @@ def _errors(found: Calibration, by: str) -> Table:
             errors = [error for error in errors if not math.isnan(error)]
             middle, most = np.quantile(errors, (0.5, 0.9), method="lower").tolist() if errors else (math.nan, math.nan)
             cells.append(f"{number(middle, 2)} / {number(most, 2)}")
-        if pairs:
-            rows.append((name, str(len(pairs)), *cells))
+        rows.append((name, str(len(pairs)), *cells))
     heads = (by, "objects", "contact < 4 s, share", "range, share", "lateral < 4 s, m", "forward, m/s", "right, m/s")
     return Table(f"Errors by true {by}, median / 90 %", heads, rows)
 
 
+def _sigmas_off(pairs: Iterable[Pair], quantity: str) -> npt.NDArray[np.float64]:
+    """Errors over their sigmas, of the pairs that have both a truth and a number."""
+    off = np.array([pair.sigmas_off(quantity) for pair in pairs if pair.known(quantity)], dtype=np.float64)
+    return off[np.isfinite(off)]
+
+
+def _inside(off: npt.NDArray[np.float64], most: float) -> str:
+    return _share(int(np.count_nonzero(np.abs(off) <= most)), len(off))
+
+
 def _sigmas(found: Calibration) -> Table:
-    """Shares of the true values within so many sigmas; the median of error over sigma shows a bias."""
+    """Shares of the true values within so many sigmas; the median of error over sigma shows a bias.
+
+    Where an object denies a contact, or does not know a number, there is no sigma to judge: those are counted apart.
+    """
     rows = []
     for quantity in _QUANTITIES:
-        off = np.array([pair.sigmas_off(quantity) for pair in found.pairs if pair.known(quantity)])
-        off = off[np.isfinite(off)]
-        inside = [_share(int(np.count_nonzero(np.abs(off) <= most)), len(off)) for most in (1, 2)]
-        rows.append((quantity, *inside, number(float(np.median(off)) if len(off) else math.nan, 2), str(len(off))))
+        off = _sigmas_off(found.pairs, quantity)
+        known = sum(pair.known(quantity) for pair in found.pairs)
+        bias = number(float(np.median(off)) if len(off) else math.nan, 2)
+        rows.append(
+            (quantity, _inside(off, 1), _inside(off, 2), bias, str(len(off)), _share(known - len(off), known)),
+        )
     return Table(
         "Truths inside (goals: one sigma 60 to 75 %, two 90 to 97 %)",
-        ("", "1 sigma", "2 sigma", "bias, sigma", "of"),
+        ("", "1 sigma", "2 sigma", "bias, sigma", "of", "no number"),
         rows,
     )
+
+
+def _sigmas_by(found: Calibration, by: str) -> Table:
+    """Shares of the true values within one and two sigmas."""
+    rows = []
+    for name, pairs in _grouped(found, by).items():
+        offs = [_sigmas_off(pairs, quantity) for quantity in _SPLIT]
+        rows.append((name, *(f"{_inside(off, 1)}, {_inside(off, 2)} of {len(off)}" for off in offs)))
+    return Table(f"Truths inside one and two sigmas, by true {by}", (by, *_SPLIT), rows)
 
 
 def _classes(found: Calibration) -> Table:
@@ -377,7 +411,7 @@ def play(kinds: Iterable[str], seeds: Sequence[int], found: Calibration, of: str
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Print the tables."""
+    """Print the tables, and write them to ``benchmarks/results``."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.calibration", description=__doc__)
     parser.add_argument("--worlds", type=int, default=8, help="of the closed loop (default 8)")
     parser.add_argument("--seed", type=int, default=0, help="of the first of them (default 0)")
@@ -398,7 +432,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
             for done in each:
                 bar.update()
                 bar.set_postfix_str(done)
-    sys.stdout.write("\n\n".join(table.markdown() for table in tables(found)) + "\n")
+    played = [f"worlds {seeds[0]} to {seeds[-1]}"] if seeds else []
+    if kinds:
+        played.append(f"{counted(options.drives, 'rendered drive')} of each of {counted(len(kinds), 'kind')}")
+    title = f"Calibration of {options.of}: {', and '.join(played) or 'nothing'}"
+    name = "calibration" if options.of == OBJECTS else f"calibration_{options.of}"
+    data = {"of": options.of, "worlds": list(seeds), "kinds": kinds, "drives": options.drives}
+    written = tables(found)
+    sys.stdout.write(report.write(name, title, written, {**data, "tables": written}) + "\n")
     return 0
 
 

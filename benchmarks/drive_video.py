@@ -64,8 +64,7 @@ def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps
         low, high = (tuple(np.rint(corner).astype(int).tolist()) for corner in (middle - half, middle + half))
         cv2.rectangle(image, low, high, _BLACK, 3)
         cv2.rectangle(image, low, high, colour, 2 if thing["probability"] >= 0.3 else 1)
-        text = f"{thing['id']} {kind.name.lower()} {thing['ttc']:.1f}s {thing['range']:.1f}m {thing['lateral']:+.1f}"
-        _write(image, text, (max(low[0], 2), max(low[1] - HEIGHT_PX - 5, 20)), colour)
+        _write(image, label(thing), (max(low[0], 2), max(low[1] - HEIGHT_PX - 5, 20)), colour)
     height = image.shape[0]
     braking = target_mps < 0.95 * moment.cruise_mps
     text = (
@@ -74,6 +73,17 @@ def draw(moment: Moment, scene: Scene, objects: npt.NDArray[np.void], target_mps
     _write(image, text, (8, height - HEIGHT_PX - 6), _RED if braking else _GREEN)
     _write(image, ", ".join(scene.notes), (8, 4), _WHITE)
     return image
+
+
+def label(thing: np.void) -> str:
+    """Id, class, and what is known of contact, range and lateral miss, each with one sigma."""
+    parts = [f"{thing['id']} {ObjectClass(int(thing['class_id'])).name.lower().replace('_', ' ')}"]
+    for name, unit, form in (("ttc", " s", ".1f"), ("range", " m", ".1f"), ("lateral", " m aside", "+.1f")):
+        if np.isfinite(thing[name]):
+            sigma = thing[f"{name}_sigma"]
+            spread = f" ±{sigma:.1f}" if np.isfinite(sigma) else ""
+            parts.append(f"{thing[name]:{form}}{spread}{unit}")
+    return ", ".join(parts)
 
 
 def _write(image: Image, text: str, at: tuple[int, int], colour: Colour) -> None:

@@ -13,6 +13,8 @@ slow enough to stop before what it would come near to. The fastest good speed is
   path in time costs no stop.
 - What stands is in the way if its probability of being met is at least ``CHANCE``. While that is not known, because the
   vehicle stands or is slow, its lateral miss tells, with its sigma.
+- It comes near from ``gap_m`` before it until the vehicle's length and ``BEHIND_M`` beyond it. Of half its box's width
+  at most ``HALF_STANDS_M`` or ``HALF_MOVES_M`` counts. The way in which what goes ahead can stop is added to its range.
 - Where the range is unknown, the time to contact stands in for it. What has neither range nor contact is left out.
 - A vehicle that rests waits for whatever moves nearer than ``CLOSE_M``: so near it fills the image, and its numbers are
   worth least.
@@ -37,6 +39,8 @@ REST_S = 1.0  # and before a vehicle that rests starts: what rests with it can b
 RESTS_MPS = 0.05
 CLOSE_M = 1.5
 AROUND_S = 0.25  # of its own motion is left before and behind what crosses
+BEHIND_M = 0.5
+HALF_STANDS_M, HALF_MOVES_M = 0.3, 0.5  # a wider box may hold more than one thing
 
 _normal = np.vectorize(lambda sigmas: 0.5 * (1 + erf(sigmas / 2**0.5)), otypes=[float])
 
@@ -71,7 +75,8 @@ def good_speed(
     forward, right, right_sigma = (
         np.nan_to_num(objects[name])[:, None] for name in ("v_forward", "v_right", "v_right_sigma")
     )
-    half = np.minimum(objects["width"][:, None] / 2 / vehicle.focal_px * ahead, np.where(stands, 0.3, 0.5)[:, None])
+    most = np.where(stands, HALF_STANDS_M, HALF_MOVES_M)[:, None]
+    half = np.minimum(objects["width"][:, None] / 2 / vehicle.focal_px * ahead, most)
 
     time = np.arange(0.0, HORIZON_S, STEP_S)
     z = ahead + forward * time  # (objects, times)
@@ -89,10 +94,10 @@ def good_speed(
     driven = np.maximum(time - vehicle.delay_s, 0.0)
     faster = np.minimum(speeds, speed + vehicle.acceleration_mps2 * driven)
     way = np.cumsum(np.maximum(faster, np.minimum(speed, speed - vehicle.braking_mps2 * driven)), axis=1) * STEP_S
-    near = (z - vehicle.gap_m < way[:, None]) & (z + vehicle.length_m + 0.5 > way[:, None])
+    near = (z - vehicle.gap_m < way[:, None]) & (z + vehicle.length_m + BEHIND_M > way[:, None])
     meets = (in_way & near).any(axis=2)  # (speeds, objects)
     left = np.where(in_way, z, np.inf).min(axis=1) - vehicle.gap_m
-    left += np.maximum(forward[:, 0], 0.0) ** 2 / 2 / vehicle.braking_mps2  # who leads needs a way to stop, too
+    left += np.maximum(forward[:, 0], 0.0) ** 2 / 2 / vehicle.braking_mps2
     a, delay = vehicle.braking_mps2, vehicle.delay_s
     stops = a * (np.sqrt(delay**2 + 2 * np.maximum(left, 0.0) / a) - delay)
     good = (~meets | (speeds <= stops)).all(axis=1)

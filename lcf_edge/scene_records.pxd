@@ -27,7 +27,7 @@ cdef double elevation(ImagePlane plane, double right, double y) noexcept nogil
 @cython.locals(i=cython.Py_ssize_t, n=int, square=int, support=cython.uint, owned=bint, right=double)
 cpdef void add_circles(Records records, CircleColumns table, ObjectColumns objects, int kind, ImagePlane plane,
                        double min_trust) noexcept
-@cython.locals(i=cython.Py_ssize_t, n=int, support=cython.uint, right=double)
+@cython.locals(i=cython.Py_ssize_t, n=int, support=cython.uint, right=double, slant=double, down=double)
 cpdef void add_objects(Records records, ObjectColumns table, ImagePlane plane, double min_trust) noexcept
 @cython.locals(i=cython.Py_ssize_t, n=int)
 cpdef void add_psi(Records records, PsiColumns table, ImagePlane plane) noexcept

@@ -87,7 +87,7 @@ def add_circles(
         else:
             floats[n, 8], floats[n, 11], floats[n, 12] = INF, NAN, NAN
         square = table.square[i]
-        owned = kind == REBEL and square >= 0 and objects.trust[square] >= min_trust
+        owned = kind == REBEL and square >= 0 and objects.active[square] and objects.trust[square] >= min_trust
         records.owner[n] = objects.id[square] if owned else 0
         records.count += 1
 
@@ -104,9 +104,11 @@ def add_objects(records: Records, table: ObjectColumns, plane: ImagePlane, min_t
         records.words[n, 1] = table.class_id[i] | table.state[i] << 8 | support << 16
         floats[n, 4], floats[n, 5] = table.width[i], table.height[i]
         floats[n, 6], floats[n, 7] = table.ttc[i], table.ttc_sigma[i]
-        floats[n, 8], floats[n, 9] = math.atan(right), BEARING_SHARE * table.width[i] / plane.fx
+        # the same extent is a smaller angle the farther from the axis
+        slant, down = 1 + right * right, (table.y[i] - plane.cy) / plane.fy
+        floats[n, 8], floats[n, 9] = math.atan(right), BEARING_SHARE * table.width[i] / plane.fx / slant
         floats[n, 10] = elevation(plane, right, table.y[i])
-        floats[n, 11] = BEARING_SHARE * table.height[i] / plane.fy
+        floats[n, 11] = BEARING_SHARE * table.height[i] / plane.fy * math.sqrt(slant) / (slant + down * down)
         floats[n, 12], floats[n, 13] = table.range[i], table.range_sigma[i]
         floats[n, 14], floats[n, 15] = table.lateral[i], table.lateral_sigma[i]
         floats[n, 16], floats[n, 17] = table.forward[i], table.forward_sigma[i]

@@ -39,6 +39,7 @@ class Exact:
     visible: float  # share of its area that nothing nearer hides
     range_m: float  # ahead of the camera, to its nearest corner
     bearing_rad: float  # of the middle of its box
+    elevation_rad: float
     beside_m: float  # of its middle from the path now
     v_forward_mps: float  # over ground
     v_right_mps: float
@@ -76,7 +77,8 @@ def exact(stage: Stage, view: View, motion: Motion, footprints: Floats, velociti
         right, forward = moving[row].tolist()
         middle = corners[row].mean(axis=0).tolist()
         beside = middle[0] + motion.curvature * middle[1] ** 2 / 2
-        across = box[0] + box[2] / 2 - stage.optics.lens.matrix[0, 2]
+        across, down = (np.array(box[:2]) + np.array(box[2:]) / 2 - stage.optics.lens.matrix[:2, 2]).tolist()
+        focal = drive.lens.focal_px
         found.append(
             Exact(
                 placed.number,
@@ -84,7 +86,8 @@ def exact(stage: Stage, view: View, motion: Motion, footprints: Floats, velociti
                 box,
                 visible,
                 way.depth_m,
-                math.atan2(across, drive.lens.focal_px),
+                math.atan2(across, focal),
+                math.atan2(-down, math.hypot(focal, across)),
                 beside,
                 forward,
                 right,
@@ -140,12 +143,12 @@ class Memory:
             values = {
                 "ttc": each.ttc_s,
                 "bearing": each.bearing_rad,
+                "elevation": each.elevation_rad,
                 "range": each.range_m,
                 "lateral": each.lateral_m if math.isfinite(each.lateral_m) or each.moving else each.beside_m,
                 "v_forward": each.v_forward_mps,
                 "v_right": each.v_right_mps,
                 "closest": each.closest_s,
-                "elevation": math.nan,
             }
             for name, value in values.items():
                 row[name] = value

@@ -116,7 +116,8 @@ def demo(folder: Path, seconds: float, say: Say) -> None:
         *summary.lines(recording.skipped),
         f"memory   {memory_mib:.0f} MiB at most, of the process that filters and publishes",
         f"received {received.scenes} of {publisher.sent} scenes in the second process, "
-        f"{received.bytes / 1e3:.0f} kB, {counted(received.circles, 'circle')}, {received.broken} broken",
+        f"{received.bytes / 1e3:.0f} kB, {counted(received.objects, 'object')}, {counted(received.circles, 'circle')}, "
+        f"{received.broken} broken",
         "",
         *_next_lines(folder, default, endpoint == default),
     ):
@@ -235,7 +236,7 @@ def _next_lines(folder: Path, endpoint: str, free: bool) -> list[str]:
     what = f"{shlex.quote(str(folder / 'recording'))} -c {shlex.quote(str(folder / 'config.toml'))}"
     code = (
         "from lcf_edge.client import scenes; "
-        f"[print(s.seq, s.circles[['cause', 'x', 'y', 'ttc']]) for s in scenes('{endpoint}')]"
+        f"[print(s.seq, s.objects[['class_id', 'range', 'ttc', 'ttc_sigma']]) for s in scenes('{endpoint}')]"
     )
     return [
         "To look at it in a browser:",

@@ -25,6 +25,7 @@ class Received(msgspec.Struct):
     scenes: int = 0
     bytes: int = 0
     broken: int = 0  # not decodable, or not encoded as a scene
+    objects: int = 0
     circles: int = 0
 
 
@@ -36,14 +37,16 @@ def receive(endpoint: str, key: str) -> Received:
     def take(sample: zenoh.Sample) -> None:
         payload = sample.payload.to_bytes()
         try:
-            circles = len(decode_scene(payload).circles)
+            scene = decode_scene(payload)
+            objects, circles = len(scene.objects), len(scene.circles)
             broken = str(sample.encoding) != SCENE_ENCODING
         except CdrError:
-            circles, broken = 0, True
+            objects, circles, broken = 0, 0, True
         with arrived:
             received.scenes += 1
             received.bytes += len(payload)
             received.broken += broken
+            received.objects += objects
             received.circles += circles
             arrived.notify()
 

@@ -1,14 +1,16 @@
 """Whether the calibration counts what it says, with objects made by hand."""
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from benchmarks import calibration
+from benchmarks import calibration, report
 from benchmarks.calibration import Calibration, match, tables
 from benchmarks.drivers import NAMES, TRUTH, driver, objects_of_circles
 from hil_mocks.closed_loop import worlds
@@ -25,6 +27,7 @@ WALKER = Exact(
     visible=1.0,
     range_m=5.0,
     bearing_rad=0.0,
+    elevation_rad=0.0,
     beside_m=0.1,
     v_forward_mps=0.0,
     v_right_mps=1.0,
@@ -79,6 +82,27 @@ def test_honest_sigmas_hold_68_and_95_percent_of_the_truths() -> None:
     assert float(two.split()[0]) == pytest.approx(95.4, abs=1.5)
 
 
+def test_sigmas_are_shown_by_class_and_by_range() -> None:
+    near = replace(WALKER, range_m=2.0, class_id=ObjectClass.ONCOMING)
+    found = seen(
+        (reported(WALKER, range=5.5, range_sigma=0.4), [WALKER]),
+        (reported(near, range=5.5, range_sigma=0.4), [near]),
+    )
+    both = {**rows("Truths inside one and two sigmas, by true class", found)}
+    both |= rows("Truths inside one and two sigmas, by true range", found)
+    assert {name: cells[1] for name, cells in both.items()} == {
+        "crossing": "0.0 %, 100.0 % of 1",
+        "oncoming": "0.0 %, 0.0 % of 1",
+        "3 to 6 m": "0.0 %, 100.0 % of 1",
+        "0 to 3 m": "0.0 %, 0.0 % of 1",
+    }
+
+
+def test_a_contact_denied_has_no_sigma_and_is_counted_apart() -> None:
+    found = seen((reported(WALKER), [WALKER]), (reported(WALKER, ttc=math.inf, ttc_sigma=math.nan), [WALKER]))
+    assert rows("Truths inside", found)["ttc"] == ("100.0 %", "100.0 %", "0.00", "1", "50.0 %")
+
+
 def test_two_objects_on_one_walker_are_several_and_another_id_ends_a_life() -> None:
     twice = np.concatenate([reported(WALKER), reported(WALKER, id=9)])
     other = reported(WALKER, id=9)
@@ -118,13 +142,21 @@ def test_the_tables_of_nothing_are_empty() -> None:
     assert rows("Goals", Calibration())["walkers: one object"][1] == "-"
 
 
-def test_it_runs_on_rendered_drives(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_it_runs_on_rendered_drives(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    monkeypatch.setattr(report, "RESULTS", tmp_path)
     make = calibration.scenes.make
     monkeypatch.setattr(
         calibration.scenes, "make", lambda kind, seed: make(kind, seed, seconds=1.0, width=320, height=240)
     )
     assert calibration.main(["--worlds", "0", "--kinds", "crossing", "--drives", "1", "--of", "circles"]) == 0
-    assert "### Goals" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "# Calibration of circles: 1 rendered drive of each of 1 kind" in printed
+    assert "### Goals" in printed
+    assert (tmp_path / "calibration_circles.md").read_text(encoding="utf-8") in printed
+    written = json.loads((tmp_path / "calibration_circles.json").read_text(encoding="utf-8"))
+    assert [table["title"] for table in written["tables"]] == [table.title for table in tables(Calibration())]
 
 
 # What circles tell a planner.

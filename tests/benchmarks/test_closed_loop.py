@@ -4,13 +4,15 @@ import json
 from pathlib import Path
 
 import cv2
+import numpy as np
 import pytest
 
-from benchmarks import closed_loop, report
+from benchmarks import closed_loop, drive_video, report
 from benchmarks.drivers import NAMES
 from hil_mocks.closed_loop import worlds
 from hil_mocks.closed_loop.course import Course
 from hil_mocks.closed_loop.world import World
+from lcf_edge.messages import OBJECT, ObjectClass
 from lcf_edge.rendered.drives import Lens
 
 
@@ -43,6 +45,16 @@ def test_tables_and_video_are_written(short: Path, capsys: pytest.CaptureFixture
     shown, image = cv2.VideoCapture(str(film)).read()
     assert shown
     assert image.shape == (240, 320, 3)
+
+
+def test_what_is_unknown_of_an_object_is_not_written_into_the_video() -> None:
+    thing = np.zeros(1, OBJECT)
+    thing["id"], thing["class_id"] = 7, ObjectClass.CUTTING_IN
+    for name, value, sigma in (("ttc", 2.14, 0.3), ("range", 3.0, 0.52), ("lateral", -0.8, np.nan)):
+        thing[name], thing[f"{name}_sigma"] = value, sigma
+    assert drive_video.label(thing[0]) == "7 cutting in, 2.1 ±0.3 s, 3.0 ±0.5 m, -0.8 m aside"
+    thing["ttc"], thing["range"], thing["lateral"] = np.inf, np.nan, np.nan
+    assert drive_video.label(thing[0]) == "7 cutting in"
 
 
 def test_the_same_worlds_give_the_same_outcomes(short: Path) -> None:

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from examples.planner import CLOSE_M, PATIENCE_S, REST_S, Planner, Vehicle, good_speed
+from examples.planner import CLOSE_M, HALF_STANDS_M, PATIENCE_S, REST_S, Planner, Vehicle, good_speed
 from lcf_edge.messages import OBJECT, ObjectClass
 
 VEHICLE = Vehicle()
@@ -82,6 +82,20 @@ def test_it_slows_down_for_who_will_be_in_the_way() -> None:
 
 def test_who_walks_away_to_the_side_is_left_alone() -> None:
     assert good_speed(crossing(1.5, 3.0, 1.2), CRUISE, CRUISE, VEHICLE) == CRUISE
+
+
+def test_of_a_wide_box_no_more_than_the_rule_says_counts() -> None:
+    reach_m = VEHICLE.half_width_m + VEHICLE.margin_m
+    unjudged = {"range": 0.6, "lateral_sigma": 0.01, "closest": math.nan, "probability": 0.0, "width": 5000}
+    beside, before = (thing(lateral=reach_m + HALF_STANDS_M + aside, **unjudged) for aside in (0.1, -0.1))
+    assert good_speed(beside, 0.0, CRUISE, VEHICLE) == CRUISE
+    assert good_speed(before, 0.0, CRUISE, VEHICLE) == 0.0
+
+
+def test_what_goes_ahead_leaves_its_own_way_to_stop() -> None:
+    stays, leads = (crossing(0.0, 1.2, 0.0, v_forward=ahead_mps) for ahead_mps in (0.0, 1.0))
+    slow, fast = (good_speed(each, CRUISE, CRUISE, VEHICLE) for each in (stays, leads))
+    assert slow < fast
 
 
 def test_the_time_to_contact_stands_in_for_an_unknown_range() -> None:

@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from drivers.samples import Frame, ImuSample, SpeedSample
 from hil_mocks.closed_loop import worlds
 from hil_mocks.closed_loop.course import Course
+from hil_mocks.closed_loop.events import BLOCKED, EVENTS
 from hil_mocks.closed_loop.exact import Exact, Memory, exact_of_drive
 from hil_mocks.closed_loop.live import LiveDriver, world_of
 from hil_mocks.closed_loop.loop import Contact, Log, Moment, drive
@@ -196,9 +197,53 @@ def test_the_truth_of_a_rendered_drive_is_that_of_its_scenes() -> None:
                 assert same.moving == thing.moving
 
 
+def test_the_truth_says_where_the_middle_of_a_body_is_seen() -> None:
+    driver = Watching(0.0)
+    drawn = world(body(1.0, 6.0), camera_height_m=0.3)
+    ended(drawn, driver, 0.2)
+    (seen,) = driver.moments[0].known
+    assert seen.bearing_rad == pytest.approx(math.atan2(1.0, 6.0), abs=0.01)
+    assert seen.elevation_rad == pytest.approx(math.atan2(1.7 / 2 - 0.3, math.hypot(1.0, 6.0)), abs=0.01)
+
+
+def shape_of(course: Course) -> str:
+    """The kind of a course, by its curvature."""
+    turns = [course.curvature(at) for at in np.linspace(0.0, course.length_m, 61).tolist()]
+    if min(turns) < 0 < max(turns):
+        return "slalom"
+    if not any(turns):
+        return "straight"
+    return "arc" if turns[-1] else "bend"
+
+
+def test_every_kind_of_event_fault_and_drive_comes_up_among_the_worlds() -> None:
+    drawn = [worlds.make(seed) for seed in range(120)]
+    assert {event for each in drawn for event in each.events} == {*EVENTS, BLOCKED}
+    assert {each.condition for each in drawn} == set(worlds.CONDITIONS)
+    assert {each.build.kind for each in drawn} == {"bicycle", "differential"}
+    assert {each.start_mps == 0 for each in drawn} == {bool(each.waits_m) for each in drawn} == {True, False}
+    assert min(each.cruise_mps for each in drawn) < 0.4
+    assert max(each.cruise_mps for each in drawn) > 3.8
+    assert {shape_of(each.course) for each in drawn} == set(worlds.COURSES)
+
+
 def test_the_memory_of_the_truth_tells_for_a_while_of_what_is_hidden() -> None:
     seen = Exact(
-        0, "walker_0", (0.0, 0.0, 20.0, 40.0), 1.0, 4.0, 0.0, 0.1, 0.0, 1.0, 2.0, 0.1, 2.0, True, ObjectClass.CROSSING
+        number=0,
+        name="walker_0",
+        box=(0.0, 0.0, 20.0, 40.0),
+        visible=1.0,
+        range_m=4.0,
+        bearing_rad=0.0,
+        elevation_rad=0.0,
+        beside_m=0.1,
+        v_forward_mps=0.0,
+        v_right_mps=1.0,
+        ttc_s=2.0,
+        lateral_m=0.1,
+        closest_s=2.0,
+        threat=True,
+        class_id=ObjectClass.CROSSING,
     )
     hidden = replace(seen, visible=0.0)
     memory = Memory()

@@ -62,6 +62,7 @@ def test_circles_that_are_trusted_are_reported(lens: Lens) -> None:
     rebels, normals, objects = filled(CircleTable(20)), filled(CircleTable(30)), filled(ObjectTable(8))
     rebels.square[:] = np.arange(20) % 9 - 1
     rebels.support[3] = 70_000
+    objects.trust[2], objects.active[2] = 5.0, False  # has just ended
     records, plane = Records(50, CIRCLE), ImagePlane(lens)
     scene_records.add_circles(records, rebels.columns, objects.columns, Kind.REBEL, plane, 3.0)
     number = records.count
@@ -75,7 +76,7 @@ def test_circles_that_are_trusted_are_reported(lens: Lens) -> None:
     assert np.isinf(rows["ttc"][number:]).all()
     assert np.isnan(rows[["range", "lateral"]][number:].tolist()).all()
     square = rebels.square[kept]
-    owned = (square >= 0) & (objects.trust[square] >= 3.0)
+    owned = (square >= 0) & objects.active[square] & (objects.trust[square] >= 3.0)
     assert np.array_equal(owners, [*np.where(owned, objects.id[square], 0), *[0] * (len(rows) - number)])
 
 
@@ -88,8 +89,12 @@ def test_objects_that_are_trusted_are_reported(lens: Lens) -> None:
     rows, kept = records.written(), (objects.trust >= 3.0).nonzero()[0]
     assert len(rows) == len(kept)
     check(rows, objects, kept, lens)
-    assert rows["bearing_sigma"] == pytest.approx(0.25 * objects.width[kept] / lens.fx, rel=1e-6)
-    assert rows["elevation_sigma"] == pytest.approx(0.25 * objects.height[kept] / lens.fy, rel=1e-6)
+    # a quarter of its extent in the image, as an angle
+    x, y, little = objects.x[kept], objects.y[kept], 1e-4
+    bearings = [lens.bearing(x + side * little * objects.width[kept], y)[0] for side in (-1, 1)]
+    elevations = [lens.bearing(x, y + side * little * objects.height[kept])[1] for side in (1, -1)]
+    assert rows["bearing_sigma"] == pytest.approx(0.25 * (bearings[1] - bearings[0]) / (2 * little), rel=1e-3)
+    assert rows["elevation_sigma"] == pytest.approx(0.25 * (elevations[1] - elevations[0]) / (2 * little), rel=1e-3)
 
 
 def test_psi_regions_are_reported_and_what_lies_between_their_fields_is_zero() -> None:

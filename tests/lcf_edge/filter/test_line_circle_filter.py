@@ -19,6 +19,7 @@ from lcf_edge.filter import Corners, LineCircleFilter, Motion, line_expert
 from lcf_edge.filter.inputs import APPEARANCE_SAMPLES
 from lcf_edge.filter.line_circle_filter import GROUND_SLOPE_RAD, Step
 from lcf_edge.lens import Lens
+from lcf_edge.messages import ObjectClass
 
 SMALL = Config(
     memory=Memory(
@@ -30,6 +31,7 @@ SMALL = Config(
         circles_rebel=3,
         groups=6,
         psi=2,
+        objects=2,
     )
 )
 TRUST = SMALL.filter
@@ -61,7 +63,7 @@ def columns(tables: LineCircleFilter) -> dict[str, npt.NDArray[Any]]:
     """Every array of the tables, by name."""
     return {
         f"{name}.{column}": values
-        for name in ("edges", "normal", "rebel", "psi", "groups", "corners")
+        for name in ("edges", "normal", "rebel", "objects", "psi", "groups", "corners")
         for column, values in getattr(tables, name).arrays.items()
     }
 
@@ -78,7 +80,16 @@ def check(tables: LineCircleFilter, step: Step, corners: Corners, memory: Memory
     assert sizes.corners == len(corners) == len(step.omitted)
     assert sizes.omitted == np.count_nonzero(step.omitted)
     assert sizes.edges_normal + sizes.edges_rebel == n
-    for name in ("edges_normal", "edges_rebel", "chains", "circles_normal", "circles_rebel", "groups", "psi"):
+    for name in (
+        "edges_normal",
+        "edges_rebel",
+        "chains",
+        "circles_normal",
+        "circles_rebel",
+        "groups",
+        "psi",
+        "objects",
+    ):
         assert 0 <= getattr(sizes, name) <= getattr(memory, name), name
     assert sizes.evicted >= 0
 
@@ -101,6 +112,10 @@ def check(tables: LineCircleFilter, step: Step, corners: Corners, memory: Memory
         owner = edges.circle[:n][edges.rebel[:n] == rebel]
         assert live[owner[owner >= 0]].all()
 
+    ids = np.concatenate([circles.id[circles.active] for circles in (tables.normal, tables.rebel)])
+    assert len(np.unique(ids)) == len(ids)
+    check_objects(tables, memory)
+
     psi = tables.psi
     for name in ("x", "y", "width", "height"):
         assert np.isfinite(getattr(psi, name)[psi.active]).all(), name
@@ -110,6 +125,25 @@ def check(tables: LineCircleFilter, step: Step, corners: Corners, memory: Memory
     places = zip(x.tolist(), y.tolist(), strict=True)
     line_expert.list_live(psi.columns)
     assert all(line_expert.psi_at(psi.columns, *place) < 0 for place in places)
+
+
+def check_objects(tables: LineCircleFilter, memory: Memory) -> None:
+    """Each number of an object is known, with its sigma, or neither is."""
+    objects, live = tables.objects, tables.objects.active
+    assert np.count_nonzero(live) == tables.objects.count <= memory.objects
+    assert len(np.unique(objects.id[live])) == np.count_nonzero(live)
+    for name in ("x", "y", "width", "height", "trust", "age_s", "unseen_s", "probability"):
+        assert np.isfinite(getattr(objects, name)[live]).all(), name
+    assert (objects.trust[live] <= TRUST.tr_max).all()
+    published = live & (objects.trust >= TRUST.tr_s)
+    assert ((objects.probability[published] >= 0) & (objects.probability[published] <= 1)).all()
+    assert (objects.ttc[published] > 0).all()
+    assert np.isfinite(objects.range[published & (objects.class_id == ObjectClass.STANDING)]).all()
+    for name in ("ttc", "range", "lateral", "forward", "right", "closest"):
+        values, sigmas = getattr(objects, name)[published], getattr(objects, f"{name}_sigma")[published]
+        known = np.isfinite(values)
+        assert (sigmas[known] >= 0).all(), name
+        assert np.isnan(sigmas[~known]).all(), name
 
 
 def driven(
@@ -153,6 +187,7 @@ def test_on_a_street_the_laws_hold(street: Any, lens: Lens) -> None:
     steps = list(driven(LineCircleFilter(Config(), lens), street, Config().memory, lens))
     assert max(step.sizes.circles_rebel for step in steps) > 0
     assert max(step.sizes.psi for step in steps) > 0
+    assert max(step.sizes.objects for step in steps) > 0
     assert all(step.sizes.evicted == 0 for step in steps)
 
 
