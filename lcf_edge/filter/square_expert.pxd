@@ -128,7 +128,7 @@ cdef int object_in_turmoil(ObjectColumns objects, CircleColumns circles, Py_ssiz
 @cython.locals(least=double)
 cdef int nearest_object(ObjectColumns objects, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 cdef int free_row(ObjectColumns objects) noexcept nogil
-cdef int least_row(ObjectColumns objects) noexcept nogil
+cdef int row_to_spare(ObjectColumns objects, Settings settings) noexcept nogil
 cdef void give_birth(ObjectColumns objects, Py_ssize_t o, Settings settings, Ids ids) noexcept nogil
 cdef void found(ObjectColumns objects, Py_ssize_t o, Squares squares, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings, Ids ids) noexcept nogil
 cdef void found_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -385,13 +385,15 @@ def free_row(objects: ObjectColumns) -> int:
     return -1
 
 
-def least_row(objects: ObjectColumns) -> int:
-    """Returns the row of the least trusted object."""
-    least = 0
+def row_to_spare(objects: ObjectColumns, settings: Settings) -> int:
+    """Returns the row of the least trusted object that is neither seen nor reported; -1: there is none."""
+    spare = -1
     for o in range(objects.capacity):
-        if objects.trust[o] < objects.trust[least]:
-            least = o
-    return least
+        if objects.unseen_s[o] == 0 or objects.trust[o] >= settings.tr_s:
+            continue
+        if spare < 0 or objects.trust[o] < objects.trust[spare]:
+            spare = o
+    return spare
 
 
 def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> None:
@@ -484,7 +486,9 @@ def gather(
             o = free_row(objects)
             if o < 0:
                 evicted += 1
-                o = least_row(objects)
+                o = row_to_spare(objects, settings)
+                if o < 0:
+                    continue
                 leave(circles, o, -1)
                 hand_over(edges, o, -1)
             if in_turmoil:

@@ -196,7 +196,7 @@ def test_without_a_speed_the_contact_is_known_and_no_speed_over_ground(
     assert reported
 
 
-def test_a_full_table_gives_way_and_counts_it(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+def test_what_finds_no_place_in_a_full_table_is_counted(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     left = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([1.0, 0, 0]))
     right = drive(box((2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([-1.0, 0, 0]))
     way = replace(drive(clutter(150)) + left + right, frames=22)
@@ -204,6 +204,19 @@ def test_a_full_table_gives_way_and_counts_it(drive: Drive, box: Landmarks, clut
     evicted = [tables.step(corners, motion).sizes.evicted for corners, motion in way]
     assert tables.objects.count == 1
     assert sum(evicted) > 0
+
+
+def test_what_is_seen_keeps_its_place_in_a_full_table(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    left = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([1.0, 0, 0]))
+    right = drive(box((2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([-1.0, 0, 0]))
+    way = replace(drive(clutter(150)) + left + right, frames=40)
+    reported = [
+        int(tables.objects.id[row])
+        for tables in steps(way, Config(memory=Memory(objects=1)))
+        for row in published(tables.objects)
+    ]
+    assert len(reported) > 20
+    assert len(set(reported)) == 1
 
 
 def test_an_object_is_reported_from_its_third_frame_on(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
