@@ -75,7 +75,7 @@ def test_a_crash_of_libcamera_does_not_end_the_daemon(running: Daemon, subscribe
     assert "the process that runs libcamera was ended by SIGSEGV" in running.machine.journal()
 
 
-def test_a_camera_that_goes_comes_back(running: Daemon, subscriber: Subscriber) -> None:
+def test_a_camera_that_goes_comes_back(running: Daemon, subscriber: Subscriber, begun_s: float) -> None:
     pid = running.pid
     running.machine.run(f"echo vimc.0 > {VIMC}/unbind")
     subscriber.wait_for_status("camera", "away since")
@@ -83,6 +83,7 @@ def test_a_camera_that_goes_comes_back(running: Daemon, subscriber: Subscriber) 
     subscriber.wait_for_status("camera", "delivers")
     subscriber.wait_for_scenes(2)
     assert running.pid == pid
+    assert "no permission" not in running.machine.journal(begun_s)  # as until udev has given it to its group
 
 
 def test_the_process_takes_little_memory(running: Daemon) -> None:
