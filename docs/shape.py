@@ -14,6 +14,7 @@ from lcf_edge.filter import tables
 ROOT = Path(__file__).parents[1]
 DRAWING = ROOT / "docs/pictures/shape.svg"
 PAGE = ROOT / "docs/developing.md"
+MANY = 4  # columns that the same modules write, and that need not be named
 BEGIN, END = "<!-- columns: begin -->\n", "<!-- columns: end -->\n"
 
 LAYERS = (
@@ -120,16 +121,23 @@ def svg() -> str:
 
 
 def owners() -> str:
-    """Return the tables of columns as Markdown: of each table a line for all columns that the same modules write."""
+    """Return the tables of columns as Markdown: of each table a line for all columns that the same modules write.
+
+    The longest line of ``MANY`` columns or more comes last, without their names.
+    """
     lines = []
     for name, columns in TABLES.items():
         written: dict[tuple[str, ...], list[str]] = defaultdict(list)
         for column in columns:
             written[column.writers].append(f"`{column.name}`")
         lines += [f"**{name}**", ""]
+        rest = max(written, key=lambda writers: len(written[writers]))
+        if len(written[rest]) >= MANY:
+            written.pop(rest)
+            written[rest] = ["all others" if written else "all"]
         for writers, names in written.items():
             modules = ", ".join(f"`{writer}`" for writer in writers)
-            lines.append(f"- {'all' if len(written) == 1 else ', '.join(names)}: {modules}")
+            lines.append(f"- {', '.join(names)}: {modules}")
         lines.append("")
     return "\n".join(lines)
 

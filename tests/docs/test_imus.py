@@ -8,6 +8,7 @@ import pytest
 from drivers.imu import registry
 
 Rows = Callable[[str, str], list[list[str]]]
+Text = Callable[[str], str]
 CHIPS = registry.chips()
 
 
@@ -21,11 +22,13 @@ def test_every_chip_has_a_row(chip_rows: dict[str, list[str]]) -> None:
 
 
 @pytest.mark.parametrize("driver", CHIPS)
-def test_a_row_tells_addresses_and_ranges_of_its_chip(chip_rows: dict[str, list[str]], driver: str) -> None:
+def test_a_row_tells_addresses_and_ranges_of_its_chip(text: Text, chip_rows: dict[str, list[str]], driver: str) -> None:
     chip = CHIPS[driver]
-    _, models, addresses, gyro, accel, *_ = chip_rows[driver]
+    _, models, addresses, own, *_ = chip_rows[driver]
     assert tuple(int(address, 16) for address in re.findall(r"0x[0-9a-f]+", addresses)) == chip.addresses
-    for written, ranges in ((gyro, chip.gyro_ranges), (accel, chip.accel_ranges)):
+    (usual,) = re.findall(r"^Ranges are (.*?) where the table has none\.", text("docs/imus.md"), re.MULTILINE)
+    for unit, ranges in (("°/s", chip.gyro_ranges), ("g", chip.accel_ranges)):
+        (written, *_) = re.findall(rf"(\d[\d to]*) {unit}(?![\w/])", f"{own}, {usual}")
         numbers = list(map(int, written.split(" to ")))
         assert {min(numbers), max(numbers)} <= set(ranges)
         assert driver == "bno055" or (min(numbers), max(numbers)) == (min(ranges), max(ranges))
