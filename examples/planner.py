@@ -14,6 +14,8 @@ slow enough to stop before what it would come near to. The fastest good speed is
 - What stands is in the way if its probability of being met is at least ``CHANCE``. While that is not known, because the
   vehicle stands or is slow, its lateral miss tells, with its sigma.
 - Where the range is unknown, the time to contact stands in for it. What has neither range nor contact is left out.
+- A vehicle that rests waits for whatever moves nearer than ``CLOSE_M``: so near it fills the image, and its numbers are
+  worth least.
 - A higher speed than before has to be good for ``PATIENCE_S``, and for ``REST_S`` where the vehicle rests; a lower one
   is wanted at once.
 """
@@ -33,6 +35,7 @@ CHANCE = 0.3
 PATIENCE_S = 0.4  # that a higher speed has to be good,
 REST_S = 1.0  # and before a vehicle that rests starts: what rests with it can be seen least
 RESTS_MPS = 0.05
+CLOSE_M = 1.5
 AROUND_S = 0.25  # of its own motion is left before and behind what crosses
 
 _normal = np.vectorize(lambda sigmas: 0.5 * (1 + erf(sigmas / 2**0.5)), otypes=[float])
@@ -63,6 +66,8 @@ def good_speed(
     if not used.any():
         return cruise
     objects, ahead, stands = objects[used], ahead[used, None], stands[used]
+    if abs(speed) < RESTS_MPS and (~stands & (ahead[:, 0] < CLOSE_M)).any():
+        return 0.0
     forward, right, right_sigma = (
         np.nan_to_num(objects[name])[:, None] for name in ("v_forward", "v_right", "v_right_sigma")
     )

@@ -271,7 +271,8 @@ def _repeated(scene: PipelineScene, look: Look) -> PipelineScene:
 def _nearer(rows: Rows, passed_s: float) -> Rows:
     """Return the same circles or objects ``passed_s`` later."""
     rows = rows.copy()
-    rows["ttc"] = np.maximum(rows["ttc"] - np.float32(passed_s), 0)
+    for name in {"ttc", "closest"}.intersection(rows.dtype.names or ()):
+        rows[name] = np.maximum(rows[name] - np.float32(passed_s), 0)
     return rows
 
 

@@ -13,11 +13,16 @@ _WORDS = {
     "no imu": "no inertial samples: rotation comes from the images alone, and the flow lines are widened; check imu",
     "imu gap": "inertial samples are missing between two images; check the IMU's cable and rate",
     "gyro stuck": "the gyro repeats one value without noise and is ignored; check imu and its wires",
+    "imu saturated": "the motion exceeds the IMU's range; raise it, or damp the mounting",
+    "gyro lacks an axis": "the gyro does not measure every axis: pitch and roll come from the images alone",
     "gyro bias unknown": "the gyro's bias is not known yet: let the vehicle stand, or show it more than a plain wall",
     "rotation from odometry": "rotation is taken from odometry",
     "no speed": "speed is unknown: ranges and times to contact are not known; check vehicle.speed_source",
     "speed drifts": "speed comes from the accelerometer alone and drifts",
     "speed from ground": "nothing measures the speed: estimated from the ground in the images and camera.height_m",
+    "few corners": "few corners: little can be found; the scene is plain or dark, or the lens out of focus",
+    "glare": "glare: much of the image is overexposed; lower the exposure, or shade the lens",
+    "blurred": "the image is blurred: shaken or turned during exposure; shorten it",
 }
 
 _WORDS_OF_A_RECORDING = {  # without mentioning a cable

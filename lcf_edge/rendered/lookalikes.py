@@ -170,6 +170,14 @@ def _swaying_trees(plan: Plan) -> None:
             plan.boxes[plan.boxes.index(tree)] = swaying
 
 
+def _biased_gyro(plan: Plan) -> None:
+    """An uncalibrated chip: each axis is off by 5 to 20 degrees a second."""
+    plan.cruise(1.2, 2.8)
+    x, y, z = (plan.side() * math.radians(plan.between(5.0, 20.0)) for _ in range(3))
+    plan.change(noise=replace(plan.drive.noise, gyro_bias_radps=(x, y, z)))
+    _walker_or_obstacle(plan)
+
+
 LOOKALIKES: dict[str, Callable[[Plan], None]] = {
     "long_lines": _long_lines,
     "dark_crossing": _dark_crossing,
@@ -181,4 +189,5 @@ LOOKALIKES: dict[str, Callable[[Plan], None]] = {
     "rolling_shutter": _rolling_shutter,
     "moving_shadows": _moving_shadows,
     "swaying_trees": _swaying_trees,
+    "biased_gyro": _biased_gyro,
 }

@@ -69,7 +69,7 @@ def test_notes_of_a_result_line(rows: Rows) -> None:
         (ROOT / "lcf_edge" / name).read_text(encoding="utf-8")
         for name in ("ego_motion/estimator.py", "corners/image_quality.py", "pipeline.py")
     )
-    noted = set(re.findall(r'notes\.append\("([^"]+)"\)', sources))
+    noted = set(re.findall(r'notes(?:\.append\(|=\(\*\w+\.notes, )"([^"]+)"\)', sources))
     table = rows("docs/replay.md", "### Notes")
     assert {row[0].strip("`") for row in table} == noted
 

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from examples.planner import PATIENCE_S, REST_S, Planner, Vehicle, good_speed
+from examples.planner import CLOSE_M, PATIENCE_S, REST_S, Planner, Vehicle, good_speed
 from lcf_edge.messages import OBJECT, ObjectClass
 
 VEHICLE = Vehicle()
@@ -60,6 +60,14 @@ def test_standing_it_judges_by_the_lateral_miss() -> None:
     before = thing(range=0.6, lateral=0.1, lateral_sigma=0.1, closest=math.nan, probability=0.0)
     assert good_speed(beside, 0.0, CRUISE, VEHICLE) == CRUISE
     assert good_speed(before, 0.0, CRUISE, VEHICLE) == 0.0
+
+
+def test_at_rest_it_waits_for_whatever_moves_close_by() -> None:
+    """Wherever it seems to go: what fills the image is measured worst."""
+    leaves = crossing(1.0, CLOSE_M - 0.1, 1.5)
+    assert good_speed(leaves, 0.0, CRUISE, VEHICLE) == 0.0
+    assert good_speed(leaves, 0.5, CRUISE, VEHICLE) > 0.0
+    assert good_speed(crossing(1.0, CLOSE_M + 0.1, 1.5), 0.0, CRUISE, VEHICLE) == CRUISE
 
 
 def test_who_will_have_left_the_path_costs_no_stop() -> None:

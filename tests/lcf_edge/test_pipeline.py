@@ -407,7 +407,7 @@ def test_an_image_that_comes_once_more_is_its_scene_once_more_with_contacts_near
     seen = outcomes(twice, config)
     new = [each for each in seen if "repeated picture" not in each.scene.notes]
     assert [comparable(each.scene) for each in new] == [comparable(each.scene) for each in outcomes(items, config)]
-    approaching = 0
+    approaching = closest = 0
     for before, again in zip(seen[5::2], seen[6::2], strict=True):
         assert again.scene.stamp_ns == before.scene.stamp_ns + 30_000_000
         assert "repeated picture" in again.scene.notes
@@ -415,7 +415,10 @@ def test_an_image_that_comes_once_more_is_its_scene_once_more_with_contacts_near
             assert np.array_equal(rows["id"], later["id"])
             np.testing.assert_allclose(later["ttc"], np.maximum(rows["ttc"] - 0.03, 0), rtol=1e-5)
             approaching += int(np.isfinite(rows["ttc"]).sum())
-    assert approaching > 10
+        passing = before.scene.objects["closest"]
+        np.testing.assert_allclose(again.scene.objects["closest"], np.maximum(passing - 0.03, 0), rtol=1e-5)
+        closest += int(np.isfinite(passing).sum())
+    assert min(approaching, closest) > 10
 
 
 IMAGE_KINDS = st.sampled_from(("wall", "noise", "black", "half"))

@@ -1,4 +1,4 @@
-"""The same drive seen at two sizes."""
+"""The same drive seen at several sizes and through several lenses."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -28,14 +28,24 @@ def published(way: Any, lens: Lens) -> npt.NDArray[np.float64]:
     return np.stack([rebel.cause[rows], right, down, rebel.ttc[rows]], axis=1)
 
 
-@pytest.mark.parametrize("scale", [0.5, 2.0])
-def test_a_wall_and_a_walker_are_found_where_they_are_at_every_size(
-    drive: Drive, clutter: Landmarks, box: Landmarks, lens: Lens, scale: float
+OTHERS = {
+    "160x120": Lens(160, 120, 125, 125, 79.5, 59.5),
+    "320x240": Lens(320, 240, 250, 250, 159.5, 119.5),
+    "1280x960": Lens(1280, 960, 1000, 1000, 639.5, 479.5),
+    "1920x1080": Lens(1920, 1080, 1500, 1500, 959.5, 539.5),
+    "104 degrees": Lens(640, 480, 250, 250, 319.5, 239.5),
+    "fisheye": Lens(640, 480, 300, 300, 319.5, 239.5, "equidistant", (0.0, 0.0, 0.0, 0.0)),
+    "170 degrees": Lens(640, 480, 216, 216, 319.5, 239.5, "equidistant", (0.0, 0.0, 0.0, 0.0)),
+}
+
+
+@pytest.mark.parametrize("other", OTHERS.values(), ids=OTHERS)
+def test_a_wall_and_a_walker_are_found_where_they_are_at_every_size_and_through_every_lens(
+    drive: Drive, clutter: Landmarks, box: Landmarks, lens: Lens, other: Lens
 ) -> None:
     wall = drive(box((0.0, -0.4, 6.0), (0.5, 0.9, 0.0), landmarks=40))
     walker = drive(box((-2.2, -0.6, 5), (0.5, 1.2, 0.3), landmarks=40), np.array([1.2, 0, 0]))
     way = replace(drive(clutter(150)) + wall + walker, frames=22)
-    other = Lens(int(640 * scale), int(480 * scale), 500 * scale, 500 * scale, 320 * scale - 0.5, 240 * scale - 0.5)
     at_one, at_other = published(way, lens), published(way, other)
     for cause in (Cause.INCOMING, Cause.CROSSING):
         one, another = (found[found[:, 0] == cause] for found in (at_one, at_other))

@@ -442,6 +442,12 @@ def test_kinds_threaten_for_part_of_the_drive(kind):
     assert any(threatened) == (kind not in ("passing", "reversing"))
 
 
+def test_a_biased_gyro_is_off_by_5_to_20_degrees_a_second():
+    drives = [scenes.make("biased_gyro", seed) for seed in range(3)]
+    off = np.degrees(np.abs([drive.noise.gyro_bias_radps for drive in drives]))
+    assert ((off > 5) & (off < 20)).all()
+
+
 def test_names_are_unique_and_seeds_differ():
     drives = [scenes.make("crossing", seed) for seed in (0, 1)]
     for spec in drives:
