@@ -15,7 +15,7 @@ from abc import ABC, abstractmethod
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
@@ -114,7 +114,7 @@ class Speed(Device):
         return SpeedSample(stamp_ns, speed_mps, yaw_rate_radps)
 
 
-def main(argv: Sequence[str]) -> int:
+def main(argv: Sequence[str]) -> NoReturn:
     """Run until a signal ends it."""
     folder, *command = argv
     drive = Drive(Path(folder))
@@ -125,10 +125,11 @@ def main(argv: Sequence[str]) -> int:
         RecordedSpeed=lambda *_: Speed(drive),
     )
     sys.modules["lcf_edge.recording.playback"] = stand_ins
-    status = command_line.main(command)
-    sys.stdout.write(f"{drive.read_s}\n")
-    return status
+    try:
+        command_line.program(command)
+    finally:
+        sys.stdout.write(f"{drive.read_s}\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, Protocol, TypeVar
 
 from drivers.clock import SYSTEM_CLOCK, Clock
-from drivers.errors import DriverError
+from drivers.errors import DeviceForbiddenError, DriverError
 
 Record = TypeVar("Record")
 Delivered_co = TypeVar("Delivered_co", covariant=True)
@@ -13,6 +13,7 @@ Delivered_co = TypeVar("Delivered_co", covariant=True)
 FIRST_PAUSE_S = 0.1
 MAX_PAUSE_S = 1.0  # so that a device, with the time to open it, is in use within 2 s of coming back
 MAX_HOPELESS_PAUSE_S = 10.0  # after errors that only the user can fix
+SETTLING_TRIES = 4  # of a device that is back: it is nobody's until udev has given it to its group
 EXCESS = ("excess_bytes", "excess_samples")  # counts of what exceeded the rate of any real device
 
 
@@ -52,6 +53,7 @@ class KeptOpen(Generic[Record]):
         self._device: Device[Record] | None = None
         self._past: Counter[str] = Counter()
         self._pause_s = FIRST_PAUSE_S
+        self._forbidden = 0  # tries in succession
 
     @property
     def counts(self) -> Counter[str]:
@@ -76,9 +78,12 @@ class KeptOpen(Generic[Record]):
     def _fail(self, error: DriverError) -> None:
         self._past["failed"] += 1
         self.close()
-        self.error = error
+        self._forbidden = self._forbidden + 1 if isinstance(error, DeviceForbiddenError) else 0
+        settling = self.error is not None and 0 < self._forbidden <= SETTLING_TRIES
+        if not settling:
+            self.error = error
         self._clock.sleep_s(self._pause_s)
-        longest_s = MAX_PAUSE_S if error.retry else MAX_HOPELESS_PAUSE_S
+        longest_s = MAX_PAUSE_S if error.retry or settling else MAX_HOPELESS_PAUSE_S
         self._pause_s = min(2 * self._pause_s, longest_s)
 
     def close(self) -> None:

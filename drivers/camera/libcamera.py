@@ -340,7 +340,7 @@ def _list() -> int:
     found = cameras()
     if not found:
         usb = by_hand.list_command("drivers.camera.v4l2")
-        sys.stderr.write(f"libcamera finds no camera; those at USB: {usb}\n")
+        sys.stderr.write(f"libcamera finds no camera; check the ribbon cable, at both ends; those at USB: {usb}\n")
         return 1
     sys.stdout.writelines(f"{camera.name}: {camera.id}\n" for camera in found)
     return 0

@@ -23,7 +23,7 @@ import selectors
 import signal
 import socket
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,9 @@ _MANUAL, _AUTOMATIC, _OFF = 1, 0, 0
 _LOCKED = ("ExposureTime", "AnalogueGain")
 
 
+_BUSY = "close that (fuser -v /dev/media* names it)"
+
+
 class Refused(Exception):  # noqa: N818  # no fault of the program
     """The request cannot be met."""
 
@@ -62,7 +65,10 @@ def serve(libcamera: Any, connection: socket.socket, request: dict[str, Any]) ->
     """Deliver images until the other end closes. Raises ``Refused``."""
     manager = libcamera.CameraManager.singleton()
     if not request["device"]:
-        _send(connection, "cameras", cameras=[{"name": _model(one), "id": one.id} for one in manager.cameras])
+        cameras = [{"name": _model(one), "id": one.id} for one in manager.cameras]
+        if not cameras and (why := why_none()).kind != "missing":
+            raise why
+        _send(connection, "cameras", cameras=cameras)
         return
     camera = _find(manager, request["device"])
     with _refusing("lost", "fails in libcamera"):
@@ -77,7 +83,7 @@ def _find(manager: Any, device: str) -> Any:
     """Return the camera with this name or id, in full or in part, or whose pipeline has this node in /dev."""
     cameras = list(manager.cameras)
     if not cameras:
-        raise why_none(sorted(Path("/dev").glob("media*")))
+        raise why_none()
     device_name = device.casefold()
     if device.startswith("/dev/"):
         found = [camera for camera in cameras if _node(device) in _property(camera, "SystemDevices", ())]
@@ -95,19 +101,22 @@ def _find(manager: Any, device: str) -> Any:
     return found[0]
 
 
-def why_none(media: list[Path]) -> Refused:
-    """Return why libcamera finds no camera. Another program that runs one holds a lock on its media device."""
-    for path in media:
+def why_none(media: Iterable[Path] | None = None) -> Refused:
+    """Return why libcamera finds no camera. Another program that runs one holds a lock on its media device.
+
+    ``media``: all of them by default.
+    """
+    for path in sorted(Path("/dev").glob("media*")) if media is None else media:
         try:
             with path.open("r+b", buffering=0) as device:
                 os.lockf(device.fileno(), os.F_TEST, 0)
         except PermissionError as error:
             if error.filename is not None:  # of opening it
                 return Refused("forbidden", f"no permission for {path}; add this user to the group video, log in again")
-            return Refused("busy", "in use by another program; close that")
+            return Refused("busy", f"in use by another program; {_BUSY}")
         except OSError as error:
             if error.errno == errno.EAGAIN:
-                return Refused("busy", "in use by another program; close that")
+                return Refused("busy", f"in use by another program; {_BUSY}")
     return Refused("missing", "libcamera finds no camera; check that the ribbon cable sits straight, then reboot")
 
 
@@ -115,7 +124,7 @@ def _acquire(camera: Any) -> None:
     try:
         camera.acquire()
     except (RuntimeError, OSError) as error:
-        raise Refused("busy", f"in use by another program ({error}); close that") from error
+        raise Refused("busy", f"in use by another program ({error}); {_BUSY}") from error
 
 
 def _run(libcamera: Any, manager: Any, camera: Any, connection: socket.socket, request: dict[str, Any]) -> None:

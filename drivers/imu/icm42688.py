@@ -3,6 +3,10 @@
 ICM-42688-P data sheet, DS-000347 revision 1.6; ICM-42605 data sheet, DS-000292. Linux (inv_icm42600.h, _buffer.c) and
 PX4 (InvenSense_ICM42688P_registers.hpp) agree. Only registers of bank 0 are used. A packet of the FIFO has a header,
 the accelerometer, the gyro, a temperature of 8 bits and a time of 16; a sensor that has no data yet is -32768 in it.
+
+By default the gyro changes its range by itself at 100 °/s (AFSR), and repeats a value for 1 to 2 ms at each change. The
+bits that forbid it are in no data sheet, but ArduPilot's (#25370, where TDK says: in all of the family), Betaflight's
+and PX4's.
 """
 
 import struct
@@ -22,6 +26,7 @@ FIFO_COUNT = 0x2E
 FIFO_DATA = 0x30
 SIGNAL_PATH_RESET = 0x4B
 INTF_CONFIG0 = 0x4C
+INTF_CONFIG1 = 0x4D  # 7:6 AFSR
 PWR_MGMT0 = 0x4E  # 3:2 gyro, 1:0 accelerometer
 GYRO_CONFIG0 = 0x4F  # 7:5 GYRO_FS_SEL, 3:0 GYRO_ODR
 ACCEL_CONFIG0 = 0x50  # 7:5 ACCEL_FS_SEL, 3:0 ACCEL_ODR
@@ -34,6 +39,7 @@ SOFT_RESET = 0x01  # DEVICE_CONFIG
 STREAM = 0x40  # FIFO_CONFIG
 FLUSH_FIFO = 0x02  # SIGNAL_PATH_RESET
 BIG_ENDIAN_IN_BYTES = 0x30  # INTF_CONFIG0: data and count; as at power-on
+AFSR, NO_AFSR = 0xC0, 0x40  # INTF_CONFIG1
 BOTH_LOW_NOISE = 0x0F  # PWR_MGMT0
 HALF_THE_RATE = 0x00  # GYRO_ACCEL_CONFIG0
 TEMP_GYRO_AND_ACCEL = 0x07  # FIFO_CONFIG1
@@ -86,6 +92,8 @@ class Icm42688(FifoImu):
     def _reset(self) -> None:
         self._command_reset(DEVICE_CONFIG, SOFT_RESET)
         self._clock.sleep_s(RESET_S)
+        others = self._read(INTF_CONFIG1, 1)[0] & ~AFSR
+        self._write(INTF_CONFIG1, others | NO_AFSR)  # while the sensors are off, as the data sheet wants it
 
     def _fifo_level(self) -> int:
         return int.from_bytes(self._read(FIFO_COUNT, 2), "big")

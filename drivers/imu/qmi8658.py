@@ -4,7 +4,8 @@ QMI8658A data sheet, 13-52-25 revision A; lewisxhe's SensorLib and IniterWorker'
 numbers its samples, and one burst reads number, temperature, accelerometer and gyro: so the registers are polled, and
 what was missed is known. Its FIFO is left alone: reading it takes a command each time, and it takes in nothing
 meanwhile. The burst begins with STATUSINT, which locks the data within 12 µs, half a byte at 400 kHz, until the last of
-them was read (section 13).
+them was read (section 13). A QMI8658C samples 5 % faster (its data sheet, as in photon-circus's ph-qmi8658), which the
+stamps follow.
 """
 
 import struct
@@ -43,7 +44,7 @@ DONE, AVAILABLE = 0x80, 0x01  # STATUSINT
 RESET_NOW = 0xB0
 RESET_DONE = 0x80
 RESET_S = 0.02  # 15 ms, in which it acknowledges nothing
-MAX_RESET_S = 0.1
+MAX_RESET_S = 2.0  # the data sheet of the QMI8658C speaks of 1.75 s
 RESET_LOOK_S = 0.005
 COMMAND_LOOK_S = 0.001
 COMMAND_LOOKS = 100

@@ -14,6 +14,7 @@ from collections import Counter, deque
 from collections.abc import Sequence
 from dataclasses import replace
 from math import isfinite
+from typing import NoReturn
 
 import msgspec
 
@@ -94,7 +95,7 @@ class _Device:
         """Nothing is held."""
 
 
-def main(argv: Sequence[str]) -> int:
+def main(argv: Sequence[str]) -> NoReturn:
     """Run until the drive is over."""
     seed, *options = argv
     world = world_of(int(seed))
@@ -116,12 +117,12 @@ def main(argv: Sequence[str]) -> int:
     )
     for work in (listen, ride):
         threading.Thread(target=work, daemon=True).start()
-    status = command_line.main(["run", *options])
-    for log in logs:
-        sys.stdout.write(msgspec.json.encode(log).decode() + "\n")
-    sys.stdout.flush()
-    return status
+    try:
+        command_line.program(["run", *options])
+    finally:
+        for log in logs:
+            sys.stdout.write(msgspec.json.encode(log).decode() + "\n")
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])

@@ -14,15 +14,20 @@ PACKETS = 2048 // PACKET_BYTES
 POWER_ON = {0x13: 0x05, 0x4C: 0x30, 0x4D: 0x91, 0x4F: 0x06, 0x50: 0x06, 0x52: 0x11, 0x5F: 0x00, 0x75: 0x47}
 ODR_HZ = {6: 1000.0, 7: 200.0, 8: 100.0, 9: 50.0, 10: 25.0, 11: 12.5, 15: 500.0}
 START_UP_NS = 45_000_000  # of the gyro, in which its words say that there are no data
+AFSR_RADPS = math.radians(100)
+AFSR_S = 0.002  # for which the gyro repeats itself when it changes its range
 
 
 class Icm42688(SimulatedChip):
-    """ICM-42688-P. The FIFO's count reads 0 once after it was flushed."""
+    """ICM-42688-P. The FIFO's count reads 0 once after it was flushed; AFSR makes the gyro stall if not forbidden."""
 
     address = 0x68
     power_on = POWER_ON
     boot_ns = 1_000_000
     _gyro_from_ns = 0
+    _fast = False  # the range that AFSR has chosen
+    _stalls = 0  # samples that repeat the one before
+    _gyro: Vector = (0.0, 0.0, 0.0)
 
     def read(self, register: int, length: int) -> bytes:
         """A burst; in another bank than 0, nothing but zeros."""
@@ -42,12 +47,21 @@ class Icm42688(SimulatedChip):
         """TEMP_DATA1 to GYRO_DATA_Z0."""
         turn_radps = math.radians(2000 / 2 ** (self.registers[0x4F] >> 5))
         force_mps2 = G_MPS2 * 16 / 2 ** (self.registers[0x50] >> 5)
+        self._adapt(max(map(abs, gyro)) > AFSR_RADPS)
+        if not self._stalls:
+            self._gyro = gyro
         warmth = round((self.celsius - 25) * 132.48)
         return {
             0x1D: warmth.to_bytes(2, "big", signed=True),
             0x1F: SIX.pack(*counts(accel, force_mps2)),
-            0x25: SIX.pack(*counts(gyro, turn_radps)),
+            0x25: SIX.pack(*counts(self._gyro, turn_radps)),
         }
+
+    def _adapt(self, fast: bool) -> None:
+        """AFSR, as long as INTF_CONFIG1 does not forbid it."""
+        changes = fast != self._fast and self.registers[0x4D] & 0xC0 != 0x40
+        self._fast = fast
+        self._stalls = round(AFSR_S * self.rate_hz()) if changes else max(self._stalls - 1, 0)
 
     def push(self, packed: Mapping[int, bytes]) -> None:
         """A packet with header, temperature and time, when FIFO_CONFIG1 asks for all; the oldest makes room."""

@@ -86,11 +86,24 @@ class Mpu9250(Mpu6500):
 
 
 class Icm20602(Mpu6500):
-    """ICM-20602: what FIFO_EN asks for comes with the temperature, in frames of 14 bytes."""
+    """ICM-20602: what FIFO_EN asks for comes with the temperature, in frames of 14 bytes.
 
-    power_on: ClassVar[Mapping[int, int]] = {0x1A: 0x80, 0x6B: 0x41, 0x75: 0x12}
+    What is added to the accelerations, 0.98 mg a unit and 15 bits, is right as it comes from the maker.
+    """
+
+    power_on: ClassVar[Mapping[int, int]] = {0x1A: 0x80, 0x6B: 0x41, 0x75: 0x12, 0x78: 0x46, 0x7A: 0x0B, 0x7D: 0x11}
     fifo_bytes = 1008
     lsb_per_c, zero_c = 326.8, 25.0
+
+    def pack(self, gyro: Vector, accel: Vector) -> Mapping[int, bytes]:
+        """With the offsets."""
+        x, y, z = (value + self._added_mps2(at) for value, at in zip(accel, (0x77, 0x7A, 0x7D), strict=True))
+        return super().pack(gyro, (x, y, z))
+
+    def _added_mps2(self, register: int) -> float:
+        now = int.from_bytes(self.registers[register : register + 2], "big", signed=True)
+        made = int.from_bytes(bytes(self.power_on.get(register + low, 0) for low in (0, 1)), "big", signed=True)
+        return (now - made) / 2 * 0.98e-3 * G_MPS2
 
     def push(self, packed: Mapping[int, bytes]) -> None:
         """4 GYRO_FIFO_EN, 3 ACCEL_FIFO_EN; nothing else is known to it."""

@@ -8,6 +8,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import NoReturn
 
 from hil_mocks.soak.stand_ins import FastCamera, FastImu, FastSpeed, Feed
 from lcf_edge.cli import command_line
@@ -16,7 +17,7 @@ from lcf_edge.recording import playback
 from lcf_edge.zenoh_link import link
 
 
-def main(argv: Sequence[str]) -> int:
+def main(argv: Sequence[str]) -> NoReturn:
     """Run until a signal ends it."""
     drive, seed, *options = argv
     feed = Feed(Path(drive), int(seed), time.monotonic_ns())
@@ -35,8 +36,8 @@ def main(argv: Sequence[str]) -> int:
         RecordedImu=lambda *_: FastImu(feed),
         RecordedSpeed=lambda *_: FastSpeed(feed),
     )
-    return command_line.main(["run", *options])
+    command_line.program(["run", *options])
 
 
 if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])

@@ -34,8 +34,8 @@ if TYPE_CHECKING:
     from lcf_edge.recording.pace import Pace
 
 
-def program() -> NoReturn:
-    """Be the program: run the command of its arguments, and end."""
+def program(argv: Sequence[str] | None = None) -> NoReturn:
+    """Be the program: run the command of its arguments, or of ``argv``, and end."""
     status = 1
 
     def end_despite_threads() -> None:
@@ -48,7 +48,7 @@ def program() -> NoReturn:
             os._exit(status)
 
     atexit.register(end_despite_threads)  # first, so it is called last
-    status = main()
+    status = main(argv)
     sys.exit(status)
 
 

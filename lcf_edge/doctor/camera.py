@@ -1,6 +1,7 @@
 """The camera: present, permitted, free, with the requested settings, and delivering usable images."""
 
 import contextlib
+import math
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -167,7 +168,8 @@ def judged(context: Context, measured: Measured[Frame], exposure_s: float | None
 
 def _rate(context: Context, measured: Measured[Frame], exposure_s: float | None) -> Finding:
     camera = context.config.camera
-    summary = f"{measured.summary()}, longest gap {1e3 * measured.longest_s:.0f} ms"
+    gap = "" if math.isnan(measured.longest_s) else f", longest gap {1e3 * measured.longest_s:.0f} ms"
+    summary = f"{measured.summary()}{gap}"
     too_long = exposure_s is not None and exposure_s * camera.fps > 1
     if exposure_s is not None and not too_long:
         summary += f", exposure {1e3 * exposure_s:.1f} ms"

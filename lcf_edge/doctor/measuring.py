@@ -60,8 +60,11 @@ class Measured(Generic[Record]):
         return [(later - earlier) / 1e9 for earlier, later in pairwise(stamps_ns)]
 
     def summary(self) -> str:
-        """Rate and jitter in words."""
-        return f"{self.rate_hz:.1f}/s, jitter {1e3 * self.jitter_s:.1f} ms"
+        """Rate and jitter in words, as far as they are known."""
+        if math.isnan(self.rate_hz):
+            return "only one came"
+        jitter = "" if math.isnan(self.jitter_s) else f", jitter {1e3 * self.jitter_s:.1f} ms"
+        return f"{self.rate_hz:.1f}/s{jitter}"
 
 
 def measure(

@@ -56,12 +56,14 @@ class Endpoint:
             ending.start()
             self._server.cut()  # else it would wait for that connection to end
             ending.join(_WITHIN_S)
+            self._thread.join(_WITHIN_S)
         self._server.server_close()
 
 
 class _Server(HTTPServer):
     request_queue_size = 4
     _connection: socket.socket | None = None  # that is served
+    _ends = False
 
     def finish_request(self, request: Any, client_address: Any) -> None:
         """Serve a connection; a client that sends or reads slowly is cut off."""
@@ -69,6 +71,8 @@ class _Server(HTTPServer):
         timer.daemon = True
         self._connection = request
         timer.start()
+        if self._ends:  # it came too late to be cut off
+            _cut(request)
         try:
             super().finish_request(request, client_address)
         finally:
@@ -76,7 +80,8 @@ class _Server(HTTPServer):
             self._connection = None
 
     def cut(self) -> None:
-        """End the connection that is served."""
+        """End the connection that is served, and those that still come."""
+        self._ends = True
         connection = self._connection
         if connection is not None:
             _cut(connection)

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import pytest
 
-from drivers.device import FIRST_PAUSE_S, MAX_HOPELESS_PAUSE_S, MAX_PAUSE_S, Device, KeptOpen
+from drivers.device import FIRST_PAUSE_S, MAX_HOPELESS_PAUSE_S, MAX_PAUSE_S, SETTLING_TRIES, Device, KeptOpen
 from drivers.errors import DeviceForbiddenError, DeviceLostError, DeviceMissingError, DriverError
 from hil_mocks.virtual_clock import VirtualClock
 
@@ -102,6 +102,36 @@ def test_pauses_grow_to_a_limit(error: DriverError, longest_s: float) -> None:
     assert pauses[0] == pytest.approx(FIRST_PAUSE_S)
     assert pauses == sorted(pauses)
     assert pauses[-1] == pytest.approx(longest_s)
+
+
+def test_a_device_that_is_back_may_be_forbidden_until_udev_has_seen_to_it() -> None:
+    port, clock = Port(Scripted([[1], LOST]), *[MISSING] * 8, FORBIDDEN, FORBIDDEN, Scripted([[2]])), VirtualClock()
+    device = kept(port, clock)
+    for _ in range(10):
+        device.read()
+    assert device.error is MISSING
+    begun_ns = clock.monotonic_ns()
+    for _ in range(2):
+        assert device.read() == []
+        assert device.error is MISSING  # and nobody is told to join a group
+    assert device.read() == [2]
+    assert clock.monotonic_ns() - begun_ns == round(2e9 * MAX_PAUSE_S)
+
+
+def test_one_that_stays_forbidden_is() -> None:
+    port, clock = Port(Scripted([[1], LOST]), FORBIDDEN), VirtualClock()
+    device = kept(port, clock)
+    for _ in range(2 + SETTLING_TRIES):
+        device.read()
+    assert device.error is LOST
+    device.read()
+    assert device.error is FORBIDDEN
+
+
+def test_one_that_is_forbidden_from_the_start_is_at_once() -> None:
+    device = kept(Port(FORBIDDEN), VirtualClock())
+    device.read()
+    assert device.error is FORBIDDEN
 
 
 def test_a_record_makes_the_pauses_short_again() -> None:

@@ -5,20 +5,22 @@ import json
 import os
 import shlex
 import signal
+import socket
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from drivers.camera import libcamera
+from drivers.camera import libcamera, libcamera_process
 from drivers.camera.libcamera import LibcameraCamera, cameras, main, monotonic
-from drivers.camera.libcamera_process import why_none
+from drivers.camera.libcamera_process import Refused, serve, why_none
 from drivers.device import KeptOpen
 from drivers.errors import (
     DeviceBusyError,
@@ -303,7 +305,9 @@ class TestFaults:
             LibcameraCamera("imx219", command=("/nowhere/python3",))
 
     def test_busy(self, open_camera: Open) -> None:
-        with pytest.raises(DeviceBusyError, match=r"^imx219: in use by another program .*; close that$"):
+        with pytest.raises(
+            DeviceBusyError, match=r"^imx219: in use by another program .*; close that \(fuser -v /dev/media\*"
+        ):
             open_camera(World(busy=True))
 
     def test_gone(self, open_camera: Open) -> None:
@@ -388,7 +392,9 @@ class TestByHand:
         assert main(["--list"]) == 1
         output = capsys.readouterr()
         assert output.out == ""
-        *_, listing = output.err.removesuffix("\n").partition("libcamera finds no camera; those at USB: ")
+        *_, listing = output.err.removesuffix("\n").partition(
+            "libcamera finds no camera; check the ribbon cable, at both ends; those at USB: "
+        )
         assert shlex.split(listing) == [sys.executable, "-m", "drivers.camera.v4l2", "--list"]
 
     def test_a_camera_that_is_not_there_is_one_line(self, capsys: pytest.CaptureFixture[str]) -> None:
@@ -424,3 +430,11 @@ class TestWhyThereIsNone:
 
     def test_there_is_nothing(self) -> None:
         assert why_none([]).kind == "missing"
+
+    def test_an_empty_list_tells_it_too(self, media: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        """Not that a cable is loose, when the user may not look."""
+        bare = SimpleNamespace(CameraManager=SimpleNamespace(singleton=lambda: SimpleNamespace(cameras=[])))
+        monkeypatch.setattr(libcamera_process, "why_none", lambda: Refused("forbidden", f"no permission for {media}"))
+        ours, other = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with ours, other, pytest.raises(Refused, match="no permission for"):
+            serve(bare, other, {"device": ""})

@@ -2,9 +2,12 @@
 
 import math
 from collections.abc import Callable
+from itertools import pairwise
 from typing import Any
 
 import pytest
+
+from drivers.imu.settings import ImuSettings
 
 RigMaker = Callable[..., Any]
 
@@ -30,3 +33,17 @@ def test_another_bank_that_a_program_left_selected_does_not_hide_it(rig: RigMake
     bench = rig("icm42688")
     bench.chip.registers[0x76] = 1
     assert bench.read_for(0.3)
+
+
+def test_the_gyro_does_not_stall_where_it_would_change_its_range_by_itself(rig: RigMaker) -> None:
+    """AFSR: at 100 °/s it would repeat a value for 2 ms."""
+    turning = rig(
+        "icm42688",
+        motion=lambda t: ((0.0, 0.0, 4 * math.sin(20 * t)), (0.0, 0.0, 9.8)),
+        settings=ImuSettings(rate_hz=1000.0, gyro_range_dps=500),
+    )
+    samples = [sample.gyro[2] for sample in turning.read_for(1.5)]
+    assert max(samples) > math.radians(200)
+    near = [(a, b) for a, b in pairwise(samples) if abs(a) < 3]
+    assert min(abs(b - a) for a, b in near) > 0.02
+    assert turning.chip.registers[0x4D] == 0x51  # nothing else in the register has changed

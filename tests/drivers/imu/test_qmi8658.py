@@ -36,6 +36,16 @@ def test_samples_that_nobody_read_in_time_are_counted_and_left_out_of_the_stamps
         assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.003)
 
 
+def test_a_qmi8658c_samples_5_percent_faster(rig: RigMaker) -> None:
+    bench = rig("qmi8658", rate_error=0.94 / 0.8968 - 1)
+    samples = [sample for sample in bench.read_for(4) if sample.stamp_ns > bench.began_ns + 2e9]
+    seconds = (samples[-1].stamp_ns - samples[0].stamp_ns) / 1e9
+    assert (len(samples) - 1) / seconds == pytest.approx(0.94 * 250, rel=0.005)
+    assert bench.device.counts["lost"] <= 4  # until its rate is known
+    for sample in samples:
+        assert sample.gyro == pytest.approx(bench.true(sample)[0], abs=0.003)
+
+
 def test_numbers_go_on_from_0_after_2_to_the_24(rig: RigMaker) -> None:
     bench = rig("qmi8658")
     bench.read_for(1)
@@ -50,6 +60,13 @@ def test_a_reset_that_never_ends_is_reported(rig: RigMaker, monkeypatch: pytest.
     monkeypatch.setattr("hil_mocks.i2c.qmi8658.Qmi8658.boot_ns", 10**10)
     with pytest.raises(DeviceLostError, match="does not come back from a reset; switch its supply off and on"):
         rig("qmi8658").open()
+
+
+def test_a_reset_may_take_as_long_as_the_data_sheet_of_the_c_says(
+    rig: RigMaker, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("hil_mocks.i2c.qmi8658.Qmi8658.boot_ns", 1_750_000_000)
+    assert rig("qmi8658").read_for(2.5)
 
 
 def test_a_command_that_is_never_done_is_reported(rig: RigMaker, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -3,6 +3,7 @@
 import errno
 import itertools
 import re
+from collections import Counter
 from collections.abc import Callable
 from functools import cache
 from typing import Any
@@ -15,6 +16,7 @@ from drivers.camera import v4l2_ioctl as v4l2
 from drivers.camera.libcamera import LibcameraCamera
 from drivers.camera.v4l2 import V4l2Camera
 from drivers.clock import SYSTEM_CLOCK, Clock
+from drivers.samples import Frame
 from hil_mocks.libcamera_device import World, command
 from hil_mocks.v4l2_device import MockCamera, MockControl, MockKernel
 from hil_mocks.virtual_clock import VirtualClock
@@ -23,6 +25,7 @@ from lcf_edge.diagnostics import DeviceStatus, Level
 from lcf_edge.doctor import camera
 from lcf_edge.doctor.daemon import Daemon
 from lcf_edge.doctor.finding import Context, Finding, Severity
+from lcf_edge.doctor.measuring import Measured
 
 PATH = "/dev/video0"
 WANTED = Camera(fps=30.0)
@@ -208,6 +211,16 @@ def test_images_that_are_lost_slow_it_down(look: Look, webcam: MockCamera) -> No
     assert "slower than camera.fps = 30" in found.text
     assert "; short " in found.text
     assert "camera.exposure_s=0.0167" in found.remedy
+
+
+@pytest.mark.parametrize(
+    ("stamps_s", "text"),
+    [([5.0], "only one came: slower than camera.fps = 30"), ([5.0, 6.6], "0.6/s, longest gap 1600 ms: slower than")],
+)
+def test_a_camera_too_slow_for_figures_has_none(machine: Machine, stamps_s: list[float], text: str) -> None:
+    images = [Frame(round(stamp_s * 1e9), seq, drawn(64, 48)) for seq, stamp_s in enumerate(stamps_s)]
+    rate, _ = camera.judged(machine(Config(camera=WANTED)), Measured("camera", images, Counter()))
+    assert rate.text.startswith(text)
 
 
 def test_an_exposure_longer_than_the_frame_is_why_it_is_slow(look: Look, webcam: MockCamera) -> None:

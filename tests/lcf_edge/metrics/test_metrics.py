@@ -143,6 +143,15 @@ def test_who_sends_slowly_does_not_hold_up_the_end(endpoint: Endpoint, monkeypat
     assert not endpoint._thread.is_alive()
 
 
+def test_who_comes_while_it_ends_does_not_hold_it_up_either(
+    endpoint: Endpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(endpoint_module, "_WITHIN_S", 60.0)
+    endpoint._server.cut()  # there is nobody yet
+    with socket.create_connection(("127.0.0.1", endpoint.port), timeout=20) as late:
+        assert late.recv(1) == b""
+
+
 def test_a_port_that_is_taken_is_reported_by_its_key(endpoint: Endpoint) -> None:
     with pytest.raises(LcfError, match=r"metrics\.port"):
         Endpoint(endpoint.port)

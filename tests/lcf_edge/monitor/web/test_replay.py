@@ -79,7 +79,8 @@ def asked(address: str, body: bytes, **headers: str) -> int:
         with urlopen(request, timeout=PATIENCE_S) as answer:
             return int(answer.status)
     except HTTPError as error:
-        return error.code
+        with error:  # a response, too
+            return error.code
 
 
 def test_a_wish_is_done_and_what_is_none_is_refused(address: str) -> None:
@@ -100,5 +101,6 @@ def test_another_page_may_not_ask(address: str) -> None:
 
 def test_a_page_of_a_daemon_cannot_be_asked_and_one_of_a_recording_saves_nothing(seen: Any, address: str) -> None:
     assert asked(seen[1].address, b'{"do": "play"}') == 404
-    with pytest.raises(HTTPError, match="404"):
+    with pytest.raises(HTTPError, match="404") as refused:
         urlopen(f"{address}save", timeout=PATIENCE_S)
+    refused.value.close()
