@@ -11,8 +11,8 @@ MEMBER_MARGIN_PX = 8.0  # around a rebel circle, within which edges may belong t
 MIN_COAST_PX = 40.0  # a circle so near that it grows too fast to be tracked is at least this large
 PSI_MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 # Lower bounds: however few px a radian has, corners lie some px apart.
-MIN_LINK_PX = 8.0
-MIN_CIRCLE_PX = 9.6
+MIN_LINK_PX = 12.0
+MIN_CIRCLE_PX = 14.0
 MIN_NEIGHBOUR_PX = 6.4
 MIN_MEMBER_MARGIN_PX = 3.0
 MIN_MIN_COAST_PX = 15.0

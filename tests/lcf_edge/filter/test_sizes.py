@@ -56,3 +56,13 @@ def test_a_wall_and_a_walker_are_found_where_they_are_at_every_size_and_through_
         if cause == Cause.INCOMING:
             k, j = np.unravel_index(away.argmin(), away.shape)
             assert another[j, 3] == pytest.approx(one[k, 3], rel=0.1)
+
+
+def test_the_few_corners_of_a_small_wide_image_make_circles_too(drive: Drive, clutter: Landmarks) -> None:
+    fisheye = Lens(160, 120, 65.4, 65.4, 79.5, 59.5, "equidistant", (0.0, 0.0, 0.0, 0.0))
+    tables = LineCircleFilter(Config(), fisheye)
+    circles = []
+    for corners, motion in replace(drive(clutter(100)), lens=fisheye, frames=30):
+        tables.step(corners, motion)
+        circles.append(int(np.count_nonzero(tables.normal.active & (tables.normal.trust >= 3))))
+    assert max(circles) >= 3
