@@ -6,15 +6,17 @@ import sys
 import threading
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 import zenoh
 
 from lcf_edge.cdr import decode_scene
 from lcf_edge.config import Publish, Zenoh
 from lcf_edge.errors import PublishError
-from lcf_edge.messages import Scene
+from lcf_edge.messages import OBJECT, Scene
 from lcf_edge.zenoh_link import ATTACHMENT, ScenePublisher, opened_session
 
 PATIENCE_S = 20.0
@@ -35,11 +37,12 @@ def test_a_second_process_receives_every_scene_whole(session: zenoh.Session, end
         assert publisher.wait_for_subscriber(PATIENCE_S)
         sizes = []
         for seq in range(20):
-            sizes.append(publisher.put(scene(seq)))
+            sizes.append(publisher.put(replace(scene(seq), objects=np.zeros(2, OBJECT))))
             threading.Event().wait(FRAME_S)  # a burst may be dropped, frames at their rate may not
         output, _ = subscriber.communicate("20\n", timeout=PATIENCE_S)
     assert publisher.sent == 20
-    assert json.loads(output) == {"scenes": 20, "bytes": sum(sizes), "broken": 0, "circles": 60}
+    received = {"scenes": 20, "bytes": sum(sizes), "broken": 0, "circles": 60, "objects": 40}
+    assert json.loads(output) == received
     assert subscriber.returncode == 0
 
 
