@@ -290,7 +290,7 @@ def test_positions_are_px_of_the_input_frame(approach: Approach, lens: Lens) -> 
 
 def test_bearings_are_angles_at_the_lens_not_in_the_image(approach: Approach) -> None:
     lens = LENSES["fisheye"]
-    circles = np.concatenate([each.scene.circles for each in outcomes(approach(lens=lens), lens=lens)])
+    circles = np.concatenate([each.scene.circles for each in outcomes(approach(lens=lens, frames=30), lens=lens)])
     ideal = lens.undistort(np.stack([circles["x"], circles["y"]], axis=1))
     bearing, elevation = lens.bearing(ideal[:, 0], ideal[:, 1])
     assert np.allclose(circles["bearing"], bearing, atol=1e-3)
