@@ -20,6 +20,7 @@ BEGIN, END = "<!-- columns: begin -->\n", "<!-- columns: end -->\n"
 LAYERS = (
     ("cli",),
     ("monitor", "doctor", "calibrate", "evaluate", "gate"),
+    ("web",),
     ("daemon", "client"),
     ("metrics",),
     ("devices", "pipeline", "sinks"),

@@ -6,8 +6,9 @@ from pathlib import Path
 from drivers.imu import serial_imu
 from lcf_edge.daemon import memory, peers
 from lcf_edge.gate import entrances, gate, key_limits, pace
-from lcf_edge.monitor.web import doorkeeper, server
+from lcf_edge.monitor.web import server
 from lcf_edge.recording.read.images import _BYTES_A_PIXEL, _DECODER_BYTES
+from lcf_edge.web import doorkeeper
 from lcf_edge.zenoh_link.admission import MAX_MESSAGE_BYTES, access_control
 from lcf_edge.zenoh_link.queryables import Queryables
 from lcf_edge.zenoh_link.session import _UNLESS_THE_FILE_SAYS, MAX_SESSIONS

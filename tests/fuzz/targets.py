@@ -44,14 +44,14 @@ from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Scene
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import Monitor
-from lcf_edge.monitor.web.doorkeeper import Doorkeeper
-from lcf_edge.monitor.web.guard import Guard
 from lcf_edge.monitor.web.server import Server
 from lcf_edge.monitor.web.update import Audience
 from lcf_edge.pipeline import Pipeline, run
 from lcf_edge.recording.read import open_recording
 from lcf_edge.recording.read.decoding import ImageDecodeError, image_from_bytes
 from lcf_edge.recording.read.sensor_yaml import SensorYaml
+from lcf_edge.web.doorkeeper import Doorkeeper
+from lcf_edge.web.guard import Guard
 from lcf_edge.zenoh_link.publisher import ATTACHMENT
 from lcf_edge.zenoh_link.session import opened_session
 from lcf_edge.zenoh_link.speed_input import RefusedError, SpeedInput

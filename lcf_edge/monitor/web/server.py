@@ -6,33 +6,26 @@ somebody looks.
 """
 
 import asyncio
-import logging
-import os
 import signal
-import socket
 import time
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable
 from contextlib import suppress
-from functools import partial
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
 import msgspec
 from aiohttp import WSMsgType, web
-from aiohttp.http_exceptions import HttpProcessingError
 
 from lcf_edge.config.endpoint import bare
-from lcf_edge.daemon.log import NoFlood
 from lcf_edge.dates import utc
-from lcf_edge.errors import LcfError
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.live.history import History
 from lcf_edge.monitor.live.monitor import Monitor
 from lcf_edge.monitor.replay.replayed import Command, Replayed
-from lcf_edge.monitor.web.doorkeeper import BACKLOG, FAREWELL_S, LOGGER, REQUEST_WITHIN_S, Doorkeeper
-from lcf_edge.monitor.web.guard import TOKEN, Guard
 from lcf_edge.monitor.web.saving import mcap_parts
 from lcf_edge.monitor.web.update import Audience
+from lcf_edge.web.doorkeeper import FAREWELL_S, Doorkeeper
+from lcf_edge.web.guard import Guard
+from lcf_edge.web.serving import Place, add_page, serve_at
 
 if TYPE_CHECKING:
     from lcf_edge.monitor.replay.player import Player
@@ -41,67 +34,22 @@ INTERVAL_S = 0.1  # between two updates for one browser
 PULSE_S = 1.0  # an update is sent even without news
 SILENCE_S = 10.0
 MAX_BROWSERS = 16
-MAX_LINE = 300  # characters of a log line, some chosen by strangers
 MAX_SAVES_AT_ONCE = 2  # each holds the messages of its file
 MAX_COMMAND_BYTES = 256
-
-PAGE = {
-    "index.html": "text/html",
-    "page.css": "text/css",
-    "page.js": "text/javascript",
-    "player.js": "text/javascript",
-    "picture.js": "text/javascript",
-    "tables.js": "text/javascript",
-    "topdown.js": "text/javascript",
-    "traces.js": "text/javascript",
-    "writing.js": "text/javascript",
-    "icon.svg": "image/svg+xml",
-}
 
 
 async def serve(shown: DaemonAddress | Replayed, host: str, port: int, write_line: Callable[[str], None]) -> None:
     """Serve until SIGINT or SIGTERM; ``write_line`` hears the address. Raises ``PublishError``, ``LcfError``."""
-    handler = _OneLine()
-    handler.addFilter(NoFlood())
-    for logger in (logging.getLogger("aiohttp"), logging.getLogger("asyncio"), LOGGER):
-        logger.handlers[:] = [handler]
-        logger.propagate = False
+    place = Place(host, port, "view", "--listen HOST and --port N")
     ended = asyncio.Event()
     loop = asyncio.get_running_loop()
     for number in (signal.SIGINT, signal.SIGTERM):
         loop.add_signal_handler(number, ended.set)
-    guard = Guard(host)
     server = Server(shown)
-    door = Doorkeeper()
-    runner = web.AppRunner(
-        server.application(guard, door),
-        access_log=None,
-        handle_signals=False,
-        shutdown_timeout=1.0,
-        keepalive_timeout=REQUEST_WITHIN_S,
-        lingering_time=REQUEST_WITHIN_S,
-    )
-    listening: asyncio.Server | None = None
     try:
-        await runner.setup()
-        listening = await _listen(runner, door, host, port)
-        write_line(f"open {_address(host, listening.sockets[0].getsockname()[1], guard.token)} (Ctrl-C ends)")
-        await ended.wait()
+        await serve_at(place, server.application, ended, lambda address: write_line(f"open {address} (Ctrl-C ends)"))
     finally:
-        if listening is not None:
-            listening.close()
-        await runner.cleanup()
         server.close()
-
-
-async def _listen(runner: web.AppRunner, door: Doorkeeper, host: str, port: int) -> asyncio.Server:
-    """Raises ``LcfError``."""
-    assert runner.server is not None
-    protocol = partial(door.protocol, runner.server)
-    try:
-        return await asyncio.get_running_loop().create_server(protocol, host, port, backlog=BACKLOG)
-    except (OSError, OverflowError) as error:
-        raise LcfError(_cannot_listen(error, host, port)) from error
 
 
 class Server:
@@ -127,9 +75,7 @@ class Server:
         """Return the application with all routes."""
         application = web.Application(middlewares=[door.busy])
         guard.protect(application)
-        for name, kind in PAGE.items():
-            path = "/" if name == "index.html" else f"/{name}"
-            application.router.add_get(path, _sent(name, kind))
+        add_page(application, __package__)
         application.router.add_get("/updates", self._updates)
         if self._player is None:
             application.router.add_get("/save", self._save)
@@ -237,52 +183,3 @@ def _abort(request: web.Request) -> None:
     """Drop the connection with all unsent data."""
     if request.transport is not None:
         request.transport.abort()
-
-
-def _sent(name: str, kind: str) -> Callable[[web.Request], Awaitable[web.Response]]:
-    """Send a file of the page."""
-    body = (files("lcf_edge.monitor.web") / "page" / name).read_bytes()
-
-    async def send(_: web.Request) -> web.Response:
-        return web.Response(body=body, content_type=kind, charset="utf-8")
-
-    return send
-
-
-def _address(host: str, port: int, token: str | None) -> str:
-    if token is None:
-        return f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    return f"http://{_own_address(host)}:{port}/?{TOKEN}={token}"
-
-
-def _own_address(host: str) -> str:
-    """Return the address by which others probably reach this machine; nothing is sent."""
-    if host not in {"0.0.0.0", "::", ""}:
-        return f"[{host}]" if ":" in host else host
-    with suppress(OSError), socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.connect(("192.0.2.1", 9))
-        return str(probe.getsockname()[0])
-    return socket.gethostname()
-
-
-def _cannot_listen(error: OSError | OverflowError, host: str, port: int) -> str:
-    code = getattr(error, "errno", None) or 0  # negative for an unknown name, with its own text
-    reason = os.strerror(code) if code > 0 else getattr(error, "strerror", None) or str(error)
-    return f"view: {host}:{port}: cannot listen ({reason}); choose with --listen HOST and --port N"
-
-
-class _OneLine(logging.StreamHandler):  # type: ignore[type-arg]
-    """Logs aiohttp's complaints in one line each on standard error, without those about invalid HTTP."""
-
-    def emit(self, record: logging.LogRecord) -> None:
-        if not isinstance(_cause(record), HttpProcessingError):
-            super().emit(record)
-
-    def format(self, record: logging.LogRecord) -> str:
-        cause = _cause(record)
-        text = f"{record.getMessage()}{'' if cause is None else f': {cause!r}'}"
-        return f"lcf-edge: warning: view: {' '.join(text.split())[:MAX_LINE]}"
-
-
-def _cause(record: logging.LogRecord) -> BaseException | None:
-    return record.exc_info[1] if record.exc_info else None

@@ -27,8 +27,8 @@ from lcf_edge.daemon.log import AT_ONCE
 from lcf_edge.messages import CIRCLE
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.web import server
-from lcf_edge.monitor.web.doorkeeper import Doorkeeper
-from lcf_edge.monitor.web.guard import Guard
+from lcf_edge.web.doorkeeper import Doorkeeper
+from lcf_edge.web.guard import Guard
 
 PATIENCE_S = 30.0
 
@@ -85,7 +85,7 @@ SCRIPTS = sorted(file.name for file in Path(server.__file__).parent.glob("page/*
 
 
 def test_the_page_and_all_that_it_needs_is_sent_with_a_strict_policy(lonely: str) -> None:
-    for name in ("", "page.css", *SCRIPTS, "icon.svg"):
+    for name in ("", "base.css", "page.css", *SCRIPTS, "icon.svg"):
         answer: Any = ask(lonely, f"/{name}")
         assert answer.status == 200
         policy = answer.headers["Content-Security-Policy"]

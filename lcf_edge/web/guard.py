@@ -60,7 +60,7 @@ class Guard:
             return None
         brought = request.query.get(TOKEN) or request.cookies.get(_cookie(request), "")
         if not hmac.compare_digest(brought.encode(errors="replace"), self.token.encode()):
-            return web.Response(status=403, text="open the address that lcf-edge view printed when it started\n")
+            return web.Response(status=403, text="open the address that lcf-edge printed when it started\n")
         return None
 
     def _welcome(self, request: web.Request) -> web.Response | None:
