@@ -19,8 +19,8 @@ BEGIN, END = "<!-- columns: begin -->\n", "<!-- columns: end -->\n"
 
 LAYERS = (
     ("cli",),
-    ("monitor", "doctor", "calibrate", "evaluate", "gate"),
-    ("web",),
+    ("monitor", "doctor", "calibrate", "evaluate"),
+    ("web", "gate"),
     ("daemon", "client"),
     ("metrics",),
     ("devices", "pipeline", "sinks"),

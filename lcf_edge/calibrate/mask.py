@@ -5,10 +5,11 @@ root mean square of the gradients; where the world passes, they change and point
 gradients: it belongs to the vehicle if it reaches the border of the image and its rim is constant.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import cv2
+import msgspec
 import numpy as np
 import numpy.typing as npt
 
@@ -16,8 +17,8 @@ from drivers.samples import Frame
 from lcf_edge.calibrate import report
 from lcf_edge.calibrate.guide import Guide
 from lcf_edge.calibrate.result import CalibrationError, Result
-from lcf_edge.calibrate.sources import SensorSource, for_a_while
-from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config
+from lcf_edge.calibrate.sources import Item, SensorSource, for_a_while
+from lcf_edge.config import MAX_POINTS, MAX_POLYGONS, Config, check_mask
 from lcf_edge.printable import counted
 
 if TYPE_CHECKING:
@@ -28,6 +29,7 @@ Marked = npt.NDArray[np.bool_]
 Polygon = list[list[float]]
 
 LIVE_S = 30.0
+NO_IMAGES = "camera: no images came; check camera.device, or name another recording"
 
 _APART_S = 0.2  # images closer together are too similar
 _MIN_FRAMES = 20
@@ -76,34 +78,46 @@ def calibrate_mask(source: SensorSource, config: Config, seconds: float | None, 
         seconds = seconds or LIVE_S
         guide.say(f"Drive around for {seconds:g} s, past things, with turns to both sides.")
     stillness: Stillness | None = None
-    image, last_ns = np.zeros((1, 1), np.uint8), 0
-    for item in for_a_while(source.items(), seconds, Frame):
-        if not isinstance(item, Frame) or (stillness and item.stamp_ns - last_ns < _APART_S * 1e9):
-            continue
-        stillness = stillness or Stillness(*item.image.shape)
-        image, last_ns = item.image, item.stamp_ns
+    image = np.zeros((1, 1), np.uint8)
+    for image in images_apart(for_a_while(source.items(), seconds, Frame)):
+        stillness = stillness or Stillness(*image.shape)
         stillness.add(image)
         guide.progress(f"{stillness.frames} images")
     guide.end()
     if stillness is None:
-        raise CalibrationError("camera: no images came; check camera.device, or name another recording")
+        raise CalibrationError(NO_IMAGES)
+    polygons, words = proposal(stillness)
+    return as_result(polygons, image, config, words, "calibrate mask")
+
+
+def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
+    """``camera.mask`` as given, px of the source's images. Raises ``CalibrationError``, ``ConfigError``."""
+    image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
+    guide.end()
+    if image is None:
+        raise CalibrationError(NO_IMAGES)
+    return as_result(polygons, image, config, f"{counted(len(polygons), 'own part')}, as given", "--polygon")
+
+
+def images_apart(items: Iterator[Item]) -> Iterator[Grey]:
+    """Yield the images among ``items`` that are so far apart that they differ when the vehicle drives."""
+    last_ns: int | None = None
+    for item in items:
+        if isinstance(item, Frame) and (last_ns is None or item.stamp_ns - last_ns >= _APART_S * 1e9):
+            last_ns = item.stamp_ns
+            yield item.image
+
+
+def proposal(stillness: Stillness) -> tuple[list[Polygon], str]:
+    """Return the outlines of what never moved, px, and what was found in words. Raises ``CalibrationError``."""
     own = own_parts(stillness)
     polygons = outlines(own)
     if not polygons:
         raise CalibrationError(
-            f"camera: nothing stands still in {stillness.frames} images; outline what is in view with --polygon"
+            f"camera: nothing stands still in {stillness.frames} images; outline what is in view yourself (--draw)"
         )
-    words = f"{counted(stillness.frames, 'image')}; {counted(len(polygons), 'own part')}, {own.mean():.1%} of the image"
-    return _result(polygons, image, config, (words,))
-
-
-def given_mask(source: SensorSource, config: Config, polygons: Sequence[Polygon], guide: Guide) -> Result:
-    """``camera.mask`` as given, px of the source's images. Raises ``CalibrationError``."""
-    image = next((item.image for item in source.items() if isinstance(item, Frame)), None)
-    guide.end()
-    if image is None:
-        raise CalibrationError("camera: no images came; check camera.device, or name another recording")
-    return _result(polygons, image, config, (f"{counted(len(polygons), 'own part')}, as given",))
+    parts = counted(len(polygons), "own part")
+    return polygons, f"{counted(stillness.frames, 'image')}; {parts}, {own.mean():.1%} of the image"
 
 
 def own_parts(stillness: Stillness) -> Marked:
@@ -163,12 +177,16 @@ def outlines(own: Marked) -> list[Polygon]:
     return [each.astype(float).tolist() for each in simple if 3 <= len(each) <= MAX_POINTS][:MAX_POLYGONS]
 
 
-def _result(polygons: Sequence[Polygon], image: Grey, config: Config, findings: tuple[str, ...]) -> Result:
+def as_result(polygons: Sequence[Polygon], image: Grey, config: Config, finding: str, origin: str) -> Result:
+    """``camera.mask`` of polygons in px of ``image``. Raises ``ConfigError`` in the name of ``origin``."""
     height, width = image.shape
     scale = np.array((config.camera.width / width, config.camera.height / height))
-    mask = [np.rint((np.array(each) + 0.5) * scale - 0.5).astype(int).tolist() for each in polygons]
+    with np.errstate(over="ignore"):  # infinity is refused
+        mask = [np.rint((np.reshape(each, (-1, 2)) + 0.5) * scale - 0.5).tolist() for each in polygons]
+    check_mask(msgspec.structs.replace(config.camera, mask=mask), origin)
+    whole: list[list[list[float]]] = [[[int(x), int(y)] for x, y in polygon] for polygon in mask]
     words = f"px of an image of {config.camera.width}x{config.camera.height} (camera.width, camera.height)"
-    return Result((*findings, words), "camera", {"mask": mask}, _painter(polygons, image))
+    return Result((finding, words), "camera", {"mask": whole}, _painter(polygons, image))
 
 
 def _painter(polygons: Sequence[Polygon], image: Grey) -> "Callable[[Figure], None]":

@@ -280,6 +280,10 @@ def _add_calibrate(commands: "argparse._SubParsersAction[_Parser]", settings: _P
         metavar="X,Y,X,Y,...",
         help="an outline, px of the image, in place of what never moves; may be repeated",
     )
+    mask.add_argument("--draw", action="store_true", help="outlines drawn on a page for a browser, on 127.0.0.1")
+    mask.add_argument(
+        "--port", type=_whole(0, 65535), default=8088, metavar="N", help="of that page (%(default)s; 0: any)"
+    )
     for kind, default_s in ((imu, "10 at rest, 20 by camera"), (foe, "20"), (clocks, "20"), (mask, "30")):
         text = f"how long to measure ({default_s}; of a recording: all)"
         kind.add_argument("--seconds", type=_positive, metavar="N", help=text)

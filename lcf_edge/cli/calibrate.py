@@ -20,6 +20,7 @@ from lcf_edge.calibrate.sources import LiveSource, RecordedSource, SensorSource
 from lcf_edge.calibrate.target import PRINT_SUFFIXES, Target
 from lcf_edge.calibrate.time_offset import calibrate_time
 from lcf_edge.config import DEFAULT_PATH, Config
+from lcf_edge.web.library import require_aiohttp
 
 SNAP_BY_HAND_DEG = 15.0  # a motion by hand is no more accurate
 
@@ -78,6 +79,18 @@ def foe(task: Task) -> list[str]:
 def time(task: Task) -> list[str]:
     """Offset between the clocks. Raises ``LcfError``."""
     return _calibrate(task, lambda source, guide: calibrate_time(source, task.config, task.seconds, guide))
+
+
+def mask_drawn(task: Task, polygons: list[Polygon] | None, port: int) -> list[str]:
+    """Own parts in view as drawn on a page; ``polygons``: already drawn, px. Raises ``LcfError``, ``DriverError``."""
+    require_aiohttp("calibrate mask")
+    from lcf_edge.calibrate.drawing.server import drawn_mask  # noqa: PLC0415
+
+    return _calibrate(
+        task,
+        lambda source, guide: drawn_mask(source, task.config, polygons or [], task.seconds, port, guide),
+        imu=False,
+    )
 
 
 def mask(task: Task, polygons: list[Polygon] | None) -> list[str]:

@@ -228,6 +228,8 @@ def _calibrate(arguments: argparse.Namespace) -> None:
             _write_lines(*calibrate.foe(task))
         case "time":
             _write_lines(*calibrate.time(task))
+        case "mask" if arguments.draw:
+            _write_lines(*calibrate.mask_drawn(task, arguments.polygon, arguments.port))
         case "mask":
             _write_lines(*calibrate.mask(task, arguments.polygon))
 

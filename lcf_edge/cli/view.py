@@ -3,9 +3,9 @@
 
 from collections.abc import Callable
 
-from lcf_edge.errors import LcfError
 from lcf_edge.monitor.live.daemon_address import DaemonAddress
 from lcf_edge.monitor.replay.replayed import Replayed
+from lcf_edge.web.library import require_aiohttp
 
 
 def view(shown: DaemonAddress | Replayed, host: str, port: int, write_line: Callable[[str], None]) -> None:
@@ -13,10 +13,7 @@ def view(shown: DaemonAddress | Replayed, host: str, port: int, write_line: Call
 
     Raises ``PublishError``, ``RecordingError``, and ``LcfError`` without the extra ``view``.
     """
-    try:
-        import aiohttp  # noqa: F401
-    except ImportError as error:
-        raise LcfError("view: aiohttp is missing; run pip install 'lcf-edge[view]'") from error
+    require_aiohttp("view")
     import asyncio
 
     from lcf_edge.monitor.web.server import serve

@@ -417,7 +417,7 @@ def _check(config: Config, origin: str) -> None:
     if 0 < camera.height_m < MIN_HEIGHT_M:
         raise ConfigError(f"{origin}: camera.height_m: 0 (unknown), or {MIN_HEIGHT_M} at least")
     _check_lens(camera, origin)
-    _check_mask(camera, origin)
+    check_mask(camera, origin)
     _check_endpoints(config.zenoh, origin)
     axes = config.imu.axes
     if axes and (len(axes) != 3 or any(len(row) != 3 for row in axes)):
@@ -443,7 +443,8 @@ def _check_lens(camera: Camera, origin: str) -> None:
         raise ConfigError(f"{origin}: camera.distortion: {camera.distortion_model} takes {counts} numbers")
 
 
-def _check_mask(camera: Camera, origin: str) -> None:
+def check_mask(camera: Camera, origin: str) -> None:
+    """Raise ``ConfigError`` in the name of ``origin`` if ``camera.mask`` cannot be used."""
     if len(camera.mask) > MAX_POLYGONS:
         raise ConfigError(f"{origin}: camera.mask: {len(camera.mask)} polygons, more than {MAX_POLYGONS}")
     for number, polygon in enumerate(camera.mask, start=1):

@@ -1,8 +1,9 @@
 """Access control: only this machine, or whoever knows the token.
 
 On loopback every request must name a loopback host, so that no web page can point a name of its own here (DNS
-rebinding). Opened to the network, a request must bring the token instead, which no such page knows. In both cases the
-Origin of a request, if it has one, must be the page's own.
+rebinding). Opened to the network, a request must bring the token instead, which no such page knows; on loopback it must
+bring it as well where other users of this machine are to be kept out. In all cases the Origin of a request, if it has
+one, must be the page's own.
 """
 
 import hmac
@@ -33,10 +34,11 @@ Handler = Callable[[web.Request], Awaitable[web.StreamResponse]]
 
 
 class Guard:
-    """Lets requests through or refuses them. ``token``: None where only loopback is listened on."""
+    """Lets requests through or refuses them. ``token``: None where being on this machine is enough."""
 
-    def __init__(self, host: str) -> None:
-        self.token = None if is_loopback(host) else secrets.token_urlsafe(24)
+    def __init__(self, host: str, *, is_private: bool = False) -> None:
+        self._is_local = is_loopback(host)
+        self.token = None if self._is_local and not is_private else secrets.token_urlsafe(24)
 
     def protect(self, application: web.Application) -> None:
         """Check every request to ``application``."""
@@ -52,7 +54,7 @@ class Guard:
         """Return the answer to a request that is refused; None: it is allowed."""
         if not all(value.isascii() for name, value in request.headers.items() if name != "Cookie"):
             return web.Response(status=400, text="a header that is not ASCII\n")  # aiohttp would fail on some of them
-        if self.token is None and not is_loopback(_name(request.host)):
+        if self._is_local and not is_loopback(_name(request.host)):
             return web.Response(status=403, text=f"{request.host} is not this machine; use http://127.0.0.1\n")
         if request.headers.get("Origin", f"//{request.host}").partition("//")[2] != request.host:
             return web.Response(status=403, text="requests from other pages are refused\n")

@@ -26,12 +26,16 @@ _KINDS = {".html": "text/html", ".css": "text/css", ".js": "text/javascript", ".
 
 @dataclass(frozen=True)
 class Place:
-    """Where to listen. ``command``: for whom; ``remedy``: which options of it choose another place."""
+    """Where to listen. ``command``: for whom; ``remedy``: which options of it choose another place.
+
+    ``is_private``: other users of this machine are kept out as well.
+    """
 
     host: str
     port: int
     command: str
     remedy: str
+    is_private: bool = False
 
 
 async def serve_at(
@@ -46,7 +50,7 @@ async def serve_at(
     for logger in (logging.getLogger("aiohttp"), logging.getLogger("asyncio"), LOGGER):
         logger.handlers[:] = [handler]
         logger.propagate = False
-    guard = Guard(place.host)
+    guard = Guard(place.host, is_private=place.is_private)
     door = Doorkeeper()
     runner = web.AppRunner(
         application(guard, door),

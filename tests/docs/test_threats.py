@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 from drivers.imu import serial_imu
+from lcf_edge.calibrate.drawing.server import MAX_DRAWING_BYTES
 from lcf_edge.daemon import memory, peers
 from lcf_edge.gate import entrances, gate, key_limits, pace
 from lcf_edge.monitor.web import server
@@ -83,6 +84,8 @@ def test_every_loss_that_is_counted_is_reported() -> None:
 def test_the_bounds_of_the_page() -> None:
     most, within_s = doorkeeper.MAX_CONNECTIONS, doorkeeper.REQUEST_WITHIN_S
     assert f"{most} connections, {within_s:g} s to a request, {server.MAX_BROWSERS} browsers" in DOCUMENT
+    drawn = f"{most} connections, {within_s:g} s to a request, drawings of {MAX_DRAWING_BYTES // 1024} KiB"
+    assert drawn in DOCUMENT
 
 
 def test_what_a_local_program_may_do() -> None:

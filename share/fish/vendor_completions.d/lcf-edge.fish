@@ -195,6 +195,8 @@ complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l from -xka "(__
 complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l report -xka "(__fish_complete_path (commandline -ct))" -d 'a figure to judge the result by'
 complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l write -d 'write the result to the configuration file'
 complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l polygon -x -d 'an outline, px of the image, in place of what never moves; may be repeated'
+complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l draw -d 'outlines drawn on a page for a browser, on 127.0.0.1'
+complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l port -x -d 'of that page (8088; 0: any)'
 complete -c lcf-edge -n '_shtab_lcf_edge_using calibrate mask' -l seconds -x -d 'how long to measure (30; of a recording: all)'
 complete -c lcf-edge -n '_shtab_lcf_edge_using; and test $_shtab_lcf_edge_npos -eq 0' -a config -d 'check and print the effective configuration'
 complete -c lcf-edge -n '_shtab_lcf_edge_using config' -s h -l help -d 'show this help message and exit'

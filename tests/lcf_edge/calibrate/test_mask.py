@@ -9,11 +9,14 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
-from lcf_edge.calibrate.mask import Stillness, outlines, own_parts
+from lcf_edge.calibrate.mask import Stillness, as_result, outlines, own_parts
 from lcf_edge.calibrate.result import CalibrationError
 from lcf_edge.cli.command_line import main
-from lcf_edge.config import load
+from lcf_edge.config import Config, load
+from lcf_edge.errors import ConfigError
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import Drive
 
@@ -94,6 +97,26 @@ def test_polygons_are_taken_as_given(recording: Path, capsys: pytest.CaptureFixt
     assert main(["calibrate", "mask", "--from", str(recording), *given, *sizes]) == 0
     found = tomllib.loads(capsys.readouterr().out)["camera"]["mask"]
     assert found == [[[0, 200], [319, 200], [319, 239], [0, 239]], [[0, 0], [20, 0], [0, 20]]]
+
+
+NUMBERS = st.floats(-700, 1300) | st.floats()
+POLYGONS = st.lists(st.lists(st.tuples(NUMBERS, NUMBERS).map(list), min_size=2, max_size=5), max_size=3)
+
+
+@given(polygons=POLYGONS)
+def test_a_mask_is_one_that_the_configuration_takes_or_it_is_refused(polygons: list[list[list[float]]]) -> None:
+    image = np.zeros((240, 320), np.uint8)
+    try:
+        mask = as_result(polygons, image, Config(), "as given", "--polygon").values["mask"]
+    except ConfigError:
+        return
+    assert load(None, [f"camera.mask={mask}"]).camera.mask == mask
+
+
+def test_a_polygon_far_outside_is_refused(recording: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["calibrate", "mask", "--from", str(recording), "--polygon", "0,0,5000,0,0,50"]) == 2
+    (line,) = capsys.readouterr().err.splitlines()
+    assert line == "lcf-edge: --polygon: camera.mask: polygon 1 lies far outside an image of 640x480 px"
 
 
 @pytest.mark.parametrize("text", ["0,0,1,1", "0,0,1,1,2", "a,b,c,d,e,f", "0,0,1,1,2,nan"])
