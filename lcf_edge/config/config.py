@@ -24,6 +24,7 @@ DEFAULT_PATH = Path("/etc/lcf-edge/config.toml")
 MIN_HEIGHT_M = 0.001
 MAX_POLYGONS, MAX_POINTS = 64, 256  # of a mask
 
+_MEASURED = ("delta_rebel_px", "edge_noise_px", "focus_sigma_px")  # once keys of `filter`, now measured
 _SHOWN = 60  # characters of an unknown key
 _MAX_QUOTED = 300  # characters of any other text from the user
 
@@ -141,7 +142,6 @@ class Filter(Table, frozen=True):
     tr_s: Trust = 3.0
     tr_max: Trust = 5.0
     delta_px: Gate = 1.5  # δ, corner noise off the flow line
-    delta_rebel_px: Gate = 2.5  # δ over the chain of key frames
     bl0_px: Gate = 12.0  # BL at birth
     leap_px: Annotated[float, msgspec.Meta(ge=0.001, le=200)] = (
         40.0  # farthest that a landmark may move between its first two frames
@@ -170,8 +170,7 @@ class Filter(Table, frozen=True):
     rebel_support: Count = 3  # edges that make a rebel circle
     rebel_share: Share = 0.15  # of the edges in a rebel circle must be rebels
     rebel_link_px: Pixels = 40.0  # rebels farther apart are not of one circle
-    edge_noise_px: Gate = 0.4  # 1 sigma of an edge's position
-    focus_sigma_px: Annotated[float, msgspec.Meta(ge=0, le=1000)] = 6.0  # uncertainty of O
+    corner_noise_px: Gate = 0.29  # 1 sigma of a corner's position, at least: that of whole pixels, 1/√12
     ground_margin: Share = 0.2  # share by which the ground may be misjudged
     pitch_sigma_rad: Annotated[float, msgspec.Meta(ge=0, le=1.5)] = 0.008
     patches: Annotated[int, msgspec.Meta(ge=0, le=64)] = 6  # of the image near the path, followed for seconds
@@ -325,9 +324,18 @@ def _read(path: Path, *, needed: bool, filled: bool) -> dict[str, Any]:
     if len(data) > bounded_toml.MAX_BYTES:
         raise ConfigError(f"{path}: too large for a configuration file; name another file with -c")
     try:
-        return bounded_toml.parse(data.decode())
+        tree = bounded_toml.parse(data.decode())
     except ValueError as error:
         raise ConfigError(f"{path}: not valid TOML: {printable(str(error), _MAX_QUOTED)}") from error
+    return _without_measured(tree) if path.suffix.lower() == ".mcap" else tree
+
+
+def _without_measured(tree: dict[str, Any]) -> dict[str, Any]:
+    """What an earlier version recorded, which nobody can edit, without the keys that are gone since."""
+    section = tree.get("filter")
+    if not isinstance(section, dict):
+        return tree
+    return {**tree, "filter": {name: value for name, value in section.items() if name not in _MEASURED}}
 
 
 def _start_of(path: Path) -> bytes:
@@ -375,6 +383,8 @@ def _typed(tree: dict[str, Any], origin: str) -> Config:
 def _refuse_unknown(tree: dict[str, Any], table: type[msgspec.Struct], prefix: str, origin: str) -> None:
     known = {field.name: field.type for field in msgspec.structs.fields(table)}
     for name, value in tree.items():
+        if prefix == "filter." and name in _MEASURED:
+            raise ConfigError(f"{origin}: filter.{name} is gone, since it is measured now; delete it")
         if name not in known:
             shown = printable(name, _SHOWN)
             raise ConfigError(f"{origin}: unknown key {prefix}{shown}{_hint(shown, prefix)}")

@@ -23,6 +23,6 @@ cpdef void send_home(EdgeColumns edges, Py_ssize_t i, Situation around, Settings
 cpdef void release_obedient(Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef void wait(EdgeColumns edges, Py_ssize_t i, bint key, Situation around) noexcept nogil
 cdef int middle_key(Verdicts verdicts, Py_ssize_t j, KeyFrames keys, bint key) noexcept nogil
-cpdef int decide(Verdicts verdicts, Verdicts recent, EdgeColumns edges, KeyFrames keys, bint key, Baselines baselines, int[::1] born, Situation around, Settings settings) noexcept nogil
-cpdef void give_births(Verdicts verdicts, Verdicts recent, EdgeColumns edges, KeyFrames keys, bint key, Baselines baselines, int[::1] born, int births, Situation around, Settings settings) noexcept nogil
+cpdef int decide(Verdicts verdicts, Verdicts recent, EdgeColumns edges, KeyFrames keys, bint key, Baselines baselines, int[::1] born, Situation around) noexcept nogil
+cpdef void give_births(Verdicts verdicts, Verdicts recent, EdgeColumns edges, KeyFrames keys, bint key, Baselines baselines, int[::1] born, int births, Settings settings) noexcept nogil
 cpdef int gather_rebels(Verdicts verdicts, EdgeColumns edges, int[::1] breaking) noexcept nogil

@@ -64,8 +64,8 @@ def judge_all(
             j = verdicts.count
             verdicts.count += 1
             verdicts.oldest[j] = key_frames.oldest_key(edges, i, keys)
-            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines, around)
-            rebel_detection.judge(verdicts, j, edges, baselines, around, settings)
+            rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines)
+            rebel_detection.judge(verdicts, j, edges, baselines, around)
     rebel_detection.find_incoming(verdicts, edges, baselines, around, settings)
 
 
@@ -125,7 +125,6 @@ def decide(
     baselines: Baselines,
     born: Integers,
     around: Situation,
-    settings: Settings,
 ) -> int:
     """Decide each chain: if its younger link agrees with the whole it becomes a rebel. Either way the chain ends.
 
@@ -141,9 +140,9 @@ def decide(
         if middle <= verdicts.oldest[j]:
             wait(edges, i, key, around)
             continue
-        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines, around)
-        rebel_detection.judge(recent, 0, edges, baselines, around, settings)
-        if rebel_detection.agree(verdicts, j, recent, 0, baselines, settings):
+        rebel_detection.link(recent, 0, edges, i, middle % KEYS, baselines)
+        rebel_detection.judge(recent, 0, edges, baselines, around)
+        if rebel_detection.agree(verdicts, j, recent, 0, baselines):
             born[births] = j
             births += 1
             continue
@@ -162,14 +161,13 @@ def give_births(
     baselines: Baselines,
     born: Integers,
     births: int,
-    around: Situation,
     settings: Settings,
 ) -> None:
     """The first ``births`` of ``born`` become rebels."""
     for b in range(births):
         j = born[b]
         slot = middle_key(verdicts, j, keys, key) % KEYS
-        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines, around)
+        rebel_detection.link(recent, 0, edges, verdicts.row[j], slot, baselines)
         rebel_detection.give_birth(edges, verdicts, j, recent, 0, baselines.elapsed_s[slot], settings)
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import flow, lengths
+from lcf_edge.filter import flow
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
@@ -10,7 +10,6 @@ from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.situation import Situation
 
 STILL_M = 1e-3  # a displacement below this has no direction
-MIN_R_PX = 1.0
 
 
 class Baselines:
@@ -19,8 +18,8 @@ class Baselines:
     ``h``: homography (KEYS, 9) of the rotation since. ``focus_x``, ``focus_y``: focus of the displacement since, px.
     ``depth_m``: ΔZ, its forward component. ``elapsed_s``. ``sigma_px``: uncertainty of the rotation since, of this key
     frame alone: by the gyro, or by the flow once that has measured it. ``is_fitted``, ``rate_covariance`` (3, 3),
-    (rad/s)²: of the rotation-rate error after a fit, which all key frames share. ``turned``: scratch, image motion of a
-    point for 1 rad about each axis, px.
+    (rad/s)²: of the rotation-rate error after a fit, which all key frames share. ``turned_x``, ``turned_y``: scratch,
+    image motion of a point for 1 rad about each axis, px.
     """
 
     def __init__(self) -> None:
@@ -28,7 +27,7 @@ class Baselines:
         self.focus_x, self.focus_y, self.depth_m, self.elapsed_s, self.sigma_px = [doubles(KEYS) for _ in range(5)]
         self.is_fitted = False
         self.rate_covariance = doubles(3, 3)
-        self.turned = doubles(3)
+        self.turned_x, self.turned_y = doubles(3), doubles(3)
 
 
 def measure(baselines: Baselines, keys: KeyFrames, h: Homography, pinhole: Pinhole, around: Situation) -> None:
@@ -81,20 +80,3 @@ def turn_px(pinhole: Pinhole, axis: int, x: float, y: float, cos: float, sin: fl
     if axis == 1:
         return (1 + u * u) * pinhole.fx * cos + u * v * pinhole.fy * sin
     return -v * pinhole.fx * cos + u * pinhole.fy * sin
-
-
-def sigma_along(baselines: Baselines, pinhole: Pinhole, slot: int, x: float, y: float) -> float:
-    """1 sigma along the flow, px, of an edge that was at (x, y) at a key frame, by the rotation since."""
-    if not baselines.is_fitted:
-        return baselines.sigma_px[slot]
-    dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
-    r = max(lengths.of(dx, dy), MIN_R_PX)
-    cos, sin = dx / r, dy / r
-    for i in range(3):
-        baselines.turned[i] = turn_px(pinhole, i, x, y, cos, sin)
-    variance = 0.0
-    for i in range(3):
-        for j in range(3):
-            variance += baselines.turned[i] * baselines.rate_covariance[i, j] * baselines.turned[j]
-    t, own = baselines.elapsed_s[slot], baselines.sigma_px[slot]
-    return math.sqrt(max(variance, 0.0) * t * t + own * own)

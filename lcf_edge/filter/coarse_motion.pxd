@@ -50,7 +50,7 @@ cdef class CoarseMotion:
     cdef int pictures, keys, seen, searches, here, across, down, least_still, least_moving
     cdef const double[::1] x, y
     cdef int[::1] rough, links_before, block
-    cdef readonly int[::1] stance
+    cdef int[::1] stance
     cdef int[::1] links
     cdef double[::1] came_x, came_y, vx_before, vy_before
     cdef double[:, ::1] shares

@@ -14,6 +14,7 @@ cdef class EdgeColumns:
     cdef double[::1] predicted_x, predicted_y, predicted_speed, cos, sin, cost
     cdef int[::1] corner, best, psi, fixed_x, fixed_y
     cdef double[::1] fixed_s
+    cdef double[::1] variance_along, variance_across, covariance_speed, variance_speed
     cdef bint own_way(self, Py_ssize_t i) noexcept nogil
     cdef bint is_own_part(self, Py_ssize_t i) noexcept nogil
     @cython.locals(number=int)

@@ -24,6 +24,8 @@ class EdgeColumns:
         self.predicted_x, self.predicted_y = memory["predicted_x"], memory["predicted_y"]
         self.predicted_speed, self.cos, self.sin = memory["predicted_speed"], memory["cos"], memory["sin"]
         self.fixed_x, self.fixed_y, self.fixed_s = memory["fixed_x"], memory["fixed_y"], memory["fixed_s"]
+        self.variance_along, self.variance_across = memory["variance_along"], memory["variance_across"]
+        self.covariance_speed, self.variance_speed = memory["covariance_speed"], memory["variance_speed"]
         self.corner, self.best, self.cost, self.psi = memory["corner"], memory["best"], memory["cost"], memory["psi"]
 
     def own_way(self, i: int) -> bool:

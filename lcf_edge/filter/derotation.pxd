@@ -17,7 +17,7 @@ cdef double MIN_SIGMA_PX
 cdef class OffLine:
     cdef readonly Py_ssize_t count
     cdef readonly double[::1] pitch, yaw, roll, px, alone, alone_sigma
-    cdef readonly NormalEquations equations
+    cdef NormalEquations equations
     cdef readonly double turn_x, turn_y, turn_z, sigma
 
 cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept nogil

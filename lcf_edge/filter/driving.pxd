@@ -15,7 +15,8 @@ cdef double MAX_ASTRAY
 cdef double MAX_DRIFT_SHARE
 
 cdef class DrivingTest:
-    cdef readonly int edges, left, right, astray
+    cdef readonly int edges, left, right
+    cdef int astray
     cdef readonly bint drives
 
 @cython.locals(r=double)

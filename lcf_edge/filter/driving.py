@@ -44,7 +44,7 @@ def look(
         return
     test.edges += 1
     outward, drift = verdicts.outward[j], math.fabs(verdicts.drift[j])
-    if lengths.of(outward, drift) < MOVES_SIGMAS * rebel_detection.sigma_px(verdicts, j, around):
+    if lengths.of(outward, drift) < MOVES_SIGMAS * rebel_detection.sigma_px(verdicts, j):
         return
     if drift > MAX_DRIFT_SHARE * outward:
         test.astray += 1

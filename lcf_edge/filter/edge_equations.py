@@ -75,6 +75,11 @@ def update_position(trust: float, tr_cr: float, predicted: float, measured: floa
     return (weight * predicted + measured) / (weight + 1)
 
 
+def share_of_corner(trust: float, tr_cr: float) -> float:
+    """Share of the way from L' to its corner that an edge takes: 1 / ((Tr - Tr_cr) + 1)."""
+    return 1 / (max(trust - tr_cr, 0.0) + 1)
+
+
 def update_speed(trust: float, tr_cr: float, speed: float, along: float, dt_s: float) -> float:
     """V = V' ± distance/t_f, plus when the corner lies beyond L' along the line (eq. EnEstimation, second line).
 

@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport edge_equations, edge_rows, image_plane, lengths, line_expert, rebel_circles
+from lcf_edge.filter cimport edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert, rebel_circles
 from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
@@ -12,6 +12,8 @@ cdef double SWING_SHARE
 cdef double MIN_ORIGIN_PX
 cdef double MIN_RADIUS_PX
 cdef double STRAY_GATE_SHARE
+cdef double ROTATION_SIGMAS
+cdef double FIRST_SPEED_SHARE
 cdef int FIXED_PX
 cdef double MAX_FIXED_STEP_S
 cdef double JOIN_GATE_SHARE
@@ -20,12 +22,12 @@ cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept n
 cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
 cdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
 cdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
-cpdef void update(EdgeColumns edges, CircleColumns normal, CircleColumns rebel, CornerColumns corners, double delta_px, double dt_s, Settings settings) noexcept nogil
+cpdef void update(EdgeColumns edges, CircleColumns normal, CircleColumns rebel, CornerColumns corners, double sigma_px, Situation around, Settings settings) noexcept nogil
 cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner, double dt_s) noexcept nogil
-cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, CircleColumns rebel, double x, double y, double dt_s, Settings settings) noexcept nogil
+cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, CircleColumns rebel, double x, double y, Situation around, Settings settings) noexcept nogil
 cdef double trust_in_prediction(EdgeColumns edges, Py_ssize_t i, CircleColumns rebel, double x, double y, double dt_s, Settings settings) noexcept nogil
 cdef void turn_own_way(EdgeColumns edges, Py_ssize_t i) noexcept nogil
-cdef void stray(EdgeColumns edges, Py_ssize_t i, double x0, double y0, CornerColumns corners, Py_ssize_t corner, double dt_s, Settings settings) noexcept nogil
+cdef void stray(EdgeColumns edges, Py_ssize_t i, double x0, double y0, CornerColumns corners, Py_ssize_t corner, Situation around, Settings settings) noexcept nogil
 cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, double tr_cr) noexcept nogil
 cpdef int count_unclaimed(CornerColumns corners) noexcept nogil
 cpdef void add(EdgeColumns edges, CircleColumns normal, CornerColumns corners, GroupColumns groups, Situation around, Py_ssize_t room, int key_number, Settings settings) noexcept nogil

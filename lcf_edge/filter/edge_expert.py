@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import edge_equations, edge_rows, image_plane, lengths, line_expert, rebel_circles
+from lcf_edge.filter import edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert, rebel_circles
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Bytes
@@ -16,6 +16,8 @@ SWING_SHARE = 0.2  # prediction error that a rebel may have, as a share of its m
 MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nor one nearer to the focus
 STRAY_GATE_SHARE = 0.5  # BL of a new suspect, as a share of BL at birth
+ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
+FIRST_SPEED_SHARE = 0.17  # 1 sigma of V of a new landmark, as a share of BL in one frame
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
 JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
@@ -81,13 +83,18 @@ def update(
     normal: CircleColumns,
     rebel: CircleColumns,
     corners: CornerColumns,
-    delta_px: float,
-    dt_s: float,
+    sigma_px: float,
+    around: Situation,
     settings: Settings,
 ) -> None:
-    """Classify the matched pairs and update every edge; unmatched ones follow their prediction. ``delta_px``: δ."""
+    """Classify the matched pairs and update every edge; unmatched ones follow their prediction.
+
+    ``sigma_px``: 1 sigma of the image motion by the rotation.
+    """
+    delta_px, dt_s = settings.delta_px + ROTATION_SIGMAS * sigma_px, around.dt_s
     for i in range(edges.count):
         edges.matched[i] = 0
+        error_matrix.predict(edges, i, sigma_px * sigma_px, dt_s)
         corner = edges.corner[i]
         if corner < 0:
             change = 0.0 if edges.held[i] else edge_equations.UNMATCHED
@@ -98,12 +105,12 @@ def update(
         relation = relation_of(edges, i, x, y, delta_px, settings)
         go_on(edges, i)
         if relation in (edge_equations.FOLLOWS, edge_equations.DISAGREES):
-            correct(edges, i, normal, rebel, x, y, dt_s, settings)
+            correct(edges, i, normal, rebel, x, y, around, settings)
             take_corner(edges, i, corners, corner, dt_s)
         change = edge_equations.trust_change(relation)
         edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
         if relation in (edge_equations.BREAKS, edge_equations.STAYS) and edges.count < edges.capacity:
-            stray(edges, i, x0, y0, corners, corner, dt_s, settings)
+            stray(edges, i, x0, y0, corners, corner, around, settings)
 
 
 def take_corner(edges: EdgeColumns, i: int, corners: CornerColumns, corner: int, dt_s: float) -> None:
@@ -126,10 +133,11 @@ def correct(
     rebel: CircleColumns,
     x: float,
     y: float,
-    dt_s: float,
+    around: Situation,
     settings: Settings,
 ) -> None:
     """Update L, V, BL of an edge with its corner at (x, y) (eq. EnEstimation), and β and DL of rebels and chains."""
+    dt_s = around.dt_s
     trust, tr_cr = trust_in_prediction(edges, i, rebel, x, y, dt_s, settings), settings.tr_cr
     predicted = edges.predicted_speed[i]
     along = (x - edges.predicted_x[i]) * edges.cos[i] + (y - edges.predicted_y[i]) * edges.sin[i]
@@ -137,6 +145,7 @@ def correct(
     edges.x[i] = edge_equations.update_position(trust, tr_cr, edges.predicted_x[i], x)
     edges.y[i] = edge_equations.update_position(trust, tr_cr, edges.predicted_y[i], y)
     edges.speed[i] = speed
+    error_matrix.correct(edges, i, edge_equations.share_of_corner(trust, tr_cr), around.corner_var, dt_s)
     corr = 1.0
     if edges.circle[i] >= 0 and not edges.rebel[i]:
         corr = max(normal.corr[edges.circle[i]], MIN_CORR)
@@ -184,11 +193,11 @@ def stray(
     y0: float,
     corners: CornerColumns,
     corner: int,
-    dt_s: float,
+    around: Situation,
     settings: Settings,
 ) -> None:
     """λ*4 and λ*5: the corner goes to α as a copy of the edge whose law it broke, which was at (x0, y0)."""
-    row = edges.count
+    row, dt_s = edges.count, around.dt_s
     edges.count += 1
     edge_rows.copy_row(edges, i, row)
     x, y = corners.x[corner], corners.y[corner]
@@ -201,6 +210,7 @@ def stray(
     edges.bl[row] = STRAY_GATE_SHARE * settings.bl0_px
     edges.suspect_keys[row] = 1
     edges.circle[row] = -1
+    error_matrix.start(edges, row, around.corner_var, 2 * around.corner_var / (dt_s * dt_s))
     take_corner(edges, row, corners, corner, dt_s)
 
 
@@ -244,6 +254,8 @@ def add(
             edges.speed[row] = first_expansion(x, y, normal, groups, around, settings) * r
             edges.bl[row], edges.trust[row] = settings.bl0_px, settings.tr_new
             edges.born_key[row] = key_number
+            reach = FIRST_SPEED_SHARE * settings.bl0_px / around.dt_s
+            error_matrix.start(edges, row, around.corner_var, reach * reach)
             take_corner(edges, row, corners, k, around.dt_s)
 
 

@@ -18,6 +18,11 @@ def copy_row(edges: EdgeColumns, source: int, target: int) -> None:
     edges.held[target], edges.matched[target] = edges.held[source], edges.matched[source]
     edges.fixed_x[target], edges.fixed_y[target] = edges.fixed_x[source], edges.fixed_y[source]
     edges.fixed_s[target] = edges.fixed_s[source]
+    edges.cos[target], edges.sin[target] = edges.cos[source], edges.sin[source]
+    edges.variance_along[target] = edges.variance_along[source]
+    edges.variance_across[target] = edges.variance_across[source]
+    edges.covariance_speed[target] = edges.covariance_speed[source]
+    edges.variance_speed[target] = edges.variance_speed[source]
     edges.words[target, 0], edges.words[target, 1] = edges.words[source, 0], edges.words[source, 1]
     for k in range(KEYS):
         edges.key_x[target, k], edges.key_y[target, k] = edges.key_x[source, k], edges.key_y[source, k]
@@ -33,6 +38,9 @@ def empty_row(edges: EdgeColumns, i: int) -> None:
     edges.rebel[i] = edges.held[i] = edges.matched[i] = 0
     edges.fixed_x[i] = edges.fixed_y[i] = 0
     edges.fixed_s[i] = 0.0
+    edges.cos[i] = edges.sin[i] = 0.0
+    edges.variance_along[i] = edges.variance_across[i] = 0.0
+    edges.covariance_speed[i] = edges.variance_speed[i] = 0.0
     edges.words[i, 0] = edges.words[i, 1] = 0
     for k in range(KEYS):
         edges.key_x[i, k] = edges.key_y[i, k] = 0.0

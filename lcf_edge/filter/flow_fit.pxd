@@ -22,6 +22,8 @@ cdef int MIN_TURNED
 cdef int COLUMNS
 cdef int ROWS
 cdef double CELL_EDGES
+cdef double NOISE_MEMORY_S
+cdef double MAX_EXCESS
 cdef double NOISE_PX
 cdef double RATE_SIGMA_RADPS
 cdef double WINDOW_S
@@ -49,13 +51,15 @@ cdef int FOCUS_Y
 cdef class FlowFit:
     cdef public int count
     cdef public double focus_x, focus_y, focus_sigma_x, focus_sigma_y, prior_x, prior_y, scale_px, turn_share
+    cdef double place_var
     cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, share, turned, rest
     cdef double[::1] on_x, on_y
     cdef readonly int[::1] slot, cells
     cdef int[::1] cell, bins
-    cdef public NormalEquations equations
+    cdef NormalEquations equations
 
 cdef bint shows_flow(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Situation around, Settings settings) noexcept nogil
+@cython.locals(place_var=double)
 cdef void gather(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cdef void note(FlowFit fit, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Pinhole pinhole) noexcept nogil
 cdef bint shows_turn(FlowFit fit, Py_ssize_t k) noexcept nogil
@@ -64,9 +68,10 @@ cpdef double weight_of(double rest_px, double width_px) noexcept nogil
 cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double explained(FlowFit fit) noexcept nogil
 cdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
-cpdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
+cdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
 cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad, double width) noexcept nogil
 cdef int slot_edges(FlowFit fit, int k) noexcept nogil
 cdef void apply(FlowFit fit, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
 cdef void learn_turn_share(FlowFit fit, double dt_s) noexcept nogil
+cdef void learn_corner_noise(FlowFit fit, Situation around) noexcept nogil
 cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around, Settings settings) noexcept nogil

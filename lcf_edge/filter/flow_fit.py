@@ -38,6 +38,8 @@ MIN_TURNED = 12  # and edges that need it
 COLUMNS = 8  # cells of the image, whose edges count for no more than ``CELL_EDGES`` each
 ROWS = 6
 CELL_EDGES = 6.0
+NOISE_MEMORY_S = 1.0  # time constant of learning the noise of corners,
+MAX_EXCESS = 4.0  # and of its variance the most that one image says
 NOISE_PX = 0.6  # 1 sigma of the drift of a stationary edge
 RATE_SIGMA_RADPS = 0.03  # least prior sigma of ω over a window of ``WINDOW_S``, less over longer ones
 WINDOW_S = 0.75
@@ -68,7 +70,8 @@ class FlowFit:
 
     ``count``: edges used, 0: too few for a fit. ``focus_x``, ``focus_y``: ΔO, px; ``focus_sigma_x``, ``focus_sigma_y``:
     1 sigma of it, and before the fit ``prior_x``, ``prior_y``. ``turn_share``: 1 sigma of the image motion by a turn,
-    as a share of it, learnt from frame to frame. ``scale_px``: 1 sigma of the residuals apart from that.
+    as a share of it, learnt from frame to frame. ``scale_px``: 1 sigma of the residuals apart from that;
+    ``place_var``: their mean variance by the edges' places, px².
 
     One row per edge: ``drift``, px; ``turned``: image motion across the flow by the turn, px; ``pitch``, ``yaw``,
     ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: derivative of the drift by ΔO; ``share``: weight by its cell;
@@ -77,7 +80,7 @@ class FlowFit:
 
     def __init__(self) -> None:
         self.count = 0
-        self.focus_x = self.focus_y = self.scale_px = 0.0
+        self.focus_x = self.focus_y = self.scale_px = self.place_var = 0.0
         self.focus_sigma_x = self.focus_sigma_y = self.prior_x = self.prior_y = 0.0
         self.drift, self.pitch, self.yaw, self.roll = [doubles(MAX_EDGES) for _ in range(4)]
         self.elapsed_s, self.on_x, self.on_y, self.share = [doubles(MAX_EDGES) for _ in range(4)]
@@ -107,7 +110,7 @@ def gather(
 ) -> None:
     """Gather the edges that show the flow, evenly thinned to at most ``MAX_EDGES``."""
     fit.count = 0
-    telling = 0
+    telling, place_var = 0, 0.0
     for i in range(edges.count):
         if shows_flow(edges, i, keys, around, settings):
             telling += 1
@@ -119,9 +122,11 @@ def gather(
         if shows_flow(edges, i, keys, around, settings):
             if telling % stride == 0:
                 note(fit, edges, i, key_frames.oldest_key(edges, i, keys) % KEYS, baselines, around.pinhole)
+                place_var += edges.variance_across[i] + around.corner_var
             telling += 1
     for k in range(fit.count):
         fit.share[k] = min(1.0, CELL_EDGES / fit.cells[fit.cell[k]])
+    fit.place_var = place_var * stride / max(telling, 1)
 
 
 def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole) -> None:
@@ -313,6 +318,16 @@ def learn_turn_share(fit: FlowFit, dt_s: float) -> None:
     fit.turn_share = math.sqrt(fit.turn_share * fit.turn_share + gain * (turn2 - fit.turn_share * fit.turn_share))
 
 
+def learn_corner_noise(fit: FlowFit, around: Situation) -> None:
+    """Learn ``corner_var`` from the residuals, against what the places of the edges explain of them."""
+    excess = fit.scale_px * fit.scale_px / fit.place_var
+    gain = 1 - math.exp(-around.dt_s / NOISE_MEMORY_S)
+    learnt = around.corner_var * (1 + gain * (min(excess, MAX_EXCESS) - 1))
+    around.corner_var = max(learnt, around.least_corner_var)
+    around.excess = max(excess, 1.0)
+    around.noise_px = math.sqrt(0.5 * fit.place_var * around.excess)
+
+
 def measure(
     fit: FlowFit,
     edges: EdgeColumns,
@@ -332,3 +347,4 @@ def measure(
     solve(fit, sigma_radps)
     apply(fit, keys, baselines, around.pinhole, sigma_radps)
     learn_turn_share(fit, around.dt_s)
+    learn_corner_noise(fit, around)

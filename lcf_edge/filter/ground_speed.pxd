@@ -3,7 +3,7 @@ from libc cimport math
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.rebel_detection cimport Verdicts
-from lcf_edge.filter cimport rounding
+from lcf_edge.filter cimport rebel_detection, rounding
 from lcf_edge.filter.situation cimport Situation
 
 cdef int BINS

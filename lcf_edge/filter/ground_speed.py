@@ -8,7 +8,7 @@ in some rows.
 
 import math
 
-from lcf_edge.filter import rounding
+from lcf_edge.filter import rebel_detection, rounding
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.memory import integers
@@ -51,7 +51,7 @@ def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baseline
         return 0.0
     slot = verdicts.slot[j]
     outward = verdicts.outward[j] if baselines.depth_m[slot] >= 0 else -verdicts.outward[j]  # reversing
-    if outward < OUTWARD_SIGMAS * (verdicts.sigma[j] + around.noise_px) or verdicts.r[j] <= 0:
+    if outward < OUTWARD_SIGMAS * rebel_detection.sigma_px(verdicts, j) or verdicts.r[j] <= 0:
         return 0.0
     range_m = around.camera_height_m * around.pinhole.focal / below
     return outward / verdicts.r[j] * range_m / baselines.elapsed_s[slot]

@@ -1,7 +1,7 @@
 """Image motion of edges that move together: mean velocity and rate of expansion, by weighted least squares.
 
 An edge that was at x' a time T ago and is at x now has the velocity v = (x - x')/T halfway between, with the standard
-deviation √2·σ/T of two positions. The uncertainty of the rotation is common to all and added once. For a set of edges
+deviation σ/T of its two places. The uncertainty of the rotation is common to all and added once. For a set of edges
 v = v̄ + e·(x - x̄): an approaching object expands by e in all directions, one that moves sideways does not. Two things
 that move apart sideways, taken for one, expand in width alone: then e is that of the height.
 """
@@ -80,7 +80,7 @@ def add_edge(
     """Add one edge, as it moved since the key frame of its verdict."""
     i, slot = verdicts.row[j], verdicts.slot[j]
     elapsed_s = baselines.elapsed_s[slot]
-    weight = elapsed_s * elapsed_s / (2 * around.noise_px * around.noise_px)
+    weight = elapsed_s * elapsed_s / (verdicts.noise[j] * verdicts.noise[j])
     vx, vy = (edges.x[i] - verdicts.x[j]) / elapsed_s, (edges.y[i] - verdicts.y[j]) / elapsed_s
     x, y = 0.5 * (edges.x[i] + verdicts.x[j]), 0.5 * (edges.y[i] + verdicts.y[j])
     sums.count[k] += 1

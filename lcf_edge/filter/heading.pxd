@@ -22,6 +22,7 @@ cdef class Heading:
     cdef readonly double lever_m, lever_sigma_m, shared, curvature, half_width_m
 
 cpdef void turn_heading(Heading heading, const double[:, :, ::1] rotation, double yaw_rate_radps, double dt_s) noexcept nogil
+cpdef double focus_variance(double sigma_rad) noexcept nogil
 cpdef double focus_sigma_rad(double mounting_sigma_rad) noexcept nogil
 cpdef void turn_aside(Heading heading, double speed_mps, double yaw_rate_radps) noexcept nogil
 cpdef double sideways_sigma_rad(Heading heading) noexcept nogil

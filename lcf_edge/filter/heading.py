@@ -66,9 +66,14 @@ def turn_aside(heading: Heading, speed_mps: float, yaw_rate_radps: float) -> Non
     heading.aside_x = -heading.lever_m * heading.curvature
 
 
+def focus_variance(sigma_rad: float) -> float:
+    """Variance of O at one instant, rad²: of the mounting, or of O over a while, and of the shaking heading."""
+    return sigma_rad * sigma_rad + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD
+
+
 def focus_sigma_rad(mounting_sigma_rad: float) -> float:
     """Prior sigma of O, rad: of the mounting, and of the shaking heading."""
-    return math.sqrt(mounting_sigma_rad * mounting_sigma_rad + SHAKE_SIGMA_RAD * SHAKE_SIGMA_RAD)
+    return math.sqrt(focus_variance(mounting_sigma_rad))
 
 
 def sideways_sigma_rad(heading: Heading) -> float:

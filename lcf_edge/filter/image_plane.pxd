@@ -5,7 +5,8 @@ cdef double MIN_RADIUS
 
 cdef class ImagePlane:
     cdef readonly int width, height
-    cdef readonly bint is_distorted, is_equidistant
+    cdef readonly bint is_distorted
+    cdef bint is_equidistant
     cdef double fx, fy, cx, cy, k1, k2, k3, k4, p1, p2, reach
     cdef readonly double u, v
 

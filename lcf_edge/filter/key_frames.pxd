@@ -9,8 +9,8 @@ cdef class KeyFrames:
     cdef readonly double[:, ::1] displacement
     cdef readonly double[::1] elapsed_s, sigma_rad
     cdef public int number
-    cdef public double since_s
-    cdef readonly double rate_sigma_radps
+    cdef double since_s
+    cdef double rate_sigma_radps
 
 cdef void turn_one(KeyFrames keys, Py_ssize_t k, const double[:, :, ::1] rotation) noexcept nogil
 cdef void learn(KeyFrames keys, int k, double x, double y, double z, double sigma_rad) noexcept nogil

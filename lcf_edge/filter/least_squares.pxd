@@ -5,7 +5,7 @@ cdef int MAX_UNKNOWNS
 cdef double MIN_PIVOT
 
 cdef class NormalEquations:
-    cdef readonly int unknowns
+    cdef int unknowns
     cdef readonly double[::1] row, right, solution
     cdef readonly double[:, ::1] matrix, inverse
     cdef double[:, ::1] factor

@@ -69,8 +69,6 @@ Grey = npt.NDArray[np.uint8]
 SURPRISE_PX = 4.0  # slack of the gates for an unpredicted rotation,
 SURPRISES = 3.0  # plus this many times the rotation that the gyro lately missed,
 GYRO_SIGMAS = 3.0  # but at most this many sigmas of the gyro
-NOISE_SHARE = 0.7  # noise of one position, as a share of the residual, which has that of two
-DELTA_SIGMAS = 4.0  # of the residual, within which an edge follows the flow
 GROUND_SLOPE_RAD = 0.002  # 1 sigma of the slope of the ground ahead, against the path
 SLOWEST_MPS = 0.05  # slower motion has no direction
 FORGET = 0.3  # weight of the latest frame in the mean of what the gyro missed
@@ -144,7 +142,6 @@ class LineCircleFilter:
         self._rest = RestTest()
         self._driving = DrivingTest()
         self.ground = GroundSpeed()
-        self._scale_px = 0.0  # of the last fit, kept until the next
         self._homography = Homography()
         self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
         self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
@@ -361,11 +358,9 @@ class LineCircleFilter:
 
     def _update(self, sigma_rad: float) -> None:
         """Classify, update and delete edges."""
-        edges, settings = self.edges.columns, self._settings
-        delta_px = settings.delta_px + 2 * sigma_rad * self._pinhole.focal
-        dt_s = self._around.dt_s
+        edges, settings, sigma_px = self.edges.columns, self._settings, sigma_rad * self._pinhole.focal
         edge_expert.update(
-            edges, self.normal.columns, self.rebel.columns, self.corners.columns, delta_px, dt_s, settings
+            edges, self.normal.columns, self.rebel.columns, self.corners.columns, sigma_px, self._around, settings
         )
         edge_expert.delete(edges, self._plane, self._dead, settings.tr_cr)
 
@@ -414,9 +409,9 @@ class LineCircleFilter:
         driving.measure(self._driving, verdicts, edges, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)
-        requested = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around, settings)
+        requested = alpha.decide(verdicts, recent, edges, keys, key, baselines, self._born, around)
         births, evicted = self._make_room(requested)
-        alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, around, settings)
+        alpha.give_births(verdicts, recent, edges, keys, key, baselines, self._born, births, settings)
         return alpha.gather_rebels(verdicts, edges, self._breaking), evicted
 
     def _fit_flow(self) -> None:
@@ -435,10 +430,9 @@ class LineCircleFilter:
             around.focus_x += fit.focus_x
             around.focus_y += fit.focus_y
             around.horizon_y = around.focus_y
-            self._scale_px = fit.scale_px
             headings.learn_mounting(heading, around, fit)
-        around.noise_px = max(around.noise_px, NOISE_SHARE * self._scale_px)
-        around.delta_px = max(around.delta_px, DELTA_SIGMAS * self._scale_px)
+        around.focus_var_x = headings.focus_variance(fit.focus_sigma_x / pinhole.fx) * pinhole.fx * pinhole.fx
+        around.focus_var_y = headings.focus_variance(fit.focus_sigma_y / pinhole.fy) * pinhole.fy * pinhole.fy
         rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)
 
     def _make_room(self, requested: int) -> tuple[int, int]:

@@ -49,7 +49,8 @@ cdef double INFINITY
 cdef double NAN
 
 cdef class Evidence:
-    cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, half_extent, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt, inverse, inverse_var
+    cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt, inverse, inverse_var
+    cdef public double half_extent
     cdef public bint is_cut
 
 cdef class Belief:

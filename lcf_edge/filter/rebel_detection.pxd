@@ -1,15 +1,15 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport baselines as lines
-from lcf_edge.filter cimport edge_equations, flow, lengths, path
+from lcf_edge.filter cimport edge_equations, error_matrix, flow, lengths, path
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
+from lcf_edge.filter.error_matrix cimport MotionError
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
-cdef double ROOT_2
 cdef double NEAREST_M
-cdef double MAX_FOCUS_SHARE
+cdef double MOVER_SIGMAS
 cdef double PARALLAX_DRIFT
 cdef double LINK_RATIO
 cdef double GROUND_DIPS
@@ -33,23 +33,24 @@ cdef class Verdicts:
     cdef public Py_ssize_t count
     cdef readonly int[::1] row, slot, near
     cdef int[::1] oldest
-    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, inverse, inverse_sigma
+    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, noise, inverse, inverse_sigma
     cdef double[::1] near_x, near_y, weight
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
     cdef double shared, ground, total
+    cdef MotionError error
 
-cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines, Situation around) noexcept nogil
+cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines) noexcept nogil
 @cython.locals(drifts=bint)
-cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
+cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef double ground_outward(double y, double lever, Situation around) noexcept nogil
-cdef double sigma_px(Verdicts verdicts, Py_ssize_t j, Situation around) noexcept nogil
+cdef double sigma_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
 cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(total=double, shared=double, ground=double)
 cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, Situation around, Settings settings) noexcept nogil
 cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef void find_incoming(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
-cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines, Settings settings) noexcept nogil
+cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines) noexcept nogil
 cdef bint rates_agree(double old, double new, double slack) noexcept nogil
 cpdef void give_birth(EdgeColumns edges, Verdicts first, Py_ssize_t j, Verdicts second, Py_ssize_t k, double elapsed_s, Settings settings) noexcept nogil

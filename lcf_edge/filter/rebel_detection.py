@@ -9,16 +9,16 @@ lies above the ground, is *incoming*.
 import math
 
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import edge_equations, flow, lengths, path
+from lcf_edge.filter import edge_equations, error_matrix, flow, lengths, path
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
+from lcf_edge.filter.error_matrix import MotionError
 from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
-ROOT_2 = math.sqrt(2.0)
 NEAREST_M = 0.25  # depth below which nothing stationary is expected
-MAX_FOCUS_SHARE = 0.5  # of an error of the focus, that shows in the drift of an edge; near the focus μ is unbounded
+MOVER_SIGMAS = 5.0  # by which a mover leaves the flow of the static scene
 PARALLAX_DRIFT = 0.25  # drift, as a share of the outward motion, of a corner between two things at different depths
 LINK_RATIO = 1.8  # factor by which the rates of two links of a chain may differ
 GROUND_DIPS = 0.8  # share of the camera's height by which the ground may lie deeper, before it is a leader
@@ -34,8 +34,8 @@ SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, in horizons at most
 MIN_INVERSE_RANGE = 1e-6  # 1/m
 MIN_OUTWARD_PX = 1e-3
 MIN_R_PX = 1.0
-LINK_NOISE_SIGMAS = 2.0  # of noise in the rate of a mover over the younger link
-CLOSING_NOISE_SIGMAS = 3.0  # of noise in the expansion over the younger link
+LINK_NOISE_SIGMAS = 1.5  # of noise in the rate of a mover over the younger link
+CLOSING_NOISE_SIGMAS = 2.0  # of noise in the expansion over the younger link
 MIN_FIRST_LINK_PX = 2.0  # a shorter first link has no direction
 
 
@@ -45,7 +45,8 @@ class Verdicts:
     ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: position then, derotated to now, px.
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge falls short of the flow.
     ``over``: px by which it exceeds it. ``outward``: px along the flow line. ``expansion``: μ per second, 1/s.
-    ``sigma``: of the rotation since, px along the flow line. ``mover``, ``incoming``: the verdict.
+    ``sigma``: of the rotation since, px along the flow line; ``noise``: of its own two places, px.
+    ``mover``, ``incoming``: the verdict.
 
     ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
     (``inverse``, 1/m) with 1 sigma (``inverse_sigma``; ``weight``: 1/σ²). ``shared``, ``ground``, ``total``: result
@@ -58,27 +59,22 @@ class Verdicts:
         self.x, self.y, self.r, self.drift = [doubles(capacity) for _ in range(4)]
         self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
         self.mover, self.incoming = [octets(capacity) for _ in range(2)]
-        self.sigma, self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(3)]
+        self.sigma, self.noise, self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(4)]
         self.near_x, self.near_y, self.weight = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
+        self.error = MotionError()
 
 
-def link(
-    verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, around: Situation
-) -> None:
+def link(verdicts: Verdicts, j: int, edges: EdgeColumns, i: int, slot: int, baselines: Baselines) -> None:
     """Link edge ``i`` to its position at the key frame in ``slot``, derotated to now."""
     key_x, key_y = edges.key_x[i, slot], edges.key_y[i, slot]
     x, y = lines.then_x(baselines, slot, key_x, key_y), lines.then_y(baselines, slot, key_x, key_y)
     verdicts.row[j], verdicts.slot[j] = i, slot
     verdicts.x[j], verdicts.y[j] = x, y
-    rotation_px = lines.sigma_along(baselines, around.pinhole, slot, x, y)
-    verdicts.sigma[j] = lengths.of(rotation_px, around.turn_share * lengths.of(x - key_x, y - key_y))
 
 
-def judge(
-    verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
-) -> None:
+def judge(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
     """Compare a linked edge with the flow of the static scene.
 
     From x' = (Z/(Z - ΔZ))·x about the focus: 1/TTC = V_e/r.
@@ -99,10 +95,15 @@ def judge(
     if math.isfinite(around.speed_mps):  # else ΔZ has only a direction: only drift shows movers
         verdicts.over[j] = outward - r * math.fabs(depth_m) / NEAREST_M
         verdicts.short[j] = ground_outward(edges.y[i], r * math.fabs(depth_m), around) - outward
-    astray = settings.focus_sigma_px * min(math.fabs(outward) / r, MAX_FOCUS_SHARE)
-    tolerance = verdicts.sigma[j] + astray + around.delta_px
-    drifts = math.fabs(drift) > tolerance + PARALLAX_DRIFT * math.fabs(outward)
-    verdicts.mover[j] = 1 if drifts or max(verdicts.short[j], verdicts.over[j]) > tolerance else 0
+    cos, sin = ax / r, ay / r
+    error_matrix.of_rotation(verdicts.error, baselines, edges, i, slot, verdicts.x[j], verdicts.y[j], around)
+    verdicts.sigma[j] = math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
+    verdicts.noise[j] = error_matrix.add_places(verdicts.error, edges, i, around)
+    error_matrix.add_focus(verdicts.error, outward / r, around)
+    along = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
+    across = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, -sin, cos))
+    drifts = math.fabs(drift) > across + PARALLAX_DRIFT * math.fabs(outward)
+    verdicts.mover[j] = 1 if drifts or max(verdicts.short[j], verdicts.over[j]) > along else 0
     verdicts.incoming[j] = 0
 
 
@@ -115,9 +116,9 @@ def ground_outward(y: float, lever: float, around: Situation) -> float:
     return lever * max(below, 0.0) / (around.camera_height_m * (1 + GROUND_DIPS) * around.pinhole.focal)
 
 
-def sigma_px(verdicts: Verdicts, j: int, around: Situation) -> float:
+def sigma_px(verdicts: Verdicts, j: int) -> float:
     """1 sigma of an edge's motion, px: of its two positions, and of the rotation between."""
-    return verdicts.sigma[j] + ROOT_2 * around.noise_px
+    return lengths.of(verdicts.sigma[j], verdicts.noise[j])
 
 
 def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
@@ -130,7 +131,7 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
     near = 0
     reach_m = around.speed_mps * around.horizon_s
     for j in range(verdicts.count):
-        sigma = sigma_px(verdicts, j, around)
+        sigma = sigma_px(verdicts, j)
         lever = lever_of(verdicts, j, baselines)
         outward = verdicts.outward[j]
         if verdicts.mover[j] or lever <= 0 or (outward + NEAR_SIGMAS * sigma) * reach_m <= lever:
@@ -147,7 +148,7 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
         lever = lever_of(verdicts, j, baselines)
         verdicts.near[a] = j
         verdicts.inverse[a] = verdicts.outward[j] / lever
-        verdicts.inverse_sigma[a] = sigma_px(verdicts, j, around) / lever
+        verdicts.inverse_sigma[a] = sigma_px(verdicts, j) / lever
         verdicts.weight[a] = 1 / (verdicts.inverse_sigma[a] * verdicts.inverse_sigma[a])
         verdicts.near_x[a], verdicts.near_y[a] = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
 
@@ -216,16 +217,16 @@ def find_incoming(
         verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, baselines, around, settings) else 0
 
 
-def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines, settings: Settings) -> bool:
+def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines) -> bool:
     """Whether the younger link of a chain agrees with the whole chain (bounded, consistent deviation).
 
     The rate of the deviation over the younger link may differ by ``LINK_RATIO`` from that of the whole, plus noise.
     """
     whole_s, recent_s = baselines.elapsed_s[whole.slot[j]], baselines.elapsed_s[recent.slot[k]]
     if not whole.mover[j]:
-        slack = CLOSING_NOISE_SIGMAS * settings.edge_noise_px / (recent_s * recent.r[k])
+        slack = CLOSING_NOISE_SIGMAS * recent.noise[k] / (recent_s * recent.r[k])
         return rates_agree(whole.expansion[j], recent.expansion[k], slack)
-    slack = LINK_NOISE_SIGMAS * settings.edge_noise_px / recent_s
+    slack = LINK_NOISE_SIGMAS * recent.noise[k] / recent_s
     drift = math.fabs(whole.drift[j])
     if drift >= whole.short[j] and drift >= whole.over[j]:
         sign = -1.0 if whole.drift[j] < 0 else 1.0

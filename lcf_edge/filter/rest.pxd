@@ -18,10 +18,11 @@ cdef double STILL_GROUND_PX
 cdef double STILL_SHARE
 
 cdef class RestTest:
-    cdef readonly int edges, still, ground, still_ground
+    cdef readonly int edges, still, ground
+    cdef int still_ground
     cdef readonly bint stands
     cdef public double measured_mps
-    cdef readonly double still_s
+    cdef double still_s
 
 cdef int latest_key(KeyFrames keys) noexcept nogil
 cpdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil

@@ -17,7 +17,6 @@ MIN_NEIGHBOUR_PX = 6.4
 MIN_MEMBER_MARGIN_PX = 3.0
 MIN_MIN_COAST_PX = 15.0
 MIN_PSI_MARGIN_PX = 5.0
-MIN_FOCUS_SIGMA_PX = 1.0
 
 
 class Settings:
@@ -32,7 +31,7 @@ class Settings:
         scale = pinhole.focal / REFERENCE_FOCAL_PX
         self.tr_cr, self.tr_s, self.tr_max = settings.tr_cr, settings.tr_s, settings.tr_max
         self.tr_new = 0.5 * (settings.tr_cr + settings.tr_s)
-        self.delta_px, self.delta_rebel_px = settings.delta_px, settings.delta_rebel_px
+        self.delta_px = settings.delta_px
         self.bl0_px, self.bl_min_px, self.leap_px = settings.bl0_px, settings.bl_min_px, settings.leap_px
         self.bs_px, self.scene_depth_m = max(settings.bs_px * scale, MIN_CIRCLE_PX), settings.scene_depth_m
         self.appearance_max, self.appearance_share = settings.appearance_max, settings.appearance_share
@@ -48,6 +47,5 @@ class Settings:
         self.member_margin_px = max(MEMBER_MARGIN_PX * scale, MIN_MEMBER_MARGIN_PX)
         self.min_coast_px = max(MIN_COAST_PX * scale, MIN_MIN_COAST_PX)
         self.psi_margin_px = max(PSI_MARGIN_PX * scale, MIN_PSI_MARGIN_PX)
-        self.edge_noise_px, self.ground_margin = settings.edge_noise_px, settings.ground_margin
-        self.focus_sigma_px = max(settings.focus_sigma_px * scale, MIN_FOCUS_SIGMA_PX)
+        self.ground_margin = settings.ground_margin
         self.pitch_sigma_rad, self.psi_life_s = settings.pitch_sigma_rad, settings.psi_life_s

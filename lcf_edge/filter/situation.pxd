@@ -8,9 +8,12 @@ cdef double NAN
 cdef class Situation:
     cdef public Pinhole pinhole
     cdef public double scene_depth_m, camera_height_m, half_width_m, height_m, horizon_s, pitch_sigma_rad, horizon_sigma_rad
-    cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, ground_mps, turn_share, lever_m, yaw_rate_radps, scene_flow_pxps
-    cdef public bint ground_is_still, flow_is_seen, is_blind
-    cdef public double noise_px, delta_px, min_noise_px, min_delta_px
+    cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, ground_mps, turn_share, lever_m, yaw_rate_radps
+    cdef double scene_flow_pxps
+    cdef public bint flow_is_seen, is_blind
+    cdef bint ground_is_still
+    cdef public double noise_px, corner_var, excess, focus_var_x, focus_var_y
+    cdef double least_corner_var
 
 cpdef void follow(Situation around, double ray_x, double ray_y, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil
 cdef bint is_at_rest(Situation around) noexcept nogil

@@ -36,8 +36,9 @@ class Situation:
         self.flow_is_seen, self.is_blind = True, False
         self.ground_mps = NAN
         self.turn_share = self.lever_m = 0.0
-        self.min_noise_px = self.noise_px = config.filter.edge_noise_px
-        self.min_delta_px = self.delta_px = config.filter.delta_rebel_px
+        self.noise_px = config.filter.corner_noise_px
+        self.least_corner_var = self.corner_var = self.noise_px * self.noise_px
+        self.excess, self.focus_var_x, self.focus_var_y = 1.0, 0.0, 0.0
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
 
 
@@ -46,7 +47,6 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
     around.focus_x = around.pinhole.cx + around.pinhole.fx * ray_x
     around.focus_y = around.horizon_y = around.pinhole.cy + around.pinhole.fy * ray_y
     around.dt_s, around.speed_mps, around.yaw_rate_radps = dt_s, speed_mps, yaw_rate_radps
-    around.noise_px, around.delta_px = around.min_noise_px, around.min_delta_px
     around.scene_flow_pxps = INFINITY
     if math.isfinite(speed_mps):
         around.scene_flow_pxps = max(math.fabs(speed_mps), SLOWEST_MPS) * around.pinhole.focal / around.scene_depth_m

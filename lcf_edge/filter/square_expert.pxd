@@ -93,12 +93,13 @@ cdef double INFINITY
 cdef double NAN
 
 cdef class Squares:
-    cdef readonly MotionSums parts, wholes, bounds
+    cdef readonly MotionSums parts, bounds
+    cdef MotionSums wholes
     cdef readonly int[::1] members
     cdef int[::1] resting
     cdef unsigned char[::1] obedient
-    cdef readonly Evidence evidence
-    cdef readonly Belief belief
+    cdef Evidence evidence
+    cdef Belief belief
 
 cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
 cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil

@@ -932,7 +932,7 @@ def obeys(
     lag = 1 - min(max(0.5 * elapsed_s * looming, -MAX_LAG), MAX_LAG)
     vx, vy = velocity_x(objects, o, x, looming, around) * lag, velocity_y(y, looming, around) * lag
     dx, dy = (edges.x[i] - verdicts.x[j]) / elapsed_s - vx, (edges.y[i] - verdicts.y[j]) / elapsed_s - vy
-    most = STRAY_SIGMAS * around.noise_px / elapsed_s + share * lengths.of(vx, vy)
+    most = STRAY_SIGMAS * verdicts.noise[j] / elapsed_s + share * lengths.of(vx, vy)
     return dx * dx + dy * dy < most * most
 
 
@@ -983,7 +983,7 @@ def take_others(
         if edges.square[i] >= 0:
             continue
         x, y = edges.x[i], edges.y[i]
-        moves = still_px(verdicts, j) > STRAY_SIGMAS * around.noise_px
+        moves = still_px(verdicts, j) > STRAY_SIGMAS * verdicts.noise[j]
         for o in range(objects.capacity):
             if not (is_in_reach(squares.bounds, o, x, y) if moves else is_in_reach(squares.wholes, o, x, y)):
                 continue

@@ -37,7 +37,8 @@ cdef class Turmoil:
     cdef double[::1] standing, changed, all_standing, all_changed
     cdef double[::1] found_now, lost_now, trusted_now, hidden_now, lasts_s, weight
     cdef unsigned char[::1] unruly, hidden
-    cdef readonly int[::1] place, size, hidden_size
+    cdef readonly int[::1] place, size
+    cdef int[::1] hidden_size
     cdef readonly Members members
 
 cdef int cell_at(Turmoil turmoil, double x, double y) noexcept nogil

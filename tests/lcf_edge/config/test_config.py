@@ -238,6 +238,18 @@ def test_an_unknown_key_names_the_closest_valid_one(file: Callable[[str], Path],
         assert ": unknown key " in message
 
 
+@pytest.mark.parametrize("key", ["filter.delta_rebel_px", "filter.edge_noise_px", "filter.focus_sigma_px"])
+def test_a_key_that_an_earlier_version_had_is_to_be_deleted(file: Callable[[str], Path], key: str) -> None:
+    assert refused(None, f"{key}=1").endswith(f": {key} is gone, since it is measured now; delete it")
+    assert refused(file(f"{key} = 1\n")).endswith("; delete it")
+
+
+def test_what_an_earlier_version_recorded_is_read_without_them() -> None:
+    walkers = Path(__file__).parents[3] / "samples/walkers.mcap"
+    assert b"delta_rebel_px" in walkers.read_bytes()
+    assert load(walkers).filter.delta_px == Config().filter.delta_px
+
+
 def test_nothing_is_suggested_for_what_resembles_nothing() -> None:
     assert refused(None, "vehicle.qqq=1") == "--set: unknown key vehicle.qqq"
 

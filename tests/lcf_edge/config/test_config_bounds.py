@@ -153,7 +153,7 @@ def test_each_bound_by_itself_runs(key: str, approach: Callable[..., Any]) -> No
         "filter.leap_px=1e12",
         "filter.bl0_px=1e12",
         "filter.bs_px=1e160",
-        "filter.edge_noise_px=1e-320",
+        "filter.corner_noise_px=1e-320",
         "camera.height_m=1e-190",
         "vehicle.speed_mps=1e300",
     ],

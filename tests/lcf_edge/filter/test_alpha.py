@@ -40,10 +40,11 @@ def crowd(drive: Drive, clutter: Landmarks) -> Any:
 @pytest.mark.parametrize("fps", [8.0, 20.0])
 @pytest.mark.parametrize("velocity_mps", [(0.9, 0, 0), (-0.9, 0, 0), (0.8, 0, -1.0)])
 def test_a_landmark_that_crosses_is_a_rebel_after_three_key_frames_and_not_before(
-    velocity_mps: tuple[float, float, float], fps: float, drive: Drive
+    velocity_mps: tuple[float, float, float], fps: float, drive: Drive, clutter: Landmarks
 ) -> None:
     config = Config(filter=Filter(key_interval_s=1 / fps, key_motion_px=0.0))
-    found = rebels_by_frame(drive(np.array([HIGH]), np.array(velocity_mps), frames=10, fps=fps), config)
+    way = drive(np.array([HIGH]), np.array(velocity_mps), frames=10, fps=fps) + drive(clutter(100))
+    found = rebels_by_frame(way, config)
     assert not any(found[: KEY_FRAMES - 1])
     assert {0} in found[KEY_FRAMES - 1 : LATEST]
     if fps == 20:  # at fewer it may be lost between two images, and found again
@@ -95,10 +96,12 @@ def test_a_landmark_that_jumps_once_is_no_rebel(drive: Drive) -> None:
 
 
 @pytest.mark.parametrize(("velocity_mps", "rebels"), [(1.2, 1), (0.0, 0)])
-def test_success_and_failure_both_free_the_chain(velocity_mps: float, rebels: int, drive: Drive) -> None:
+def test_success_and_failure_both_free_the_chain(
+    velocity_mps: float, rebels: int, drive: Drive, clutter: Landmarks
+) -> None:
     """It leaps at 0.3 s, and then goes on or stands."""
     leap = drive(np.array([HIGH]), np.array([1.2, 0, 0]), from_s=0.3, until_s=0.4 if not velocity_mps else np.inf)
-    way = replace(leap, frames=26)
+    way = replace(leap + drive(clutter(100)), frames=26)
     tables = LineCircleFilter(EVERY_FRAME, way.lens)
     chains = [tables.step(*each).sizes.chains for each in way]
     assert max(chains) > 0
@@ -118,14 +121,16 @@ def test_a_rebel_that_obeys_goes_home(crowd: Any, drive: Drive, box: Landmarks) 
     assert len(set(known)) > 0.9 * len(walker.points_m)
 
 
-def test_a_rebel_that_obeys_takes_its_history_home(drive: Drive) -> None:
-    way = drive(np.array([(1.5, -1.2, 8.0)]), np.array([0.6, 0, 0]), until_s=0.5, frames=30)
+def test_a_rebel_that_obeys_takes_its_history_home(drive: Drive, clutter: Landmarks) -> None:
+    way = drive(np.array([(1.5, -1.2, 8.0)]), np.array([0.7, 0, 0])) + drive(clutter(100))
+    way = replace(way, until_s=0.5, frames=30)
     assert {0} in rebels_by_frame(way)
     tables = LineCircleFilter(EVERY_FRAME, way.lens)
     for corners, motion in way:
         tables.step(corners, motion)
     assert not tables.edges.rebel[: tables.edges.count].any()
-    assert tables.edges.born_key[: tables.edges.count].tolist() == [0]
+    walker = way.landmarks(tables) == 0
+    assert tables.edges.born_key[: tables.edges.count][walker].tolist() == [0]
 
 
 def test_a_rebel_that_vanishes_is_forgotten(crowd: Any, drive: Drive, box: Landmarks) -> None:

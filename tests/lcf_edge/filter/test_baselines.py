@@ -64,27 +64,3 @@ def test_px_a_radian_are_those_of_the_exact_rotation(at: tuple[float, float], ab
     moved = (turned(*at, rotation_of(small * np.eye(3)[about])) - at) / small
     along = np.cos(beta), np.sin(beta)
     assert lines.turn_px(PINHOLE, about, *at, *along) == pytest.approx(float(moved @ along), abs=0.05)
-
-
-@given(place, st.integers(0, 1000))
-def test_the_sigma_along_the_flow_is_that_of_rotations_drawn_from_the_covariance(
-    at: tuple[float, float], seed: int
-) -> None:
-    random, baselines = np.random.default_rng(seed), since(np.eye(3))
-    spread = random.normal(0, 0.01, (3, 3))
-    covariance, elapsed_s = spread @ spread.T, 0.4
-    baselines.is_fitted = True
-    np.asarray(baselines.rate_covariance)[:] = covariance
-    baselines.elapsed_s[SLOT] = elapsed_s
-    baselines.focus_x[SLOT], baselines.focus_y[SLOT] = PINHOLE.cx, PINHOLE.cy
-    outward = np.array(at) - (PINHOLE.cx, PINHOLE.cy)
-    outward /= max(float(np.linalg.norm(outward)), 1.0)
-    per_radian = [lines.turn_px(PINHOLE, about, *at, *outward) for about in range(3)]
-    expected = np.std(random.multivariate_normal(np.zeros(3), covariance, 4000) @ per_radian) * elapsed_s
-    assert lines.sigma_along(baselines, PINHOLE, SLOT, *at) == pytest.approx(expected, rel=0.1, abs=1e-3)
-
-
-def test_before_a_fit_the_sigma_is_that_of_the_gyro() -> None:
-    baselines = since(np.eye(3))
-    baselines.sigma_px[SLOT] = 1.7
-    assert lines.sigma_along(baselines, PINHOLE, SLOT, 400.0, 300.0) == 1.7

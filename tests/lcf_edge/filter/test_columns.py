@@ -69,7 +69,7 @@ def test_each_column_is_known_to_the_loops(kind: str) -> None:
 
 def test_a_copied_edge_takes_all_that_outlives_a_frame_along() -> None:
     copied = written(FILTER / f"{MOVES_ROWS}.py")["EdgeColumns"]
-    rewritten = {"predicted_x", "predicted_y", "predicted_speed", "cos", "sin", "corner", "best", "cost", "psi"}
+    rewritten = {"predicted_x", "predicted_y", "predicted_speed", "corner", "best", "cost", "psi"}
     assert copied == {column.name for column in tables.EDGE_COLUMNS} - rewritten
 
 

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
-from lcf_edge.config import Filter
+from lcf_edge.config import Config, Filter
 from lcf_edge.filter import edge_expert
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable
 from lcf_edge.messages import Cause
 
-SETTINGS = Settings(Filter(), Pinhole(500.0, 500.0, 319.5, 239.5))
+PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
+SETTINGS = Settings(Filter(), PINHOLE)
 DT_S = 0.05
 DELTA_PX = SETTINGS.delta_px
 TR_MAX = SETTINGS.tr_max
@@ -30,7 +32,9 @@ def left_behind(step_px: float, behind_px: float, aside_px: float = 0.0, cause: 
     edges.bl[row] = 12.0
     rebel.cause[0], rebel.active[0] = cause, True
     corners.x[0], corners.y[0] = 300.0 + behind_px, 200.0 + aside_px
-    edge_expert.update(edges.columns, normal.columns, rebel.columns, corners.columns, DELTA_PX, DT_S, SETTINGS)
+    around = Situation(Config(), PINHOLE)
+    around.dt_s = DT_S
+    edge_expert.update(edges.columns, normal.columns, rebel.columns, corners.columns, 0.0, around, SETTINGS)
     return float(np.hypot(corners.x[0] - edges.x[row], corners.y[0] - edges.y[row]))
 
 

@@ -13,8 +13,9 @@ from hypothesis import strategies as st
 
 from lcf_edge.config import Config, Filter
 from lcf_edge.filter import baselines as lines
-from lcf_edge.filter import flow_fit, key_frames
+from lcf_edge.filter import error_matrix, flow_fit, key_frames
 from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.error_matrix import MotionError
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
 from lcf_edge.filter.key_frames import KeyFrames
@@ -50,13 +51,13 @@ class Seen:
     baselines: Baselines = field(default_factory=Baselines)
     keys: KeyFrames = field(default_factory=KeyFrames)
 
-    def measured(self, number: int = 0) -> "Seen":
+    def measured(self, number: int = 0, around: Situation | None = None) -> "Seen":
         """With ``number`` of the landmarks, 0: all of them."""
         number = number or self.number
         edges = EdgeTable(number, 1, 1)
         edges.append(number)
         self._look(edges, self.keys, number)
-        around = Situation(Config(), PINHOLE)
+        around = around or Situation(Config(), PINHOLE)
         around.dt_s = 0.05
         lines.measure(self.baselines, self.keys, Homography(), PINHOLE, around)
         self.fit.prior_x = self.fit.prior_y = PRIOR_PX
@@ -182,19 +183,53 @@ def test_few_edges_show_the_rotation_of_a_key_frame_while_the_gyro_s_bias_is_unk
     assert rotation[0, 0, 2] == pytest.approx(turned_rad, abs=0.006)
 
 
+def rotation_sigma_px(baselines: Baselines, slot: int) -> float:
+    """1 sigma along the flow by the rotation since a key frame, of an edge that has not turned."""
+    around, edges, error = Situation(Config(), PINHOLE), EdgeTable(1, 1, 1), MotionError()
+    x, y = 500.0, 300.0
+    edges.key_x[0, slot], edges.key_y[0, slot] = x, y
+    error_matrix.of_rotation(error, baselines, edges.columns, 0, slot, x, y, around)
+    r = math.hypot(x - PINHOLE.cx, y - PINHOLE.cy)
+    return math.sqrt(error_matrix.variance(error, (x - PINHOLE.cx) / r, (y - PINHOLE.cy) / r))
+
+
 def test_a_key_frame_that_the_flow_says_nothing_of_stays_as_uncertain_as_the_gyro_leaves_it() -> None:
     seen = Seen()
     seen.keys.sigma_rad[:] = 0.01
-    assert lines.sigma_along(seen.measured(14).baselines, PINHOLE, 0, 500.0, 300.0) == pytest.approx(
-        0.01 * PINHOLE.focal
-    )
+    assert rotation_sigma_px(seen.measured(14).baselines, 0) == pytest.approx(0.01 * PINHOLE.focal)
     few = Seen(youngest=True)
     few.keys.sigma_rad[:] = 0.01
     few.measured()
     assert few.baselines.is_fitted
-    oldest, fitted = (lines.sigma_along(few.baselines, PINHOLE, slot, 500.0, 300.0) for slot in (0, KEY_FRAMES - 6))
+    oldest, fitted = (rotation_sigma_px(few.baselines, slot) for slot in (0, KEY_FRAMES - 6))
     assert oldest >= 0.01 * PINHOLE.focal
     assert fitted < 0.3 * oldest
+
+
+@pytest.mark.parametrize("noise_px", [0.3, 0.8])
+def test_the_noise_of_corners_is_learnt_from_what_the_fit_leaves(noise_px: float) -> None:
+    """Places of edges that only their corners explain, then and now: each has the noise of one."""
+    around = Situation(Config(), PINHOLE)
+    for seed in range(80):
+        Seen(noise_px=noise_px, seed=seed).measured(around=around)
+    assert math.sqrt(around.corner_var) == pytest.approx(math.sqrt(2) * noise_px, rel=0.35)
+
+
+def test_a_blurred_image_is_doubted_at_once_and_a_clear_one_after_it_is_not() -> None:
+    around = Situation(Config(), PINHOLE)
+    for seed in range(80):
+        Seen(noise_px=0.3, seed=seed).measured(around=around)
+    Seen(noise_px=1.5).measured(around=around)
+    assert around.excess > 9
+    Seen(noise_px=0.3).measured(around=around)
+    assert around.excess < 2
+
+
+def test_corners_are_never_taken_to_be_better_than_whole_pixels() -> None:
+    around = Situation(Config(), PINHOLE)
+    for seed in range(40):
+        Seen(noise_px=0.02, seed=seed).measured(around=around)
+    assert math.sqrt(around.corner_var) == pytest.approx(Config().filter.corner_noise_px)
 
 
 def turn_share(distortion: float, frames: int = 60) -> float:

@@ -67,7 +67,7 @@ class Seen:
         np.asarray(self.verdicts.row)[:] = np.arange(self.count)
         np.asarray(self.verdicts.x)[:], np.asarray(self.verdicts.y)[:] = x - seen_s * vx, y - seen_s * vy
         for row in range(self.count):
-            rebel_detection.judge(self.verdicts, row, edges.columns, self.baselines, around, SETTINGS)
+            rebel_detection.judge(self.verdicts, row, edges.columns, self.baselines, around)
 
     def taken(self) -> RebelGroups:
         """In groups, which are still to be made."""

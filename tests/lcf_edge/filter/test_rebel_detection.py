@@ -28,6 +28,7 @@ PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SETTINGS = Settings(Filter(), PINHOLE)
 STEPS = 8  # of 0.05 s
 HEIGHT_M = 0.3  # of the camera
+NOISE_PX = 1.1  # of the two places of an edge in a chain
 
 Around = Callable[..., Situation]
 Drive = Callable[..., Any]
@@ -80,8 +81,8 @@ class Watched:
         verdicts = Verdicts(edges.count)
         verdicts.count = edges.count
         for row in range(edges.count):
-            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines, self.around)
-            rebel_detection.judge(verdicts, row, edges.columns, baselines, self.around, SETTINGS)
+            rebel_detection.link(verdicts, row, edges.columns, row, slot, baselines)
+            rebel_detection.judge(verdicts, row, edges.columns, baselines, self.around)
         return verdicts
 
     def verdict(self, *, known: bool = False, sigma_px: float = 0.0) -> Judged:
@@ -93,9 +94,9 @@ class Watched:
 
     def agreed(self) -> list[bool]:
         edges, baselines = self.seen()
+        self.around.corner_var = NOISE_PX * NOISE_PX
         whole, recent = (self.judged(edges, baselines, slot) for slot in (0, 1))
-        noisy = Settings(Filter(edge_noise_px=0.8), PINHOLE)
-        return [bool(rebel_detection.agree(whole, row, recent, row, baselines, noisy)) for row in range(whole.count)]
+        return [bool(rebel_detection.agree(whole, row, recent, row, baselines)) for row in range(whole.count)]
 
 
 @pytest.fixture(scope="session")
@@ -277,8 +278,9 @@ def test_neighbours_show_together_what_one_edge_near_the_focus_cannot(watch: Wat
     """10 px from the focus an edge moves by a pixel or so; a dozen of them leave no doubt."""
     few = [(0.06, -0.08, 6.5)]
     many = [(x, y, 6.5) for x in (-0.08, 0.0, 0.08) for y in (-0.16, -0.12, -0.08, -0.04)]
-    assert not watch(few).verdict().incoming.any()
-    assert watch(many).verdict().incoming.sum() >= 9
+    corner_var = 0.3  # px²
+    assert not watch(few, corner_var=corner_var).verdict().incoming.any()
+    assert watch(many, corner_var=corner_var).verdict().incoming.sum() >= 9
 
 
 def test_a_threat_begins_a_little_inside_the_horizon_and_ends_at_it(watch: Watch) -> None:
@@ -366,7 +368,7 @@ def verdict_of(*, mover: bool, drift: float = 0.0, expansion: float = 0.0, slot:
     """A verdict on one edge 100 px from the focus."""
     verdicts = Verdicts(1)
     verdicts.count = 1
-    columns = {"r": 100.0, "drift": drift, "short": -50.0, "over": -50.0, "expansion": expansion}
+    columns = {"r": 100.0, "noise": NOISE_PX, "drift": drift, "short": -50.0, "over": -50.0, "expansion": expansion}
     for name, value in (columns | {"slot": slot, "mover": mover, "incoming": not mover}).items():
         np.asarray(getattr(verdicts, name))[0] = value
     return verdicts
@@ -377,7 +379,7 @@ def agrees(whole: Verdicts, recent: Verdicts) -> bool:
     baselines = Baselines()
     np.asarray(baselines.elapsed_s)[:2] = 0.4, 0.2
     np.asarray(recent.slot)[0] = 1
-    return bool(rebel_detection.agree(whole, 0, recent, 0, baselines, Settings(Filter(edge_noise_px=0.8), PINHOLE)))
+    return bool(rebel_detection.agree(whole, 0, recent, 0, baselines))
 
 
 @pytest.mark.parametrize("sign", [-1, 1])
