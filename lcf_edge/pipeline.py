@@ -16,6 +16,7 @@ from lcf_edge.config import Config
 from lcf_edge.corners import own_parts
 from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.corners.image_quality import ImageQuality
+from lcf_edge.corners.lens_dirt import LensDirt
 from lcf_edge.corners.repeats import Repeats
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
@@ -81,6 +82,7 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
         self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
         self._quality = ImageQuality()
+        self._dirt = LensDirt(lens, visible)
         self._repeats = Repeats()
         self._scene: PipelineScene | None = None  # of the last new image
         self._speed_mps = math.nan  # of the last frame
@@ -159,6 +161,7 @@ class Pipeline:
         frame, corners = look.frame, look.corners
         ego = self._see_rotation(look.small, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
+        self._dirt.look(look.small, ego.rotation, look.still)
         step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
@@ -172,6 +175,8 @@ class Pipeline:
         notes = [*ego.notes, *look.notes]
         if self.filter.stands:
             notes.append("stands still")
+        if self._dirt.is_seen:
+            notes.append("dirty lens")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
         self._last_corners = corners, step.omitted
