@@ -28,6 +28,7 @@ from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import NO_CORNERS, Corners
 from lcf_edge.filter.line_circle_filter import Mounting
 from lcf_edge.filter.normal_circles import mean_expansion
+from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.filter.tables import Floats
 from lcf_edge.lens import Lens
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, Timing, View
@@ -129,6 +130,11 @@ class Pipeline:
         """The camera's mounting as learnt so far."""
         return self.filter.mounting
 
+    @property
+    def shutter(self) -> RollingShutter:
+        """What is known of a rolling shutter."""
+        return self.filter.shutter
+
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take an inertial sample or a speed, each kind in stamp order."""
         if isinstance(sample, ImuSample):
@@ -177,6 +183,8 @@ class Pipeline:
             notes.append("stands still")
         if self._dirt.is_seen:
             notes.append("dirty lens")
+        if self.shutter.matters:
+            notes.append("rolling shutter")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
         self._last_corners = corners, step.omitted

@@ -54,6 +54,7 @@ from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.rest import RestTest
+from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.square_expert import Squares
@@ -149,6 +150,7 @@ class LineCircleFilter:
         self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
         self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
         self._off_line = OffLine()
+        self.shutter = RollingShutter(self._pinhole, lens.height, self._settings)
         self._speed_mps = math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
@@ -354,8 +356,10 @@ class LineCircleFilter:
             key_frames.turn(self._keys, rotation)
             self._warp(rotation)
             derotation.derotate_predictions(edges, self._homography)
+            self.shutter.measure(self.edges, self.corners, motion.rate_radps, motion.dt_s)
         else:
             self._missing_px = settings.leap_px  # lost: search everywhere
+            self.shutter.lose()
         key_frames.inflate(self._keys, sigma_rad, self._around.dt_s)
         return sigma_rad, residual
 

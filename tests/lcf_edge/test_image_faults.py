@@ -11,7 +11,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import Drive
 
-FAULTS = {"dirty lens"}
+FAULTS = {"dirty lens", "rolling shutter"}
 
 
 def faults_of(drive: Drive) -> list[set[str]]:
@@ -26,6 +26,7 @@ def faults_of(drive: Drive) -> list[set[str]]:
     ("kind", "good", "fault"),
     [
         ("wet_lens", {"drops": ()}, "dirty lens"),
+        ("rolling_shutter", {"readout_s": 0.0}, "rolling shutter"),
     ],
 )
 def test_what_spoils_the_images_is_told_after_half_of_the_drive(
