@@ -185,6 +185,8 @@ class Pipeline:
             notes.append("dirty lens")
         if self.shutter.matters:
             notes.append("rolling shutter")
+        if self.filter.floor.is_glossy:
+            notes.append("glossy floor")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
         self._last_corners = corners, step.omitted

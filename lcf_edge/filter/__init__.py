@@ -26,6 +26,7 @@ of one step, in the order in which ``line_circle_filter`` calls them:
 ``flow_fit``         errors of the camera's rotation and of O, fitted to all edges together
 ``rest``             whether the vehicle is stationary, from the image
 ``driving``          whether it drives, from the image
+``glossy_floor``     whether the floor mirrors
 ``ground_speed``     the vehicle's speed, from the flow of the ground
 ``rebel_detection``  the equations that find what breaks the flow over a chain of key positions
 ``alpha``            applies them: chains become rebel edges, rebels that obey the flow return to E_n

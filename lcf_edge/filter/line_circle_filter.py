@@ -40,6 +40,7 @@ from lcf_edge.filter.driving import DrivingTest
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
+from lcf_edge.filter.glossy_floor import GlossyFloor
 from lcf_edge.filter.ground_speed import GroundSpeed
 from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.image_plane import ImagePlane
@@ -155,6 +156,7 @@ class LineCircleFilter:
         self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
+        self.floor = GlossyFloor(self._verdicts, self.edges, self._baselines, self._settings)
         self._leaps = Leaps(capacity)
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
@@ -415,6 +417,7 @@ class LineCircleFilter:
         coarse_motion.measure(self._coarse, keys, baselines, self._plane, around)
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
+        self.floor.measure(around)
         driving.measure(self._driving, verdicts, edges, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)

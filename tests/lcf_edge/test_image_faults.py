@@ -11,7 +11,7 @@ from lcf_edge.lens import Lens
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import Drive
 
-FAULTS = {"dirty lens", "rolling shutter"}
+FAULTS = {"dirty lens", "rolling shutter", "glossy floor"}
 
 
 def faults_of(drive: Drive) -> list[set[str]]:
@@ -27,6 +27,7 @@ def faults_of(drive: Drive) -> list[set[str]]:
     [
         ("wet_lens", {"drops": ()}, "dirty lens"),
         ("rolling_shutter", {"readout_s": 0.0}, "rolling shutter"),
+        ("glossy_floor", {"gloss": 0.0}, "glossy floor"),
     ],
 )
 def test_what_spoils_the_images_is_told_after_half_of_the_drive(

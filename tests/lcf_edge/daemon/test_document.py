@@ -22,6 +22,7 @@ TESTS = {
     "covered lens": "test_a_dark_or_covered_lens_is_reported_after_half_a_second_and_until_it_sees",
     "glare, blur, few corners": "test_what_degrades_a_scene_is_reported",
     "rolling shutter": "test_a_rolling_shutter_is_told_with_its_readout_time",
+    "glossy floor": "test_what_degrades_a_scene_is_reported",
     "drops or dirt on the lens": "test_what_degrades_a_scene_is_reported",
     "frame rate too low for the motion": "test_a_frame_rate_too_low_for_the_motion",
     "no IMU": "test_an_imu_that_is_away_widens_and_is_reported",
