@@ -16,6 +16,7 @@ from lcf_edge.config import Config
 from lcf_edge.corners import own_parts
 from lcf_edge.corners.detector import CornerDetector
 from lcf_edge.corners.image_quality import ImageQuality
+from lcf_edge.corners.lens_dirt import LensDirt
 from lcf_edge.corners.repeats import Repeats
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
@@ -27,6 +28,7 @@ from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import NO_CORNERS, Corners
 from lcf_edge.filter.line_circle_filter import Mounting
 from lcf_edge.filter.normal_circles import mean_expansion
+from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.filter.tables import Floats
 from lcf_edge.lens import Lens
 from lcf_edge.messages import CIRCLE, OBJECT, PSI_REGION, Kind, PipelineScene, Timing, View
@@ -81,6 +83,7 @@ class Pipeline:
         self._detector = CornerDetector(config.filter, lens, config.memory.corners, visible)
         self._own_parts = own_parts.polygons(config.camera, lens.width, lens.height)
         self._quality = ImageQuality()
+        self._dirt = LensDirt(lens, visible)
         self._repeats = Repeats()
         self._scene: PipelineScene | None = None  # of the last new image
         self._speed_mps = math.nan  # of the last frame
@@ -127,6 +130,11 @@ class Pipeline:
         """The camera's mounting as learnt so far."""
         return self.filter.mounting
 
+    @property
+    def shutter(self) -> RollingShutter:
+        """What is known of a rolling shutter."""
+        return self.filter.shutter
+
     def add(self, sample: ImuSample | SpeedSample) -> None:
         """Take an inertial sample or a speed, each kind in stamp order."""
         if isinstance(sample, ImuSample):
@@ -159,6 +167,7 @@ class Pipeline:
         frame, corners = look.frame, look.corners
         ego = self._see_rotation(look.small, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
+        self._dirt.look(look.small, ego.rotation, look.still)
         step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
@@ -172,6 +181,12 @@ class Pipeline:
         notes = [*ego.notes, *look.notes]
         if self.filter.stands:
             notes.append("stands still")
+        if self._dirt.is_seen:
+            notes.append("dirty lens")
+        if self.shutter.matters:
+            notes.append("rolling shutter")
+        if self.filter.floor.is_glossy:
+            notes.append("glossy floor")
         sizes = replace(step.sizes, evicted=step.sizes.evicted + look.cut) if look.cut else step.sizes
         done = time.perf_counter_ns()
         self._last_corners = corners, step.omitted

@@ -22,6 +22,10 @@ _WORDS = {
     "speed from ground": "nothing measures the speed: estimated from the ground in the images and camera.height_m",
     "few corners": "few corners: little can be found; the scene is plain or dark, or the lens out of focus",
     "glare": "glare: much of the image is overexposed; lower the exposure, or shade the lens",
+    "rolling shutter": "rolling shutter: rows are read over camera_readout_ms, and what is upright leans as the camera "
+    "shakes; choose a faster mode, or damp the mounting",
+    "glossy floor": "glossy floor: much is seen deep below the ground, as mirrored; or camera.height_m is too low",
+    "dirty lens": "dirty lens: drops or dirt stay in place in the image; wipe it, or outline own parts in camera.mask",
     "blurred": "the image is blurred: shaken or turned during exposure; shorten it",
 }
 

@@ -120,6 +120,9 @@ class Health:
             values["gyro_bias_sigma_radps"] = f"{loop.gyro_bias.sigma_radps.max():.4f}"
         if loop.mounting is not None:
             values |= {f"camera_{name}": f"{value:.4f}" for name, value in asdict(loop.mounting).items()}
+        if loop.shutter is not None and loop.shutter.is_known:
+            values["camera_readout_ms"] = f"{1e3 * loop.shutter.readout_s:.1f}"
+            values["camera_readout_sigma_ms"] = f"{1e3 * loop.shutter.sigma_s:.1f}"
         values |= {f"refused {reason}": str(count) for reason, count in sorted(loop.refused.items())}
         return DeviceStatus("pipeline", Level.WARN if notes else Level.OK, "; ".join(notes) or "runs", values)
 

@@ -22,6 +22,7 @@ from lcf_edge.daemon.outputs import Outputs
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY
 from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.filter.line_circle_filter import Mounting
+from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.messages import PipelineScene
 from lcf_edge.meters import DurationHistogram
 from lcf_edge.pipeline import Pipeline
@@ -113,6 +114,11 @@ class Loop(threading.Thread):
     def mounting(self) -> Mounting | None:
         """The camera's mounting as learnt so far; None before the first frame."""
         return self._pipeline.mounting if self._pipeline else None
+
+    @property
+    def shutter(self) -> RollingShutter | None:
+        """What is known of a rolling shutter; None before the first frame."""
+        return self._pipeline.shutter if self._pipeline else None
 
     def rebuild(self, config: Config) -> None:
         """Use a new pipeline with empty tables from the next frame on, after trying out another like it.

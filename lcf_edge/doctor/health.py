@@ -16,6 +16,8 @@ _SHOWN = (
     "latency_p99_ms",
     "gyro_bias_radps",
     "gyro_bias_sigma_radps",
+    "camera_readout_ms",
+    "camera_readout_sigma_ms",
     "resident_mib",
     "budget_mib",
     "temperature_c",

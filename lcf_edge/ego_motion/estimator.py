@@ -21,7 +21,7 @@ from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.ego_motion.inertial_speed import GRAVITY_MPS2, MAX_SPEED_MPS, InertialSpeed
 from lcf_edge.ego_motion.sample_ring import Ring, Span, Track, Window
 from lcf_edge.filter.ground_speed import GroundSpeed
-from lcf_edge.filter.inputs import Motion
+from lcf_edge.filter.inputs import UNKNOWN, Motion
 
 Floats = npt.NDArray[np.float64]
 
@@ -77,12 +77,14 @@ class EgoMotion:
     speed_mps: float  # forward, mean over the interval, NaN: unknown
     yaw_rate_radps: float  # of the camera, turning left positive, mean over the interval
     path_yaw_rate_radps: float  # of the vehicle: odometry's, else the camera's without its shaking
+    rate_radps: tuple[float, float, float]  # by the gyro at the end of the interval, NaN: not measured
     notes: tuple[str, ...]  # what degrades it; docs/replay.md lists them
 
     def to_motion(self) -> Motion:
         """Return it as a step of the filter takes it."""
         dt_s = max(self.dt_s, MIN_DT_S)
-        return Motion(dt_s, self.rotation, self.rotation_sigma_rad, self.speed_mps, self.path_yaw_rate_radps)
+        path_radps = self.path_yaw_rate_radps
+        return Motion(dt_s, self.rotation, self.rotation_sigma_rad, self.speed_mps, path_radps, self.rate_radps)
 
 
 @dataclass(slots=True)
@@ -130,6 +132,7 @@ class EgoMotionEstimator:
         self._samples = Track(IMU_CAPACITY + 2, self._imu.columns)
         self._speeds = Track(SPEED_CAPACITY + 2, self._odometry.columns)
         self._guessed = Track(2, 3)
+        self._latest = Track(2, self._imu.columns)
         self._window = Window()
         self._interval = _Interval(Span(0, 0), self._guessed, False, nan, nan, 0.0)
         self._error_radps = [0.0, 0.0, 0.0]
@@ -360,8 +363,18 @@ class EgoMotionEstimator:
             self._speed_mps,
             yaw_rate_radps,
             self._path_yaw_radps,
+            self._rate_at_end(),
             tuple(interval.notes),
         )
+
+    def _rate_at_end(self) -> tuple[float, float, float]:
+        """Return the gyro's rates at the end of the interval, NaN: not measured."""
+        if not self._interval.measured:
+            return UNKNOWN
+        end_ns = self._interval.span.end_ns
+        self._imu.between(Span(end_ns, end_ns), self._latest)
+        x, y, z, *_ = self._latest.mean()
+        return x, y, z
 
     def _follow_path(self, error_radps: Sequence[float]) -> float:
         """Return the camera's yaw rate, given the error of the rates; the path's yaw rate follows it."""

@@ -16,6 +16,7 @@ of one step, in the order in which ``line_circle_filter`` calls them:
 ``least_squares``    with a few unknowns
 ``rounding``         to integers, as C does; ``lengths`` of offsets
 ``derotation``       step 0: takes the camera's rotation out of all stored positions
+``rolling_shutter``  how long it reads an image, from edges off their flow lines while the camera turns
 ``line_expert``      corners inside ψ are omitted, the rest is grouped by λ
 ``matching``         corners and predicted edges find each other, one to one
 ``leaps``            where whole parts of the image lost their corners: the shift that they share
@@ -25,6 +26,7 @@ of one step, in the order in which ``line_circle_filter`` calls them:
 ``flow_fit``         errors of the camera's rotation and of O, fitted to all edges together
 ``rest``             whether the vehicle is stationary, from the image
 ``driving``          whether it drives, from the image
+``glossy_floor``     whether the floor mirrors
 ``ground_speed``     the vehicle's speed, from the flow of the ground
 ``rebel_detection``  the equations that find what breaks the flow over a chain of key positions
 ``alpha``            applies them: chains become rebel edges, rebels that obey the flow return to E_n

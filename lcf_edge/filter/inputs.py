@@ -1,12 +1,14 @@
 """Input of one step of the filter."""
 
 from dataclasses import dataclass
+from math import nan
 
 import numpy as np
 import numpy.typing as npt
 
 APPEARANCE_SAMPLES = 16
 KEYS = 16  # key frames in an edge's history
+UNKNOWN = (nan, nan, nan)
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +39,7 @@ class Motion:
     ``dt_s``: t_f, from capture stamps. ``rotation``: float64 (3, 3), takes a direction from the last exposure's camera
     axes to this one's. ``rotation_sigma_rad``: its uncertainty. ``speed_mps``: V_ν, NaN: unknown.
     ``path_yaw_rate_radps``: of the vehicle's path, turning left is positive (the camera may shake besides).
+    ``rate_radps``: ω of the camera about its axes at this exposure, NaN: not measured.
     """
 
     dt_s: float
@@ -44,3 +47,4 @@ class Motion:
     rotation_sigma_rad: float
     speed_mps: float
     path_yaw_rate_radps: float
+    rate_radps: tuple[float, float, float] = UNKNOWN

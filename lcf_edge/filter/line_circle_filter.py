@@ -40,6 +40,7 @@ from lcf_edge.filter.driving import DrivingTest
 from lcf_edge.filter.feedback import Candidates
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.flow_fit import FlowFit
+from lcf_edge.filter.glossy_floor import GlossyFloor
 from lcf_edge.filter.ground_speed import GroundSpeed
 from lcf_edge.filter.heading import Heading
 from lcf_edge.filter.image_plane import ImagePlane
@@ -54,6 +55,7 @@ from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
 from lcf_edge.filter.rest import RestTest
+from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation, follow
 from lcf_edge.filter.square_expert import Squares
@@ -146,10 +148,12 @@ class LineCircleFilter:
         self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
         self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
         self._off_line = OffLine()
+        self.shutter = RollingShutter(self._pinhole, lens.height, self._settings)
         self._speed_mps = math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
+        self.floor = GlossyFloor(self._verdicts, self.edges, self._baselines, self._settings)
         self._leaps = Leaps(capacity)
         self._born, self._breaking = (integers(capacity) for _ in range(2))
         self._dead = octets(capacity)
@@ -351,8 +355,10 @@ class LineCircleFilter:
             key_frames.turn(self._keys, rotation)
             self._warp(rotation)
             derotation.derotate_predictions(edges, self._homography)
+            self.shutter.measure(self.edges, self.corners, motion.rate_radps, motion.dt_s)
         else:
             self._missing_px = settings.leap_px  # lost: search everywhere
+            self.shutter.lose()
         key_frames.inflate(self._keys, sigma_rad, self._around.dt_s)
         return sigma_rad, residual
 
@@ -406,6 +412,7 @@ class LineCircleFilter:
         coarse_motion.measure(self._coarse, keys, baselines, self._plane, around)
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
+        self.floor.measure(around)
         driving.measure(self._driving, verdicts, edges, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)

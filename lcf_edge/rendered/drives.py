@@ -147,6 +147,16 @@ class Shadow:
 
 
 @dataclass(frozen=True, slots=True)
+class Drop:
+    """A drop of water on the lens: out of focus, it shows the scene upside down; or dirt, which is dark."""
+
+    x_px: float
+    y_px: float
+    radius_px: float
+    is_dirt: bool = False
+
+
+@dataclass(frozen=True, slots=True)
 class Lens:
     """The camera: pinhole with an optional distortion of the finished image (OpenCV's coefficients)."""
 
@@ -206,5 +216,6 @@ class Drive:
     ceiling_m: float = 3.0  # where they hang
     gloss: float = 0.0  # share of their light that the floor mirrors
     own_parts: tuple[tuple[tuple[float, float], ...], ...] = ()  # polygons of the vehicle in the image, px
+    drops: tuple[Drop, ...] = ()
     half_width_m: float = 0.6  # of the vehicle
     horizon_s: float = 4.0  # contact later than this is no threat yet

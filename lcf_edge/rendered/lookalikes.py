@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lcf_edge.rendered.drives import Box, Lamp, Paint, Profile, Shadow
+from lcf_edge.rendered.drives import Box, Drop, Lamp, Paint, Profile, Shadow
 from lcf_edge.rendered.placing import crossing_walker, obstacle_ahead, through
 from lcf_edge.rendered.plan import Plan, Road
 
@@ -178,6 +178,26 @@ def _biased_gyro(plan: Plan) -> None:
     _walker_or_obstacle(plan)
 
 
+def _wet_lens(plan: Plan) -> None:
+    """Drops and dirt on the lens, on a winding way."""
+    plan.cruise(1.2, 2.8)
+    side, rate = plan.side(), plan.between(0.3, 0.5)
+    knots = ((0.0, side * rate), (0.25, side * rate), (0.35, -side * rate), (0.75, -side * rate), (0.85, side * rate))
+    plan.change(yaw_rate=Profile(tuple((share * plan.end_s, turn) for share, turn in knots)))
+    width, height = plan.drive.lens.width, plan.drive.lens.height
+    drops = (
+        Drop(
+            width * plan.between(0.15, 0.85),
+            height * plan.between(0.2, 0.8),
+            width * plan.between(0.04, 0.08),
+            is_dirt=number == 0,
+        )
+        for number in range(int(plan.random.integers(3, 6)))
+    )
+    plan.change(drops=tuple(drops))
+    _walker_or_obstacle(plan)
+
+
 LOOKALIKES: dict[str, Callable[[Plan], None]] = {
     "long_lines": _long_lines,
     "dark_crossing": _dark_crossing,
@@ -190,4 +210,5 @@ LOOKALIKES: dict[str, Callable[[Plan], None]] = {
     "moving_shadows": _moving_shadows,
     "swaying_trees": _swaying_trees,
     "biased_gyro": _biased_gyro,
+    "wet_lens": _wet_lens,
 }

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 
 from lcf_edge.rendered import textures
-from lcf_edge.rendered.drives import Box, Floats, Paint
+from lcf_edge.rendered.drives import Box, Drop, Floats, Paint
 from lcf_edge.rendered.projection import Stage, Surface, View
 from lcf_edge.rendered.textures import Image
 
@@ -32,6 +32,10 @@ _DARK = np.zeros((8, 8), dtype=np.uint8)
 _OWN_FEATURE_PX = 25.0
 _OWN_GREY = 70.0
 _LAMP = np.full((8, 8), 250, dtype=np.uint8)
+_DROP_RIM = 0.15  # of its radius, over which it fades
+_DROP_BLUR = 0.08  # of the image in it
+_DROP_SHRINKS = 8
+_DIRT_GREY = 60
 
 
 class _Skin:
@@ -91,6 +95,8 @@ class Renderer:
             light = [exposed, *(self._optics.finish(self._canvas(each)) for each in views)]
             exposed = np.rint(np.mean(light, axis=0)).astype(np.uint8)
         exposed = np.where(self._own > 0, self._own_look, exposed) if drive.own_parts else exposed
+        for drop in drive.drops:
+            _cover(exposed, drop)
         gain = float(drive.gain.at(np.array([view.time_s]))[0])
         lit = cv2.multiply(exposed, self._vignette, scale=gain, dtype=cv2.CV_8U)
         if drive.sharpening:
@@ -246,3 +252,22 @@ def _paint(canvas: Image, surface: Surface, texture: Image, share: float = 1.0) 
     region = canvas[top : top + height, left : left + width]
     kept = cv2.multiply(region, cv2.bitwise_not(mask), scale=1 / 255)
     cv2.add(kept, cv2.multiply(patch, mask, scale=1 / 255), region)
+
+
+def _cover(image: Image, drop: Drop) -> None:
+    """Blend what a drop shows into the image."""
+    height, width = image.shape
+    reach = round(2 * drop.radius_px)
+    left, top = max(round(drop.x_px) - reach, 0), max(round(drop.y_px) - reach, 0)
+    region = image[top : round(drop.y_px) + reach, left : round(drop.x_px) + reach]
+    x, y = np.meshgrid(np.arange(region.shape[1]) + left - drop.x_px, np.arange(region.shape[0]) + top - drop.y_px)
+    opaque = 1 / (1 + np.exp((np.hypot(x, y) / drop.radius_px - 1) / _DROP_RIM))
+    shown = np.full(region.shape, float(_DIRT_GREY))
+    if not drop.is_dirt:
+        small = cv2.resize(image, (width // _DROP_SHRINKS, height // _DROP_SHRINKS), interpolation=cv2.INTER_AREA)
+        soft = cv2.GaussianBlur(small, (0, 0), _DROP_BLUR * small.shape[1])
+        # The whole image is upside down in it.
+        columns, rows = ((0.5 - each / (2 * drop.radius_px)) for each in (x, y))
+        columns, rows = (columns * small.shape[1]).astype(np.float32), (rows * small.shape[0]).astype(np.float32)
+        shown = cv2.remap(soft, columns, rows, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE).astype(float)
+    region[:] = np.rint(region * (1 - opaque) + shown * opaque).astype(np.uint8)

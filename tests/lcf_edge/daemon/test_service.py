@@ -21,6 +21,7 @@ from lcf_edge.diagnostics import Level
 from lcf_edge.errors import ConfigError
 from lcf_edge.pipeline import Pipeline
 from lcf_edge.recording.playback import RecordedCamera
+from lcf_edge.rendered import scenes
 from tests.emulation import needs_the_processor
 
 PATIENCE_S = 20.0
@@ -184,6 +185,18 @@ def test_diagnostics_report_each_part(config: Config, runs: Runs, link: Any) -> 
     assert abs(float(pipeline.values["camera_yaw_rad"])) < 0.2
     assert pipeline.values["filter"] == ("uncompiled" if uncompiled() else "compiled")
     assert float(link.statuses["memory"].values["resident_mib"]) > 10
+
+
+@needs_the_processor("20 images and 200 samples a second are too many for it")
+def test_a_rolling_shutter_is_told_with_its_readout_time(config: Config, runs: Runs, link: Any, tmp_path: Path) -> None:
+    drive = scenes.make("rolling_shutter", 1, seconds=6.0, width=320, height=240, focal_px=250.0)
+    camera = msgspec.structs.replace(config.camera, recording=str(scenes.write(drive, tmp_path / "drive")))
+    runs.start(msgspec.structs.replace(config, camera=camera))
+    link.wait_for(lambda: link.statuses and "camera_readout_ms" in link.statuses["pipeline"].values)
+    values = link.statuses["pipeline"].values
+    sigma_ms = float(values["camera_readout_sigma_ms"])
+    assert abs(float(values["camera_readout_ms"]) - 1e3 * drive.readout_s) < 4 * sigma_ms
+    link.wait_for(lambda: "rolling shutter: " in link.statuses["pipeline"].message)
 
 
 @needs_the_processor("20 images and 200 samples a second are too many for it")

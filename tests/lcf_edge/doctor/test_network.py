@@ -225,7 +225,7 @@ def running(endpoint: str) -> Iterator[Config]:
     link = Link(open_session(config.zenoh), config)
     statuses = [
         DeviceStatus("camera", Level.OK, "delivers", {"rate_hz": "30.00"}),
-        DeviceStatus("pipeline", Level.WARN, "dark", {"gyro_bias_sigma_radps": "0.2000", "latency_p50_ms": "3.2"}),
+        DeviceStatus("pipeline", Level.WARN, "dark", {"camera_readout_ms": "23.0", "latency_p50_ms": "3.2"}),
     ]
     ended = threading.Event()
 
@@ -251,7 +251,7 @@ def test_a_running_daemon_is_asked(machine: Machine, running: Config) -> None:
     assert answers.text.endswith("has no scenes (no scene yet)")
     assert (pipeline.level, pipeline.text) == (
         Severity.WARN,
-        "pipeline: dark (latency_p50_ms 3.2, gyro_bias_sigma_radps 0.2000)",
+        "pipeline: dark (latency_p50_ms 3.2, camera_readout_ms 23.0)",
     )
     held = next(network.check(context))
     assert (held.level, held.text) == (Severity.OK, f"{running.zenoh.listen[0]}: the daemon listens")

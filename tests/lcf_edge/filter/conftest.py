@@ -5,6 +5,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
+import cv2
 import numpy as np
 import numpy.typing as npt
 import pytest
@@ -30,7 +31,8 @@ class Drive:
 
     ``points_m``: (n, 3), where the landmarks are at the start, camera axes. ``velocity_mps``: (n, 3) or (3,), of each
     over ground. ``camera_ahead_m``: of the axle, which moves along the heading. ``from_s``, ``until_s``: the landmarks
-    move only between these times.
+    move only between these times. ``shake_rad``: by which the camera pitches and yaws to and fro. ``readout_s``: from
+    the first row to the last, the middle one at the stamp.
     """
 
     points_m: Metres
@@ -41,6 +43,8 @@ class Drive:
     yaw_rate_radps: float = 0.0
     sigma_rad: float = 0.0
     camera_ahead_m: float = 0.0
+    shake_rad: float = 0.0
+    readout_s: float = 0.0
     lens: Lens = LENS
     from_s: float = 0.0
     until_s: float = np.inf
@@ -54,7 +58,7 @@ class Drive:
             before = rotation
             yield (
                 self.corners(seq),
-                Motion(1 / self.fps, turned, self.sigma_rad, self.speed_mps, self.yaw_rate_radps),
+                Motion(1 / self.fps, turned, self.sigma_rad, self.speed_mps, self.yaw_rate_radps, self.rate_radps(seq)),
             )
 
     def __add__(self, other: "Drive") -> "Drive":
@@ -73,7 +77,19 @@ class Drive:
             yaw_rate_radps=-self.yaw_rate_radps,
         )
 
-    def pose(self, seq: int) -> tuple[Metres, Metres]:
+    def rate_radps(self, seq: int) -> tuple[float, float, float]:
+        """About the camera's axes: a direction turns by exp(-[ω]× dt)."""
+        step = 1e-3
+        turned = self.pose(seq + step)[0] @ self.pose(seq - step)[0].T
+        x, y, z = (-cv2.Rodrigues(turned)[0].ravel() * self.fps / (2 * step)).tolist()
+        return x, y, z
+
+    def shaken(self, time_s: float) -> Metres:
+        """(3, 3) rotation of directions by the shaking."""
+        angles = np.sin(2 * np.pi * np.array([4.3, 3.1, 0.0]) * time_s) * self.shake_rad
+        return np.asarray(cv2.Rodrigues(angles)[0])
+
+    def pose(self, seq: float) -> tuple[Metres, Metres]:
         """Rotation into the camera's axes (3, 3) and its place (3,), in the axes of the start."""
         time_s = seq / self.fps
         turn = self.yaw_rate_radps * time_s
@@ -81,24 +97,34 @@ class Drive:
         reach = self.speed_mps * time_s
         along, aside = (np.sin(turn) / turn, (1 - np.cos(turn)) / turn) if turn else (1.0, 0.0)
         swing = self.camera_ahead_m * np.array([-np.sin(turn), 0, np.cos(turn) - 1])
-        return rotation, np.array([-reach * aside, 0, reach * along]) + swing
+        return self.shaken(time_s) @ rotation, np.array([-reach * aside, 0, reach * along]) + swing
 
-    def in_camera(self, seq: int) -> Metres:
+    def in_camera(self, seq: float) -> Metres:
         """(n, 3) landmarks in the camera's axes."""
         moved_s = np.clip(seq / self.fps, self.from_s, self.until_s) - self.from_s
         rotation, place = self.pose(seq)
         return np.asarray((self.points_m + self.velocity_mps * moved_s - place) @ rotation.T)
 
-    def in_image(self, seq: int) -> npt.NDArray[np.float32]:
+    def in_image(self, seq: float) -> npt.NDArray[np.float32]:
         """(n, 2) px of the ideal pinhole; NaN behind the camera."""
         x, y, z = self.in_camera(seq).T
         z = np.where(z > 0.05, z, np.nan)
         lens = self.lens
         return np.stack([lens.cx + lens.fx * x / z, lens.cy + lens.fy * y / z], axis=1).astype(np.float32)
 
+    def read_out(self, seq: int) -> npt.NDArray[np.float32]:
+        """(n, 2) px of the input frame, bands of ten rows each at its own time; NaN: not in the image."""
+        raw = np.full((len(self.points_m), 2), np.nan, np.float32)
+        for top in range(0, self.lens.height, 10):
+            late_s = self.readout_s * ((top + 5) / self.lens.height - 0.5)
+            then = self.lens.distort(self.in_image(seq + late_s * self.fps))
+            inside = (then[:, 1] >= top) & (then[:, 1] < top + 10)
+            raw[inside] = then[inside]
+        return raw
+
     def corners(self, seq: int) -> Corners:
         """Those in the image, at whole pixels of the input frame."""
-        raw = np.rint(self.lens.distort(self.in_image(seq)))
+        raw = np.rint(self.read_out(seq) if self.readout_s else self.lens.distort(self.in_image(seq)))
         size = self.lens.width, self.lens.height
         seen = np.flatnonzero(((raw >= 0) & (raw < size)).all(axis=1))  # NaN compares false
         pixel = raw[seen].astype(np.int32)

@@ -17,6 +17,8 @@ def digest(tables: LineCircleFilter, step: Step) -> str:
             found.update(column.tobytes())
     for column in (tables.patches.x, tables.patches.y, tables.patches.scale, tables.patches.sigma):
         found.update(bytes(column))
+    shutter, floor = tables.shutter, tables.floor
+    found.update(repr((shutter.readout_s, shutter.sigma_s, shutter.matters, floor.under_s, floor.seen_s)).encode())
     return found.hexdigest()
 
 

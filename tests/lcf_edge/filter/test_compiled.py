@@ -59,11 +59,11 @@ def test_compiled_and_uncompiled_the_tables_hold_the_same_bytes_after_every_fram
     box: Landmarks,
     tmp_path: Path,
 ) -> None:
-    """A drive with something of everything: what passes, a walker who crosses, a wall ahead, on an arc."""
+    """A drive with something of everything: what passes, a walker who crosses, a wall ahead, on an arc, shaken."""
     walker = drive(box((-2.2, -0.6, 6), (0.5, 1.2, 0.3)), np.array([1.2, 0, 0]))
     wall = drive(box((0.05, -0.4, 7), (0.5, 0.9, 0.0), seed=5))
     street = replace(drive(clutter(200)) + walker + wall, frames=20, yaw_rate_radps=0.05, sigma_rad=sigma_rad)
-    street = replace(street, lens=lens or street.lens)
+    street = replace(street, lens=lens or street.lens, shake_rad=0.01, readout_s=0.02)
     path = tmp_path / "frames"
     path.write_bytes(pickle.dumps((config, street.lens, list(street))))
     (compiled, *digests), (uncompiled, *others) = run(path, pure=False), run(path, pure=True)

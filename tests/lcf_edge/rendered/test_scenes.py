@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from lcf_edge.rendered import scenes
-from lcf_edge.rendered.drives import START_NS, Shadow
+from lcf_edge.rendered.drives import START_NS, Drop, Shadow
 from lcf_edge.rendered.projection import Stage
 from lcf_edge.rendered.rendering import Renderer
 from lcf_edge.rendered.scenes import Box, Drive, Lamp, Lens, Paint, Profile, SensorNoise, Shake
@@ -386,6 +386,20 @@ def test_own_parts_stay_in_their_place_and_hide_the_world():
     bare = first_image(replace(spec, own_parts=()))
     assert np.array_equal(images[0][:299], bare[:299])
     assert cv2.absdiff(images[0][inside], bare[inside]).mean() > 10
+
+
+def test_a_drop_hides_the_world_and_shows_it_upside_down_and_dirt_is_dark():
+    bare = first_image(drive(lens=Lens())).astype(int)
+    inside = np.s_[170:230, 290:350]
+    outside = np.ones_like(bare, dtype=bool)
+    outside[80:320, 200:440] = False
+    for is_dirt in (False, True):
+        covered = first_image(drive(lens=Lens(), drops=(Drop(320.0, 200.0, 60.0, is_dirt),))).astype(int)
+        assert np.array_equal(covered[outside], bare[outside])
+        assert cv2.Laplacian(covered[inside].astype(np.uint8), cv2.CV_64F).std() < 12  # noise is left
+        brighter = covered[220:230, 290:350].mean() - covered[170:180, 290:350].mean()
+        assert abs(brighter) < 5 if is_dirt else brighter > 10  # the sky is brighter than the ground
+        assert (covered[inside].mean() < 80) == is_dirt
 
 
 def test_the_floor_mirrors_lamps_where_their_images_are():
