@@ -17,7 +17,7 @@ MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nor one nearer to the focus
 STRAY_GATE_SHARE = 0.5  # BL of a new suspect, as a share of BL at birth
 ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
-FIRST_SPEED_SHARE = 0.17  # 1 sigma of V of a new landmark, as a share of BL in one frame
+FIRST_SPEED_SHARE = 0.5  # 1 sigma of V of a new landmark, as a share of it: its depth is not known
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
 JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
@@ -94,7 +94,7 @@ def update(
     delta_px, dt_s = settings.delta_px + ROTATION_SIGMAS * sigma_px, around.dt_s
     for i in range(edges.count):
         edges.matched[i] = 0
-        error_matrix.predict(edges, i, sigma_px * sigma_px, dt_s)
+        error_matrix.predict(edges, i, dt_s)
         corner = edges.corner[i]
         if corner < 0:
             change = 0.0 if edges.held[i] else edge_equations.UNMATCHED
@@ -254,8 +254,8 @@ def add(
             edges.speed[row] = first_expansion(x, y, normal, groups, around, settings) * r
             edges.bl[row], edges.trust[row] = settings.bl0_px, settings.tr_new
             edges.born_key[row] = key_number
-            reach = FIRST_SPEED_SHARE * settings.bl0_px / around.dt_s
-            error_matrix.start(edges, row, around.corner_var, reach * reach)
+            unsure = FIRST_SPEED_SHARE * edges.speed[row]
+            error_matrix.start(edges, row, around.corner_var, unsure * unsure)
             take_corner(edges, row, corners, k, around.dt_s)
 
 

@@ -11,7 +11,7 @@ cdef class MotionError:
     cdef double xx, xy, yy
 
 cpdef void start(EdgeColumns edges, Py_ssize_t i, double corner_var, double speed_var) noexcept nogil
-cpdef void predict(EdgeColumns edges, Py_ssize_t i, double rotation_var, double dt_s) noexcept nogil
+cpdef void predict(EdgeColumns edges, Py_ssize_t i, double dt_s) noexcept nogil
 cpdef void correct(EdgeColumns edges, Py_ssize_t i, double share, double corner_var, double dt_s) noexcept nogil
 cpdef void of_rotation(MotionError error, Baselines baselines, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, double x, double y, Situation around) noexcept nogil
 @cython.locals(i=int, j=int)

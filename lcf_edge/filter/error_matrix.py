@@ -28,12 +28,11 @@ def start(edges: EdgeColumns, i: int, corner_var: float, speed_var: float) -> No
     edges.covariance_speed[i], edges.variance_speed[i] = 0.0, speed_var
 
 
-def predict(edges: EdgeColumns, i: int, rotation_var: float, dt_s: float) -> None:
-    """L' = L + V·t_f, with the rotation in between known by ``rotation_var``, px²."""
+def predict(edges: EdgeColumns, i: int, dt_s: float) -> None:
+    """L' = L + V·t_f. An error of the rotation shifts all edges alike, and is found with them: ``of_rotation``."""
     turned = edges.covariance_speed[i] + dt_s * edges.variance_speed[i]
-    edges.variance_along[i] += dt_s * (edges.covariance_speed[i] + turned) + rotation_var
+    edges.variance_along[i] += dt_s * (edges.covariance_speed[i] + turned)
     edges.covariance_speed[i] = turned
-    edges.variance_across[i] += rotation_var
 
 
 def correct(edges: EdgeColumns, i: int, share: float, corner_var: float, dt_s: float) -> None:
@@ -100,8 +99,11 @@ def add_places(error: MotionError, edges: EdgeColumns, i: int, around: Situation
 
 
 def add_focus(error: MotionError, mu: float, around: Situation) -> None:
-    """By the focus of expansion, from which an edge has moved by a share μ of its distance."""
-    share = min(math.fabs(mu), MAX_FOCUS_SHARE)
+    """By the focus of expansion, from which an edge has moved by a share μ of its distance.
+
+    Nothing stationary goes towards it: there, it moves by none.
+    """
+    share = min(max(mu, 0.0), MAX_FOCUS_SHARE)
     error.xx += share * share * around.focus_var_x
     error.yy += share * share * around.focus_var_y
 

@@ -295,7 +295,7 @@ def test_bearings_are_angles_at_the_lens_not_in_the_image(approach: Approach) ->
     bearing, elevation = lens.bearing(ideal[:, 0], ideal[:, 1])
     assert np.allclose(circles["bearing"], bearing, atol=1e-3)
     assert np.allclose(circles["elevation"], elevation, atol=1e-3)
-    assert np.abs(circles["bearing"]).max() > 0.5
+    assert np.abs(circles["bearing"]).max() > 0.4  # where image and lens differ
 
 
 # Bounds
