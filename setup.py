@@ -63,7 +63,7 @@ LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles"}
 LITTLE |= {"coarse_circles", "columns", "derotation", "driving", "edge_rows", "error_matrix"}
 LITTLE |= {"feedback", "flow_fit", "ground_speed", "group_motion", "heading", "image_plane"}
 LITTLE |= {"key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
-LITTLE |= {"object_circles", "patch_circles", "path", "range_belief", "rebel_circles"}
+LITTLE |= {"object_circles", "patch_circles", "patches", "path", "range_belief", "rebel_circles"}
 LITTLE |= {"rebel_detection", "rest", "sample_ring", "scene_records", "settings", "situation"}
 LITTLE |= {"speed_change", "square_expert", "stillness", "turmoil"}
 

@@ -20,7 +20,7 @@ from lcf_edge.corners.lens_dirt import LensDirt
 from lcf_edge.corners.repeats import Repeats
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, SPEED_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
-from lcf_edge.ego_motion.image_rotation import ImageRotation
+from lcf_edge.ego_motion.image_rotation import ImageRotation, Turn
 from lcf_edge.ego_motion.stillness import Stillness
 from lcf_edge.errors import ConfigError
 from lcf_edge.filter import LineCircleFilter
@@ -39,6 +39,9 @@ if TYPE_CHECKING:  # the daemon reads none, and importing their formats takes me
     from lcf_edge.recording.read import Recording
 
 MIN_RANGE_M = 0.1
+_AGREEING_SHARE = 0.8  # of the edges found by the predicted rotation, which that of the image must find
+_MIN_CORNERS = 15  # fewer cannot contradict a rotation of the image, which must show more than a plain surface
+_ALIKE_PX = 3.0  # in the middle of the image: rotations nearer than that find the same edges
 NO_IMAGE = np.zeros((0, 0), np.uint8)
 
 Rows = np.ndarray[Any, np.dtype[np.void]]
@@ -165,7 +168,7 @@ class Pipeline:
             return _repeated(look.repeats, look)
         started = time.perf_counter_ns()
         frame, corners = look.frame, look.corners
-        ego = self._see_rotation(look.small, self._motion.advance(frame.stamp_ns, look.still))
+        ego = self._see_rotation(look, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
         self._dirt.look(look.small, ego.rotation, look.still)
         step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
@@ -217,13 +220,29 @@ class Pipeline:
         farthest_m = max(abs(self._speed_mps) * vehicle.horizon_s, MIN_RANGE_M)
         return self.filter.focus[1] - self._lens.fy * max(vehicle.height_m - camera.height_m, 0.0) / farthest_m
 
-    def _see_rotation(self, small: npt.NDArray[np.uint8], ego: EgoMotion) -> EgoMotion:
+    def _see_rotation(self, look: Look, ego: EgoMotion) -> EgoMotion:
         """Return the motion, with the rotation from the image where the gyro's is uncertain."""
         if not self._lost and not self._motion.needs_image_rotation(self._image_rotation.sigma_rad):
             self._image_rotation.forget()
             return ego
-        turn = self._image_rotation.turn(small)
-        return ego if turn is None else self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
+        turn = self._image_rotation.turn(look.small)
+        if turn is None or not self._corners_agree(look.corners, ego, turn):
+            return ego
+        return self._motion.add_image_rotation(turn.turn_rad, turn.sigma_rad)
+
+    def _corners_agree(self, corners: Corners, ego: EgoMotion, turn: Turn) -> bool:
+        """Whether the rotation of the image explains the corners about as well as the predicted one, or better.
+
+        What is near and fills the image moves it as a rotation would. Without trusted edges, as in the beginning,
+        there are no grounds to contradict; without corners, no rotation is to be seen.
+        """
+        if len(corners) < _MIN_CORNERS:
+            return False
+        apart_x, apart_y, _ = self._lens.fx * (turn.rotation - ego.rotation)[:, 2]
+        if math.hypot(apart_x, apart_y) < _ALIKE_PX:
+            return True
+        predicted = self.filter.found_share(corners, ego.rotation, ego.dt_s)
+        return not self.filter.found_share(corners, turn.rotation, ego.dt_s) < _AGREEING_SHARE * predicted
 
     def _circles(self) -> tuple[Rows, npt.NDArray[np.uint32]]:
         """Return the circles from Tr_s up, rebels first, and the object id of each, 0: none."""

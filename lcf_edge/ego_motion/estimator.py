@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from itertools import islice
-from math import exp, expm1, hypot, inf, isfinite, nan, sqrt
+from math import exp, hypot, inf, isfinite, nan, sqrt
 
 import numpy as np
 import numpy.typing as npt
@@ -19,6 +19,7 @@ from lcf_edge.config import Imu, Vehicle
 from lcf_edge.ego_motion.ground_belief import GroundBelief
 from lcf_edge.ego_motion.gyro_bias import GyroBias
 from lcf_edge.ego_motion.inertial_speed import GRAVITY_MPS2, MAX_SPEED_MPS, InertialSpeed
+from lcf_edge.ego_motion.path_yaw import PathYaw
 from lcf_edge.ego_motion.sample_ring import Ring, Span, Track, Window
 from lcf_edge.filter.ground_speed import GroundSpeed
 from lcf_edge.filter.inputs import UNKNOWN, Motion
@@ -64,8 +65,6 @@ _ROLL_SHARE = 0.5  # roll moves the image's edge by this share of what yaw does
 
 _DRIVES_S = 0.5  # an object that comes close to a stationary vehicle may cause flow too, but not for this long
 
-_SHAKE_S = 0.4  # a shorter yaw rate is the camera shaking, not the vehicle turning
-
 
 @dataclass(frozen=True, slots=True)
 class EgoMotion:
@@ -96,7 +95,6 @@ class _Interval:
     measured: bool  # by a working gyro,
     odometry_mps: float
     odometry_yaw_radps: float
-    path_yaw_before_radps: float
     notes: list[str] = field(default_factory=list)
     axes: Sequence[bool] = (False, False, False)  # which of its axes
     rests: bool = False  # without a gyro, by odometry that measures no turn either
@@ -123,7 +121,7 @@ class EgoMotionEstimator:
         self._ground = GroundBelief()
         self._drove_ns: int | None = None  # when the image last showed that it drives,
         self._driven_s = 0.0  # and for how long it has
-        self._path_yaw_radps = 0.0
+        self._path_yaw = PathYaw()
         self._guess_variance = [_SIGMA_UNKNOWN_RADPS**2] * 3  # of rates that no gyro measures
         self._noisy = False  # as a real gyro; synthetic samples have no noise
         self._turned = [0, 0, 0]  # samples other than 0, by axis
@@ -134,7 +132,7 @@ class EgoMotionEstimator:
         self._guessed = Track(2, 3)
         self._latest = Track(2, self._imu.columns)
         self._window = Window()
-        self._interval = _Interval(Span(0, 0), self._guessed, False, nan, nan, 0.0)
+        self._interval = _Interval(Span(0, 0), self._guessed, False, nan, nan)
         self._error_radps = [0.0, 0.0, 0.0]
 
     def add_imu(self, sample: ImuSample) -> None:
@@ -185,8 +183,9 @@ class EgoMotionEstimator:
         if self._odometry.age_s(stamp_ns) <= _FRESH_S:
             self._odometry.between(span, self._speeds)
             odometry_mps, odometry_yaw_radps = self._speeds.mean()
-        interval = _Interval(span, self._guessed, False, odometry_mps, odometry_yaw_radps, self._path_yaw_radps, notes)
+        interval = _Interval(span, self._guessed, False, odometry_mps, odometry_yaw_radps, notes)
         self._interval = interval
+        self._path_yaw.advance(span.dt_s)
         gap_limit_s = max(_GAP_S, 5 * self._imu.period_s())
         if self._imu.covers(span, gap_limit_s):
             may_rest = still is not False and self._stands(stamp_ns, odometry_mps, still) is not False
@@ -253,7 +252,7 @@ class EgoMotionEstimator:
 
     def _guess(self, interval: _Interval) -> None:
         """Guess the rates without a gyro: odometry's yaw rate, or else the last rates."""
-        yaw_radps = self._path_yaw_radps
+        yaw_radps = self._path_yaw.rate_radps
         if isfinite(interval.odometry_yaw_radps):
             interval.notes.append("rotation from odometry")
             yaw_radps = interval.odometry_yaw_radps
@@ -362,7 +361,7 @@ class EgoMotionEstimator:
             max(sigma_x, sigma_y, _ROLL_SHARE * sigma_z) * dt_s,
             self._speed_mps,
             yaw_rate_radps,
-            self._path_yaw_radps,
+            self._path_yaw.rate_radps,
             self._rate_at_end(),
             tuple(interval.notes),
         )
@@ -381,11 +380,9 @@ class EgoMotionEstimator:
         interval = self._interval
         yaw_rate_radps = error_radps[1] - interval.mean_radps[1]
         if isfinite(interval.odometry_yaw_radps):
-            self._path_yaw_radps = interval.odometry_yaw_radps
+            self._path_yaw.see_odometry(interval.odometry_yaw_radps)
         else:
-            before_radps = interval.path_yaw_before_radps
-            share = -expm1(-interval.span.dt_s / _SHAKE_S)
-            self._path_yaw_radps = before_radps + share * (yaw_rate_radps - before_radps)
+            self._path_yaw.see_camera(yaw_rate_radps)
         return yaw_rate_radps
 
     def _stuck(self, stamp_ns: int, gap_limit_s: float, period_s: float, may_rest: bool) -> bool:

@@ -36,6 +36,12 @@ class Turn:
     turn_rad: Floats
     sigma_rad: Floats
 
+    @property
+    def rotation(self) -> Floats:
+        """(3, 3), as in ``EgoMotion``."""
+        matrix, _ = cv2.Rodrigues(self.turn_rad)
+        return np.asarray(matrix, np.float64)
+
 
 class ImageRotation:
     """For images of one size and ``lens``. ``sigma_rad``: of pitch and yaw at best."""

@@ -1,9 +1,11 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow, least_squares
+from lcf_edge.filter cimport flow, image_plane, least_squares, matching
 from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.flow cimport Homography, Pinhole
+from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.least_squares cimport NormalEquations
+from lcf_edge.filter.matching cimport CornerIndex
 from lcf_edge.filter.settings cimport Settings
 
 cdef double CORNER_SIGMA_PX
@@ -13,6 +15,8 @@ cdef int ROUNDS
 cdef double WEAK_RAD
 cdef double SCATTER
 cdef double MIN_SIGMA_PX
+cdef int MIN_SOUGHT
+cdef double FOUND_PX
 
 cdef class OffLine:
     cdef readonly Py_ssize_t count
@@ -23,7 +27,6 @@ cdef class OffLine:
 cpdef void derotate_edges(EdgeColumns edges, Homography h, double roll) noexcept nogil
 cpdef void derotate_circles(CircleColumns circles, Homography h, double roll) noexcept nogil
 cpdef void derotate_psi(PsiColumns psi, Homography h) noexcept nogil
-cpdef void derotate_predictions(EdgeColumns edges, Homography h) noexcept nogil
 cdef bint shows_rotation(EdgeColumns edges, Py_ssize_t i, double tr_s) noexcept nogil
 cpdef bint measure_off_line(OffLine off, EdgeColumns edges, CornerColumns corners, Pinhole pinhole, Settings settings) noexcept nogil
 cpdef void off_line(OffLine off, EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Pinhole pinhole) noexcept nogil
@@ -31,3 +34,5 @@ cpdef void off_line(OffLine off, EdgeColumns edges, Py_ssize_t i, CornerColumns 
 cpdef void missing_rotation(OffLine off, double focal, double prior_sigma_rad) noexcept nogil
 @cython.locals(scatter=double)
 cdef double weigh(OffLine off, double prior) noexcept nogil
+@cython.locals(sought=int, found=int)
+cpdef double found_share(CornerIndex index, ImagePlane plane, EdgeColumns edges, CornerColumns corners, Homography h, double dt_s, Settings settings) noexcept nogil

@@ -1,11 +1,16 @@
-"""Step 0: takes the camera's rotation out of all stored positions; the flow shows what the gyro missed."""
+"""Step 0: takes the camera's rotation out of all stored positions; the flow shows what the gyro missed.
+
+Between two rotations that differ by more than the gates, the corners decide (``found_share``).
+"""
 
 import math
 
-from lcf_edge.filter import flow, least_squares
+from lcf_edge.filter import flow, image_plane, least_squares, matching
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, PsiColumns
 from lcf_edge.filter.flow import Homography, Pinhole
+from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.least_squares import NormalEquations
+from lcf_edge.filter.matching import CornerIndex
 from lcf_edge.filter.memory import doubles
 from lcf_edge.filter.settings import Settings
 
@@ -16,13 +21,17 @@ ROUNDS = 3
 WEAK_RAD = 1.0  # prior of the rotation by the flow alone
 SCATTER = 0.17  # of edges with ordinary corner noise, see ``weigh``
 MIN_SIGMA_PX = 0.15  # error common to all corners of a frame
+MIN_SOUGHT = 15  # trusted edges in the image, to tell what share of them a rotation finds again
+FOUND_PX = 6.0  # around where an edge must be then
 
 
 def derotate_edges(edges: EdgeColumns, h: Homography, roll: float) -> None:
-    """Apply H = K·R·K⁻¹ to all positions of the edges; β of rebels and chains turns too. ``roll``: rad."""
+    """Apply H = K·R·K⁻¹ to all positions of the edges, also L'; β of rebels and chains turns too. ``roll``: rad."""
     for i in range(edges.count):
         flow.warp(h, edges.x[i], edges.y[i])
         edges.x[i], edges.y[i] = h.x, h.y
+        flow.warp(h, edges.predicted_x[i], edges.predicted_y[i])
+        edges.predicted_x[i], edges.predicted_y[i] = h.x, h.y
         if edges.own_way(i):
             flow.warp(h, edges.origin_x[i], edges.origin_y[i])
             edges.origin_x[i], edges.origin_y[i] = h.x, h.y
@@ -44,13 +53,6 @@ def derotate_psi(psi: PsiColumns, h: Homography) -> None:
         if psi.active[p]:
             flow.warp(h, psi.x[p], psi.y[p])
             psi.x[p], psi.y[p] = h.x, h.y
-
-
-def derotate_predictions(edges: EdgeColumns, h: Homography) -> None:
-    """Apply H = K·R·K⁻¹ to L'."""
-    for i in range(edges.count):
-        flow.warp(h, edges.predicted_x[i], edges.predicted_y[i])
-        edges.predicted_x[i], edges.predicted_y[i] = h.x, h.y
 
 
 class OffLine:
@@ -161,3 +163,34 @@ def weigh(off: OffLine, prior: float) -> float:
         least_squares.add(off.equations, 1 / (outlying * outlying), px)
         scatter += 1 - 1 / outlying
     return scatter / max(off.count, 1)
+
+
+def found_share(
+    index: CornerIndex,
+    plane: ImagePlane,
+    edges: EdgeColumns,
+    corners: CornerColumns,
+    h: Homography,
+    dt_s: float,
+    settings: Settings,
+) -> float:
+    """Share of the trusted normal edges found again if H = K·R·K⁻¹ is the camera's rotation; 0: too few edges.
+
+    Of the edges found in the last frame, found now are those with a corner like them within ``FOUND_PX`` of where H and
+    V put them.
+    """
+    sought, found = 0, 0
+    for i in range(edges.count):
+        if not shows_rotation(edges, i, settings.tr_s):
+            continue
+        way = edges.speed[i] * dt_s
+        flow.warp(h, edges.x[i] + way * edges.cos[i], edges.y[i] + way * edges.sin[i])
+        if not image_plane.project(plane, h.x, h.y):
+            continue
+        sought += 1
+        most = matching.likeness_needed(matching.contrast(edges, i), settings)
+        for k in range(matching.list_near(index, corners, plane.u, plane.v, FOUND_PX)):
+            if matching.difference(edges, i, index, index.listed[k]) < most:
+                found += 1
+                break
+    return found * 1.0 / sought if sought >= MIN_SOUGHT else 0.0

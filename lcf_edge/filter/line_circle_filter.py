@@ -244,6 +244,16 @@ class LineCircleFilter:
             residual,
         )
 
+    def found_share(self, corners: Corners, rotation: Matrix, dt_s: float) -> float:
+        """Return the share of the trusted edges that corners agree with if ``rotation`` is the camera's; 0: too few.
+
+        ``rotation``: as in ``Motion``, over the ``dt_s`` since the last step.
+        """
+        self._take(corners)
+        flow.set_homography(self._homography, self._pinhole, _memory(rotation), 0)
+        edges, plane, settings = self.edges.columns, self._plane, self._settings
+        return derotation.found_share(self._index, plane, edges, self.corners.columns, self._homography, dt_s, settings)
+
     def _rested(self, motion: Motion) -> Motion:
         """The motion, with speed 0 where the vehicle is stationary by the image."""
         self._rest.measured_mps = motion.speed_mps
@@ -354,7 +364,6 @@ class LineCircleFilter:
             self._missing_px += FORGET * (math.hypot(a, b) * self._pinhole.focal - self._missing_px)
             key_frames.turn(self._keys, rotation)
             self._warp(rotation)
-            derotation.derotate_predictions(edges, self._homography)
             self.shutter.measure(self.edges, self.corners, motion.rate_radps, motion.dt_s)
         else:
             self._missing_px = settings.leap_px  # lost: search everywhere

@@ -12,10 +12,13 @@ from benchmarks.playing import config_of
 from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Config, Imu, Vehicle
 from lcf_edge.ego_motion.estimator import EgoMotionEstimator
+from lcf_edge.ego_motion.image_rotation import ImageRotation
 from lcf_edge.filter import Motion
 from lcf_edge.lens import Lens
 from lcf_edge.pipeline import Pipeline
 from lcf_edge.rendered import scenes
+from lcf_edge.rendered.trajectory import Trajectory
+from lcf_edge.small_image import SmallImage
 
 Spoil = Callable[[Sequence[ImuSample]], Sequence[ImuSample]]
 
@@ -193,3 +196,69 @@ def test_a_vehicle_that_stands_without_a_gyro_takes_nobody_who_passes_close_for_
         pipeline.process(frame)
     assert max(turned_mrad[10:]) < 3.0
     assert max(sigma_mrad[10:]) < 1.5  # 0.04 rad/s, the least of a guess while it drives, would be 2
+
+
+def odometry_alone(drive: scenes.Drive, yaw_rate: bool) -> Sequence[SpeedSample]:
+    samples = scenes.odometry(drive)
+    return samples if yaw_rate else [replace(sample, yaw_rate_radps=float("nan")) for sample in samples]
+
+
+def of_drive(drive: scenes.Drive, yaw_rate: bool) -> Iterator[tuple[int, Motion, Pipeline]]:
+    """Number, motion as given to the filter, and pipeline of each frame, without an IMU."""
+    config = config_of(drive)
+    pipeline = Pipeline(config, Lens.from_config(config.camera, 640, 480))
+    motions: list[Motion] = []
+    step = pipeline.filter.step
+
+    def watched(corners: object, motion: Motion, *images: object) -> object:
+        motions.append(motion)
+        return step(corners, motion, *images)  # type: ignore[arg-type]
+
+    pipeline.filter.step = watched  # type: ignore[method-assign, assignment]
+    samples, given = odometry_alone(drive, yaw_rate), 0
+    for frame, _ in scenes.frames(drive):
+        while given < len(samples) and samples[given].stamp_ns <= frame.stamp_ns + LATE_NS:
+            pipeline.add(samples[given])
+            given += 1
+        pipeline.process(frame)
+        yield frame.seq, motions[-1], pipeline
+
+
+@pytest.mark.parametrize("yaw_rate", [True, False], ids=["yaw rate by odometry", "no yaw rate"])
+def test_somebody_who_crosses_close_without_a_gyro_is_not_taken_for_a_turn(yaw_rate: bool) -> None:
+    """The vehicle drives straight on; the walker fills so much of the image that the whole seems to turn by 8°."""
+    turned_rad = [abs(motion.rotation[0, 2]) for _, motion, _ in of_drive(scenes.make("crossing", 90), yaw_rate)]
+    assert max(turned_rad[10:]) < 0.02
+
+
+def test_turns_of_100_degrees_a_second_are_followed_without_gyro_and_yaw_rate() -> None:
+    """To and fro, at 20 images a second. O stays where the vehicle is heading, and so do both in the camera's axes."""
+    rate = np.radians(100)
+    knots = ((0.0, 0.0), (1.5, 0.0), (1.75, rate), (2.1, rate), (2.6, -rate), (2.95, -rate), (3.2, 0.0))
+    drive = replace(scenes.make("passing", 92), yaw_rate=scenes.Profile(knots), seconds=4.0)
+    off_rad, missed_rad = [], []
+    times = np.arange(0.0, 4.0, 0.05)
+    truth = -np.diff(Trajectory(drive).heading(times))  # right positive, as the image moves to the left
+    for number, motion, pipeline in of_drive(drive, yaw_rate=False):
+        if number >= 20:
+            off_rad.append(abs(pipeline.filter.focus[0] - 319.5) / drive.lens.focal_px)
+            missed_rad.append(abs(np.arcsin(motion.rotation[0, 2]) + truth[number - 1]))
+    assert np.percentile(missed_rad, 90) < 0.02
+    assert np.percentile(off_rad, 90) < 0.05  # with a path that follows within 0.4 s: 0.15
+
+
+def test_an_image_without_corners_shows_no_rotation_however_far_it_shifts() -> None:
+    noise = np.random.default_rng(5).normal(0, 1, (480, 1280))
+    soft = cv2.GaussianBlur(noise, (0, 0), 14)
+    soft = np.clip(128 + 40 * soft / soft.std(), 0, 255).astype(np.uint8)
+    images = [np.ascontiguousarray(soft[:, left : left + 640]) for left in range(0, 600, 60)]
+    lens = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
+    alone, small = ImageRotation(lens), SmallImage(640, 480)
+    turns = [alone.turn(small.of(image)) for image in images]
+    assert all(turn is not None and turn.turn_rad[1] < -0.1 for turn in turns[1:])
+
+    pipeline = Pipeline(Config(), lens)
+    for number, image in enumerate(images):
+        scene = pipeline.process(Frame(50_000_000 * number, number, image))
+        assert scene.sizes.corners < 15
+        assert "rotation from pictures" not in scene.notes

@@ -11,16 +11,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Filter
-from lcf_edge.filter import derotation, flow
+from lcf_edge.filter import derotation, flow, matching
 from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.flow import Homography, Pinhole, line_distance, set_homography
+from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.line_circle_filter import Residual
+from lcf_edge.filter.matching import CornerIndex
+from lcf_edge.filter.memory import memory_of
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, PsiTable
+from lcf_edge.lens import Lens
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SIGMA_RAD = 0.01
 SETTINGS = Settings(Filter(), PINHOLE)
+
+Vector = tuple[float, float, float]
 
 angle = st.floats(-0.006, 0.006)
 
@@ -206,3 +212,39 @@ def test_the_distance_from_the_flow_line_is_that_of_the_corner() -> None:
     for row in range(25):
         dx, dy = corners.x[row] - edges.predicted_x[row], corners.y[row] - edges.predicted_y[row]
         assert np.asarray(off.px)[row] == pytest.approx(line_distance(dx, dy, edges.cos[row], edges.sin[row]))
+
+
+# Which of two rotations the corners agree with
+
+LENS = Lens(640, 480, 500.0, 500.0, 319.5, 239.5)
+
+
+def share_found(number: int, turned: Vector, asked: Vector) -> float:
+    """Share of ``number`` trusted edges found again by a rotation, where their corners have turned by another one."""
+    x, y = spread(number)
+    edges, corners, index = EdgeTable(400, 1, 1), CornerTable(400), CornerIndex(640, 480, 400)
+    rows = edges.append(number)
+    edges.x[rows], edges.y[rows], edges.trust[rows], edges.corner[rows] = x, y, SETTINGS.tr_s, 0
+    looks = np.random.default_rng(1).integers(0, 256, (number, 16)).astype(np.uint8)
+    edges.appearance[rows] = looks
+    moved = warp(rotation_of(turned), x, y)
+    seen = ((moved >= 0) & (moved.T <= (639, 479)).T).all(axis=0)
+    pixel = np.ascontiguousarray(np.rint(moved.T[seen]), np.int32)
+    words = np.ascontiguousarray(looks[seen]).view(np.uint64)
+    matching.take_corners(corners.columns, memory_of(pixel), memory_of(pixel.astype(np.float32)), memory_of(words))
+    matching.fill(index, corners.columns)
+    h, plane = homography(rotation_of(asked)), ImagePlane(LENS)
+    return derotation.found_share(index, plane, edges.columns, corners.columns, h, 0.05, SETTINGS)
+
+
+@given(st.floats(-0.09, 0.09), st.floats(-0.09, 0.09))
+def test_the_rotation_that_happened_finds_nearly_all_edges_again_and_another_one_hardly_any(
+    pitch: float, yaw: float
+) -> None:
+    assert share_found(200, (pitch, yaw, 0.0), (pitch, yaw, 0.0)) > 0.95
+    assert share_found(200, (pitch, yaw, 0.0), (pitch, yaw + 0.04, 0.0)) < 0.2
+
+
+def test_too_few_edges_agree_with_no_rotation() -> None:
+    assert share_found(14, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == 0.0
+    assert share_found(15, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)) == 1.0
