@@ -17,5 +17,5 @@ cpdef void of_rotation(MotionError error, Baselines baselines, EdgeColumns edges
 @cython.locals(i=int, j=int)
 cdef void add_rate(MotionError error, Baselines baselines, Py_ssize_t slot, double x, double y, Situation around) noexcept nogil
 cpdef double add_places(MotionError error, EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
-cpdef void add_focus(MotionError error, double mu, Situation around) noexcept nogil
+cpdef double add_focus(MotionError error, double mu, double cos, double sin, Situation around) noexcept nogil
 cpdef double variance(MotionError error, double cos, double sin) noexcept nogil

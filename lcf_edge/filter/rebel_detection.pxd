@@ -33,7 +33,7 @@ cdef class Verdicts:
     cdef public Py_ssize_t count
     cdef readonly int[::1] row, slot, near
     cdef int[::1] oldest
-    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, noise, inverse, inverse_sigma
+    cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, astray, noise, inverse, inverse_sigma
     cdef double[::1] near_x, near_y, weight
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
@@ -45,6 +45,7 @@ cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i
 cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef double ground_outward(double y, double lever, Situation around) noexcept nogil
 cdef double sigma_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
+cdef double common_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
 cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(total=double, shared=double, ground=double)

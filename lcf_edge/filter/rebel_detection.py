@@ -28,7 +28,7 @@ NEAR_PATH = 1.5  # half widths from the path within which edges are candidates
 NEAR_SIGMAS = 2.0  # by which a candidate may move slower than it should
 MAX_CANDIDATES = 200  # all pairs are compared
 NEW_THREAT = 0.97  # share of the horizon within which a threat begins; hysteresis against flicker
-RANGE_SIGMAS = 4.0  # by which 1/Z of an incoming edge exceeds zero,
+RANGE_SIGMAS = 3.0  # by which 1/Z of an incoming edge exceeds zero,
 GROUND_SIGMAS = 1.0  # and that of the ground
 SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, in horizons at most
 MIN_INVERSE_RANGE = 1e-6  # 1/m
@@ -45,7 +45,8 @@ class Verdicts:
     ``row``: of the table of edges. ``slot``: of the key frame. ``x``, ``y``: position then, derotated to now, px.
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge falls short of the flow.
     ``over``: px by which it exceeds it. ``outward``: px along the flow line. ``expansion``: μ per second, 1/s.
-    ``sigma``: of the rotation since, px along the flow line; ``noise``: of its own two places, px.
+    ``sigma``: of the rotation since, px along the flow line; ``astray``: of O, likewise; ``noise``: of its own two
+    places, px.
     ``mover``, ``incoming``: the verdict.
 
     ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
@@ -59,7 +60,8 @@ class Verdicts:
         self.x, self.y, self.r, self.drift = [doubles(capacity) for _ in range(4)]
         self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
         self.mover, self.incoming = [octets(capacity) for _ in range(2)]
-        self.sigma, self.noise, self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(4)]
+        self.sigma, self.astray, self.noise = [doubles(capacity) for _ in range(3)]
+        self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(2)]
         self.near_x, self.near_y, self.weight = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
         self.shared = self.ground = self.total = 0.0
@@ -99,7 +101,7 @@ def judge(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, 
     error_matrix.of_rotation(verdicts.error, baselines, edges, i, slot, verdicts.x[j], verdicts.y[j], around)
     verdicts.sigma[j] = math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
     verdicts.noise[j] = error_matrix.add_places(verdicts.error, edges, i, around)
-    error_matrix.add_focus(verdicts.error, outward / r, around)
+    verdicts.astray[j] = math.sqrt(error_matrix.add_focus(verdicts.error, outward / r, cos, sin, around))
     along = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
     across = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, -sin, cos))
     drifts = math.fabs(drift) > across + PARALLAX_DRIFT * math.fabs(outward)
@@ -117,8 +119,13 @@ def ground_outward(y: float, lever: float, around: Situation) -> float:
 
 
 def sigma_px(verdicts: Verdicts, j: int) -> float:
-    """1 sigma of an edge's motion, px: of its two positions, and of the rotation between."""
-    return lengths.of(verdicts.sigma[j], verdicts.noise[j])
+    """1 sigma of an edge's motion, px: of its two positions, of the rotation between, and of O."""
+    return lengths.of(common_px(verdicts, j), verdicts.noise[j])
+
+
+def common_px(verdicts: Verdicts, j: int) -> float:
+    """What of that it shares with its neighbours, px."""
+    return lengths.of(verdicts.sigma[j], verdicts.astray[j])
 
 
 def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
@@ -183,7 +190,7 @@ def will_be_met(
     i, shared = verdicts.row[j], verdicts.shared
     focal = around.pinhole.focal
     reach_m = around.speed_mps * around.horizon_s
-    shared_px = verdicts.sigma[j] + max(around.noise_px - COMMON_NOISE_PX, 0.0)  # errors that neighbours share
+    shared_px = common_px(verdicts, j) + max(around.noise_px - COMMON_NOISE_PX, 0.0)  # errors that neighbours share
     inverse_sigma = 1 / math.sqrt(verdicts.total) + shared_px / lever_of(verdicts, j, baselines)
     range_m = 1 / max(shared, MIN_INVERSE_RANGE)
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
