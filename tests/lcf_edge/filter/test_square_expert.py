@@ -358,7 +358,7 @@ def test_who_left_the_image_at_its_side_is_remembered_longer_if_he_walks_towards
 def test_who_was_lost_right_before_a_vehicle_that_stands_is_there_until_it_sees_through_him(
     drive: Drive, box: Landmarks, clutter: Landmarks, far_things: int, about_s: float
 ) -> None:
-    walker = drive(box((1.2, -0.55, 3.25), (0.4, 1.7, 0.2), landmarks=60), np.array([-0.45, 0, 0]))
+    walker = drive(box((1.35, -0.55, 3.3), (0.4, 1.7, 0.2), landmarks=60), np.array([-0.5, 0, 0]))
     behind = drive(box((0.0, -1.0, 30.0), (34.0, 10.0, 0.2), landmarks=far_things, seed=3))
     way = replace(drive(clutter(150)) + walker + behind, frames=60, speed_mps=1.5)
     assert remembered_s(way, slice(150, 210), 0.1) == pytest.approx(about_s, abs=0.4)
