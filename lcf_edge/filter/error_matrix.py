@@ -101,12 +101,13 @@ def add_places(error: MotionError, edges: EdgeColumns, i: int, around: Situation
 def add_focus(error: MotionError, mu: float, cos: float, sin: float, around: Situation) -> float:
     """By the focus of expansion, from which an edge has moved by a share μ of its distance.
 
-    Nothing stationary goes towards it: there, it moves by none. Return the part in the direction (cos, sin), px².
+    Nothing stationary goes towards it: there, it moves by none. Return the part in the direction (cos, sin) that lasts,
+    px²: the heading shakes, which key frames see differently.
     """
     share = min(max(mu, 0.0), MAX_FOCUS_SHARE)
     error.xx += share * share * around.focus_var_x
     error.yy += share * share * around.focus_var_y
-    return share * share * (cos * cos * around.focus_var_x + sin * sin * around.focus_var_y)
+    return share * share * (cos * cos * around.lasting_var_x + sin * sin * around.lasting_var_y)
 
 
 def variance(error: MotionError, cos: float, sin: float) -> float:

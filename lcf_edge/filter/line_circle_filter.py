@@ -447,6 +447,8 @@ class LineCircleFilter:
             around.focus_y += fit.focus_y
             around.horizon_y = around.focus_y
             headings.learn_mounting(heading, around, fit)
+        around.lasting_var_x = fit.focus_sigma_x * fit.focus_sigma_x
+        around.lasting_var_y = fit.focus_sigma_y * fit.focus_sigma_y
         around.focus_var_x = headings.focus_variance(fit.focus_sigma_x / pinhole.fx) * pinhole.fx * pinhole.fx
         around.focus_var_y = headings.focus_variance(fit.focus_sigma_y / pinhole.fy) * pinhole.fy * pinhole.fy
         rest.measure(self._rest, self.edges.columns, self._keys, self._baselines, around)

@@ -12,7 +12,7 @@ cdef class Situation:
     cdef double scene_flow_pxps
     cdef public bint flow_is_seen, is_blind
     cdef bint ground_is_still
-    cdef public double noise_px, corner_var, excess, focus_var_x, focus_var_y
+    cdef public double noise_px, corner_var, excess, focus_var_x, focus_var_y, lasting_var_x, lasting_var_y
     cdef double least_corner_var
 
 cpdef void follow(Situation around, double ray_x, double ray_y, double speed_mps, double yaw_rate_radps, double dt_s) noexcept nogil

@@ -142,8 +142,10 @@ def test_the_places_count_along_and_across_the_direction_of_the_edge(
 def test_the_focus_counts_by_the_share_of_its_distance_that_an_edge_has_moved(mu: float, share: float) -> None:
     """Near the focus that share has no bound, and half of it is taken at most; nothing stationary goes towards it."""
     error = MotionError()
-    along = error_matrix.add_focus(error, mu, 0.6, 0.8, situation(focus_var_x=4.0, focus_var_y=9.0))
-    assert along == pytest.approx(share**2 * (0.36 * 4 + 0.64 * 9))
+    along = error_matrix.add_focus(
+        error, mu, 0.6, 0.8, situation(focus_var_x=4.0, focus_var_y=9.0, lasting_var_x=1.0, lasting_var_y=2.0)
+    )
+    assert along == pytest.approx(share**2 * (0.36 * 1 + 0.64 * 2))
     assert in_direction(error, 0.0) == pytest.approx(share**2 * 4)
     assert in_direction(error, math.pi / 2) == pytest.approx(share**2 * 9)
     assert in_direction(error, math.pi / 4) == pytest.approx(share**2 * 6.5)
