@@ -16,13 +16,14 @@ class Situation:
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
     unknown. ``scene_flow_pxps``: image speed at V_ν, or ``SLOWEST_MPS`` if more, of a point at the configured scene
     depth, one focal length from O, which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown.
-    ``dt_s``: t_f. ``noise_px``: 1 sigma of an edge's position; ``corner_var``: variance of a corner's, px², at
-    least ``least_corner_var``; ``excess``: factor by which this image leaves more than they explain. ``focus_var_x``,
+    ``dt_s``: t_f. ``noise_px``: 1 sigma of an edge's position; ``corner_var``: variance of a corner's, px², at least
+    ``least_corner_var``; ``excess``: factor by which this image leaves more than they explain. ``focus_var_x``,
     ``focus_var_y``: variance of O at one instant, px²; ``lasting_var_x``, ``lasting_var_y``: without the shaking of the
-    heading. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it. ``pitch_sigma_rad``: 1
-    sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must
-    flow (``rest``). ``flow_is_seen``: enough of the static scene is in view to show its flow. ``is_blind``: it is not,
-    and hardly an edge of the image is found again: something covers it.
+    heading. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it. ``pitch_sigma_rad``: 1 sigma of
+    the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance of the
+    camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``: enough of
+    the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is found
+    again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
