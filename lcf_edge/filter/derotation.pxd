@@ -20,6 +20,7 @@ cdef double FOUND_PX
 
 cdef class OffLine:
     cdef readonly Py_ssize_t count
+    cdef readonly int[::1] row
     cdef readonly double[::1] pitch, yaw, roll, px, alone, alone_sigma
     cdef NormalEquations equations
     cdef readonly double turn_x, turn_y, turn_z, sigma

@@ -11,7 +11,7 @@ from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.least_squares import NormalEquations
 from lcf_edge.filter.matching import CornerIndex
-from lcf_edge.filter.memory import doubles
+from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
 
 CORNER_SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
@@ -58,13 +58,14 @@ def derotate_psi(psi: PsiColumns, h: Homography) -> None:
 class OffLine:
     """Edges off their flow lines, which show the rotation that the gyro missed; one row each, at most ``MAX_EDGES``.
 
-    ``pitch``, ``yaw``, ``roll``: px across the flow line for 1 rad about x, y and z; ``px``: distance from it. The
-    solution: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad. ``alone``, ``alone_sigma``: (3,), the same rotation
-    by the flow alone, without the gyro's prior, and its 1 sigma.
+    ``row``: of the table of edges. ``pitch``, ``yaw``, ``roll``: px across the flow line for 1 rad about x, y and z;
+    ``px``: distance from it. The solution: ``turn_x``, ``turn_y``, ``turn_z`` and ``sigma``, rad. ``alone``,
+    ``alone_sigma``: (3,), the same rotation by the flow alone, without the gyro's prior, and its 1 sigma.
     """
 
     def __init__(self) -> None:
         self.count = 0
+        self.row = integers(MAX_EDGES)
         self.pitch, self.yaw, self.roll, self.px = [doubles(MAX_EDGES) for _ in range(4)]
         self.turn_x = self.turn_y = self.turn_z = self.sigma = 0.0
         self.alone, self.alone_sigma = [doubles(3) for _ in range(2)]
@@ -103,6 +104,7 @@ def measure_off_line(
 def off_line(off: OffLine, edges: EdgeColumns, i: int, corners: CornerColumns, pinhole: Pinhole) -> None:
     """Add one edge: its distance from the flow line, and the derivative of that by a small rotation, px/rad."""
     k, corner = off.count, edges.corner[i]
+    off.row[k] = i
     x, y, cos, sin = corners.x[corner], corners.y[corner], edges.cos[i], edges.sin[i]
     u, v = (x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy
     off.pitch[k] = pinhole.focal * (sin * u * v - cos * (1 + v * v))

@@ -364,7 +364,7 @@ class LineCircleFilter:
             self._missing_px += FORGET * (math.hypot(a, b) * self._pinhole.focal - self._missing_px)
             key_frames.turn(self._keys, rotation)
             self._warp(rotation)
-            self.shutter.measure(self.edges, self.corners, motion.rate_radps, motion.dt_s)
+            self.shutter.measure(off, self.edges, self.corners, motion.rate_radps, motion.dt_s)
         else:
             self._missing_px = settings.leap_px  # lost: search everywhere
             self.shutter.lose()

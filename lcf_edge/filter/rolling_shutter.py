@@ -18,9 +18,10 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.filter.derotation import OffLine
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.settings import Settings
-from lcf_edge.filter.tables import CornerTable, EdgeTable, Rows
+from lcf_edge.filter.tables import CornerTable, EdgeTable
 
 Floats = npt.NDArray[np.float64]
 
@@ -30,7 +31,7 @@ LEAST_RADPS = 0.05  # of ω - ω̄; with less a frame shows nothing
 LAG_SHARE = 0.03  # of the frame interval: 1 sigma of T by tracks that lag otherwise than ω̄, which no scatter shows
 SURE_S = 1e-3  # when the rest of 1 sigma is less, nothing more is measured
 SIGMA_PX = 0.7  # 1 sigma of a corner against its prediction
-MIN_EDGES, MAX_EDGES = 25, 200  # fully trusted
+MIN_EDGES = 25  # fully trusted
 ROUNDS = 3  # the first without weights
 WEAK = 1.0  # prior of turn and T: 0 ± 1 rad, 0 ± 1 s
 KNOWN_SIGMAS = 5.0  # by which T is known to differ from 0,
@@ -57,8 +58,13 @@ class RollingShutter:
         """Forget ω̄: edges were lost."""
         self._mean_radps = None
 
-    def measure(self, edges: EdgeTable, corners: CornerTable, rate_radps: Sequence[float], dt_s: float) -> None:
-        """Take a frame's edges with the corners that they found, and ω (3,) at its exposure, NaN: unknown."""
+    def measure(
+        self, off: OffLine, edges: EdgeTable, corners: CornerTable, rate_radps: Sequence[float], dt_s: float
+    ) -> None:
+        """Take a frame's edges off their flow lines, the corners that they found, and ω (3,) at its exposure.
+
+        ω is NaN where it is unknown.
+        """
         if not all(map(math.isfinite, rate_radps)):
             self.lose()
             return
@@ -69,21 +75,19 @@ class RollingShutter:
         self._lean += (1 - math.exp(-dt_s / LEAN_MEMORY_S)) * (change2 - self._lean)
         self._sums *= math.exp(-dt_s / MEMORY_S)
         if change2 >= LEAST_RADPS**2 and not self.sigma_s < math.hypot(LAG_SHARE * dt_s, SURE_S):  # true for NaN
-            self._add(edges, corners, np.array(change))
+            self._add(off, edges, corners, np.array(change))
         if self._sums[0] > 0:
             self._decide(dt_s)
 
-    def _add(self, edges: EdgeTable, corners: CornerTable, change: Floats) -> None:
+    def _add(self, off: OffLine, edges: EdgeTable, corners: CornerTable, change: Floats) -> None:
         """Add T and its information by the fully trusted edges of one frame, robust against movers."""
-        n = edges.count
-        settled = np.flatnonzero(
-            (edges.corner[:n] >= 0) & (edges.trust[:n] >= self._settings.tr_max) & ~edges.own_way()
-        )
-        if len(settled) < MIN_EDGES:
+        row = np.asarray(off.row)[: off.count]
+        settled = edges.trust[row] >= self._settings.tr_max
+        if np.count_nonzero(settled) < MIN_EDGES:
             return
-        settled = settled[:: 1 + len(settled) // MAX_EDGES]
-        a, px = self._off_line(edges, corners, settled)
-        rows = np.vstack([a, -(change @ a) * corners.pixel_y[edges.corner[settled]] / self._height])
+        a = np.stack([np.asarray(each)[: off.count][settled] for each in (off.pitch, off.yaw, off.roll)])
+        px, found = np.asarray(off.px)[: off.count][settled], edges.corner[row[settled]]
+        rows = np.vstack([a, -(change @ a) * corners.pixel_y[found] / self._height])
         prior = np.eye(4) * (SIGMA_PX / WEAK) ** 2
         weighted = rows  # w = 1/(1 + (rest/2σ)²)²
         for k in range(ROUNDS):
@@ -95,15 +99,6 @@ class RollingShutter:
         readout_s, information = solution[3], 1 / (SIGMA_PX**2 * np.linalg.inv(matrix)[3, 3])
         squared = information * information
         self._sums += (information, information * readout_s, squared, squared * readout_s, squared * readout_s**2)
-
-    def _off_line(self, edges: EdgeTable, corners: CornerTable, rows: Rows) -> tuple[Floats, Floats]:
-        """Return a (3, n) of edges, and their distances (n,) from their flow lines, px."""
-        found, cos, sin = edges.corner[rows], edges.cos[rows], edges.sin[rows]
-        x, y, pinhole = corners.x[found], corners.y[found], self._pinhole
-        u, v = (x - pinhole.cx) / pinhole.fx, (y - pinhole.cy) / pinhole.fy
-        pitch, yaw = sin * u * v - cos * (1 + v * v), cos * u * v - sin * (1 + u * u)
-        px = (y - edges.predicted_y[rows]) * cos - (x - edges.predicted_x[rows]) * sin
-        return pinhole.focal * np.stack([pitch, yaw, sin * v + cos * u]), px
 
     def _decide(self, dt_s: float) -> None:
         information, weighted, squares, linear, constant = self._sums.tolist()

@@ -290,12 +290,12 @@ def test_positions_are_px_of_the_input_frame(approach: Approach, lens: Lens) -> 
 
 def test_bearings_are_angles_at_the_lens_not_in_the_image(approach: Approach) -> None:
     lens = LENSES["fisheye"]
-    circles = np.concatenate([each.scene.circles for each in outcomes(approach(lens=lens, frames=30), lens=lens)])
+    circles = np.concatenate([each.scene.circles for each in outcomes(approach(lens=lens, frames=40), lens=lens)])
     ideal = lens.undistort(np.stack([circles["x"], circles["y"]], axis=1))
     bearing, elevation = lens.bearing(ideal[:, 0], ideal[:, 1])
     assert np.allclose(circles["bearing"], bearing, atol=1e-3)
     assert np.allclose(circles["elevation"], elevation, atol=1e-3)
-    assert np.abs(circles["bearing"]).max() > 0.4  # where image and lens differ
+    assert np.abs(circles["bearing"]).max() > 0.5
 
 
 # Bounds
