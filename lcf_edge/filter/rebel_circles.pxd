@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport coarse_circles, edge_equations, flow, image_plane, lengths, patch_circles, path, situation, turmoil
+from lcf_edge.filter cimport coarse_circles, edge_equations, flow, image_plane, lengths, patch_circles, path, rebel_detection, situation, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.coarse_circles cimport CoarseGroups
@@ -48,6 +48,8 @@ cdef double FAR_LINK_SHARE
 cdef double FAR_LINK_RAD
 cdef double NEAR_LINK_M
 cdef double NEAR_LIKE_HZ
+cdef double STAND_SIGMAS
+cdef double STAND_SHARE
 cdef double FAR_LIKE_SPEED
 cdef double COAST_SHARE
 cdef double COAST_TIME_SHARE
@@ -64,7 +66,7 @@ cdef class RebelGroups:
     cdef public Py_ssize_t count, groups
     cdef readonly int[::1] verdict, label
     cdef int[::1] group
-    cdef readonly double[::1] vx, vy, elapsed_s
+    cdef readonly double[::1] vx, vy, elapsed_s, inverse, inverse_sigma
     cdef readonly Members members
     cdef readonly double[::1] mean_s, closing_mps, focus_rate, focus_r2
     cdef double[::1] mean_vx, mean_vy, below2, below_vy
@@ -88,6 +90,7 @@ cdef double velocity_y(CircleColumns circles, Py_ssize_t c, double y, double hor
 cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
 cdef double noise_between(RebelGroups groups, Py_ssize_t a, Py_ssize_t b) noexcept nogil
 cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
+cdef bint stand_together(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around) noexcept nogil
 cpdef int lowest_label(RebelGroups groups, int k) noexcept nogil
 cdef void join(RebelGroups groups, int a, int b) noexcept nogil
 cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil

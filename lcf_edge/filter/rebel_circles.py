@@ -11,6 +11,7 @@ from lcf_edge.filter import (
     lengths,
     patch_circles,
     path,
+    rebel_detection,
     situation,
     turmoil,
 )
@@ -61,8 +62,10 @@ FASTEST_EXPANSION = 4.0  # of one object, per horizon
 LINK_SHARE = 0.03  # rebels link over what the faster moves in this share of the horizon: near things are large;
 FAR_LINK_SHARE = 0.08  # or in this share, where they move almost the same,
 FAR_LINK_RAD = 0.35  # but no farther
-NEAR_LINK_M = 0.3  # distance on the ground over which groups are merged
+NEAR_LINK_M = 0.3  # distance over which standing rebels link, and on the ground groups are merged
 NEAR_LIKE_HZ = 0.3  # that move alike but for an expansion of this
+STAND_SIGMAS = 2.0  # of both, by which 1/Z of linked standing rebels may differ,
+STAND_SHARE = 0.1  # plus this share: things have depth
 FAR_LIKE_SPEED = 0.3  # difference of those, and their noise, at most, as a share of the faster one's speed
 COAST_SHARE = 0.25  # nearer contacts, in horizons, grow too fast for their corners to be tracked, and coast
 COAST_TIME_SHARE = 0.1  # for this long
@@ -78,7 +81,8 @@ class RebelGroups:
     """The rebel edges of a frame, clustered into groups.
 
     One row per rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s, measured over ``elapsed_s``;
-    ``label``, parent in its cluster; ``group``, its group, -1: too small.
+    ``inverse``, 1/Z of one that stands in the way, else 0, and ``inverse_sigma``, 1/m; ``label``, parent in its
+    cluster; ``group``, its group, -1: too small.
 
     One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, number of incoming edges;
     ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``, ``focus_r2``, means
@@ -93,6 +97,7 @@ class RebelGroups:
         self.count = self.groups = 0
         self.verdict, self.label, self.group = [integers(rebels) for _ in range(3)]
         self.vx, self.vy, self.elapsed_s = [doubles(rebels) for _ in range(3)]
+        self.inverse, self.inverse_sigma = [doubles(rebels) for _ in range(2)]
         self.members = Members(rebels)
         self.mean_vx, self.mean_vy, self.mean_s = [doubles(rebels) for _ in range(3)]
         self.closing_mps, self.focus_rate = [doubles(rebels) for _ in range(2)]
@@ -223,6 +228,11 @@ def take_rebels(
         groups.verdict[k], groups.elapsed_s[k], groups.label[k] = j, elapsed_s, k
         groups.vx[k] = (edges.x[i] - verdicts.x[j]) / elapsed_s
         groups.vy[k] = (edges.y[i] - verdicts.y[j]) / elapsed_s
+        groups.inverse[k] = groups.inverse_sigma[k] = 0.0
+        if verdicts.incoming[j]:
+            lever = rebel_detection.lever_of(verdicts, j, baselines)
+            groups.inverse[k] = verdicts.outward[j] / lever
+            groups.inverse_sigma[k] = rebel_detection.sigma_px(verdicts, j) / lever
 
 
 def noise_between(groups: RebelGroups, a: int, b: int) -> float:
@@ -257,6 +267,17 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     )
 
 
+def stand_together(groups: RebelGroups, a: int, b: int, distance: float, around: Situation) -> bool:
+    """Whether two rebels that stand in the way, ``distance`` px apart, are at one range and near each other there.
+
+    The few corners of something large and plain lie far apart in the image.
+    """
+    nearer, farther = max(groups.inverse[a], groups.inverse[b]), min(groups.inverse[a], groups.inverse[b])
+    if not farther > 0 or distance >= NEAR_LINK_M * around.pinhole.fx * nearer:
+        return False
+    return nearer - farther < STAND_SIGMAS * (groups.inverse_sigma[a] + groups.inverse_sigma[b]) + STAND_SHARE * nearer
+
+
 def lowest_label(groups: RebelGroups, k: int) -> int:
     """The lowest rebel of a rebel's cluster (union-find, with path halving)."""
     while groups.label[k] != k:
@@ -278,7 +299,7 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
         for b in range(a):
             k = verdicts.row[groups.verdict[b]]
             distance = lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
-            if are_linked(groups, a, b, distance, around, settings):
+            if are_linked(groups, a, b, distance, around, settings) or stand_together(groups, a, b, distance, around):
                 join(groups, a, b)
 
 
@@ -461,7 +482,7 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
     A leader stands on the ground: from its foot it reaches up to a share of the camera's height. Where the ground
     itself does not flow, the vehicle is slower than measured, or its own parts are in view, and nothing there leads.
     """
-    if groups.inwards[g] <= 0.5:
+    if 2 * groups.inwards[g] <= members.size[g]:
         return False
     lowest = around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad
     if is_mirrored(groups, g, members) or (around.ground_is_still and members.y[g] > lowest):

@@ -201,6 +201,21 @@ def test_groups_far_apart_in_the_image_are_one_where_what_is_seen_is_near(
     assert scene.groups.groups == groups
 
 
+@pytest.mark.parametrize(
+    ("ranges_m", "makes"),
+    [((1.5, 1.5, 1.5), 1), ((4.0, 4.0, 4.0), 0), ((1.5, 1.1, 0.8), 0)],
+    ids=["near", "farther off", "at different ranges"],
+)
+def test_few_rebels_far_apart_on_something_plain_that_stands_near_are_one(
+    situation: Situation, ranges_m: tuple[float, ...], makes: int
+) -> None:
+    around = situation()  # they are 80 px apart: 0.24 m at 1.5 m
+    x, y = np.array([220.0, 300.0, 380.0], np.float32), np.array([150.0, 160.0, 150.0], np.float32)
+    looming_hz = around.speed_mps / np.array(ranges_m)
+    vx, vy = looming_hz * (x - around.focus_x), looming_hz * (y - around.focus_y)
+    assert int(standing(around, x, y, vx, vy).active.sum()) == makes
+
+
 @pytest.mark.parametrize("number", range(1, 6))
 def test_too_few_rebels_make_no_circle(scene: Scene, number: int) -> None:
     assert bool(scene.update(CROSSING, number=number).trust) == (number >= SETTINGS.rebel_support)
