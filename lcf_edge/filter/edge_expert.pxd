@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert, rebel_circles
-from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns
+from lcf_edge.filter cimport edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert, object_circles, rebel_circles, square_expert
+from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns, ObjectColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
@@ -32,4 +32,4 @@ cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, 
 cpdef int count_unclaimed(CornerColumns corners) noexcept nogil
 cpdef void add(EdgeColumns edges, CircleColumns normal, CornerColumns corners, GroupColumns groups, Situation around, Py_ssize_t room, int key_number, Settings settings) noexcept nogil
 cdef double first_expansion(double x, double y, CircleColumns normal, GroupColumns groups, Situation around, Settings settings) noexcept nogil
-cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, Situation around, Settings settings) noexcept nogil
+cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, ObjectColumns objects, Situation around, Settings settings) noexcept nogil

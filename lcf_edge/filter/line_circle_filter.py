@@ -405,7 +405,7 @@ class LineCircleFilter:
             self._keys.number,
             settings,
         )
-        edge_expert.join_rebels(edges.columns, start, self.rebel.columns, self._around, settings)
+        edge_expert.join_rebels(edges.columns, start, self.rebel.columns, self.objects.columns, self._around, settings)
         return evicted
 
     def _detect(self) -> tuple[int, int]:
