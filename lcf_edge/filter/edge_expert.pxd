@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert, object_circles, rebel_circles, square_expert
-from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns, ObjectColumns
+from lcf_edge.filter cimport edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert
+from lcf_edge.filter.columns cimport CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
@@ -16,7 +16,6 @@ cdef double ROTATION_SIGMAS
 cdef double FIRST_SPEED_SHARE
 cdef int FIXED_PX
 cdef double MAX_FIXED_STEP_S
-cdef double JOIN_GATE_SHARE
 
 cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
 cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
@@ -32,4 +31,3 @@ cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, 
 cpdef int count_unclaimed(CornerColumns corners) noexcept nogil
 cpdef void add(EdgeColumns edges, CircleColumns normal, CornerColumns corners, GroupColumns groups, Situation around, Py_ssize_t room, int key_number, Settings settings) noexcept nogil
 cdef double first_expansion(double x, double y, CircleColumns normal, GroupColumns groups, Situation around, Settings settings) noexcept nogil
-cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, ObjectColumns objects, Situation around, Settings settings) noexcept nogil

@@ -2,18 +2,8 @@
 
 import math
 
-from lcf_edge.filter import (
-    edge_equations,
-    edge_rows,
-    error_matrix,
-    image_plane,
-    lengths,
-    line_expert,
-    object_circles,
-    rebel_circles,
-    square_expert,
-)
-from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, ObjectColumns
+from lcf_edge.filter import edge_equations, edge_rows, error_matrix, image_plane, lengths, line_expert
+from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import Bytes
 from lcf_edge.filter.settings import Settings
@@ -30,7 +20,6 @@ ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
 FIRST_SPEED_SHARE = 0.5  # 1 sigma of V of a new landmark, as a share of it: its depth is not known
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
-JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 
 
 def direct(edges: EdgeColumns, i: int, around: Situation) -> float:
@@ -284,35 +273,3 @@ def first_expansion(
         if math.fabs(ground) > math.fabs(expansion):
             return ground
     return expansion
-
-
-def join_rebels(
-    edges: EdgeColumns,
-    start: int,
-    circles: CircleColumns,
-    objects: ObjectColumns,
-    around: Situation,
-    settings: Settings,
-) -> None:
-    """Start new landmarks inside a rebel circle in α, with the motion of its object, if that is known, else its own.
-
-    ``start``: row of the first of them.
-    """
-    for i in range(start, edges.count):
-        c = rebel_circles.circle_at(circles, edges.x[i], edges.y[i], settings)
-        if c < 0:
-            continue
-        o = circles.square[c]
-        if o >= 0 and object_circles.is_sure(objects, o, settings) and math.isfinite(objects.qq[o]):
-            looming = square_expert.looming_at(objects, o, around.speed_mps)
-            vx = square_expert.velocity_x(objects, o, edges.x[i], looming, around)
-            vy = square_expert.velocity_y(edges.y[i], looming, around)
-        else:
-            vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
-            vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)
-        edges.suspect_keys[i] = 1
-        edges.beta[i] = math.atan2(vy, vx)
-        edges.speed[i] = lengths.of(vx, vy)
-        edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]
-        step = JOIN_GATE_SHARE * edges.speed[i] * around.dt_s
-        edges.bl[i] = max(STRAY_GATE_SHARE * settings.bl0_px, step)

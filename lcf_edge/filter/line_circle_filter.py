@@ -405,7 +405,9 @@ class LineCircleFilter:
             self._keys.number,
             settings,
         )
-        edge_expert.join_rebels(edges.columns, start, self.rebel.columns, self.objects.columns, self._around, settings)
+        object_circles.join_rebels(
+            edges.columns, start, self.rebel.columns, self.objects.columns, self._around, settings
+        )
         return evicted
 
     def _detect(self) -> tuple[int, int]:

@@ -1,13 +1,14 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport image_plane, lengths, square_expert, turmoil
+from lcf_edge.filter cimport edge_expert, image_plane, lengths, rebel_circles, square_expert, turmoil
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
+cdef double JOIN_GATE_SHARE
 cdef double LEFT_SHARE
 cdef int UNKNOWN
 cdef int STANDING
@@ -37,3 +38,4 @@ cdef bint has_left(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexce
 cdef void end_outside(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(o=Py_ssize_t, c=int, is_due=bint)
 cpdef void update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil
+cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, ObjectColumns objects, Situation around, Settings settings) noexcept nogil

@@ -1,9 +1,9 @@
-"""Objects correct their circles, since they know more than each of them, and keep one."""
+"""Objects know more than each of their circles: they correct these, keep one, and tell how new edges in them move."""
 
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import image_plane, lengths, square_expert, turmoil
+from lcf_edge.filter import edge_expert, image_plane, lengths, rebel_circles, square_expert, turmoil
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.image_plane import ImagePlane
@@ -11,6 +11,7 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
+JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 LEFT_SHARE = 0.25  # of an object's width: with no more in the image it has left
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
@@ -140,3 +141,35 @@ def update(
             shared.begin(circles, c, ids)
             circles.square[c] = o
         show(objects, o, circles, c, around, settings)
+
+
+def join_rebels(
+    edges: EdgeColumns,
+    start: int,
+    circles: CircleColumns,
+    objects: ObjectColumns,
+    around: Situation,
+    settings: Settings,
+) -> None:
+    """Start new landmarks inside a rebel circle in α, with the motion of its object, if that is known, else its own.
+
+    ``start``: row of the first of them.
+    """
+    for i in range(start, edges.count):
+        c = rebel_circles.circle_at(circles, edges.x[i], edges.y[i], settings)
+        if c < 0:
+            continue
+        o = circles.square[c]
+        if o >= 0 and is_sure(objects, o, settings) and math.isfinite(objects.qq[o]):
+            looming = square_expert.looming_at(objects, o, around.speed_mps)
+            vx = square_expert.velocity_x(objects, o, edges.x[i], looming, around)
+            vy = square_expert.velocity_y(edges.y[i], looming, around)
+        else:
+            vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
+            vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)
+        edges.suspect_keys[i] = 1
+        edges.beta[i] = math.atan2(vy, vx)
+        edges.speed[i] = lengths.of(vx, vy)
+        edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]
+        step = JOIN_GATE_SHARE * edges.speed[i] * around.dt_s
+        edges.bl[i] = max(edge_expert.STRAY_GATE_SHARE * settings.bl0_px, step)

@@ -8,8 +8,8 @@ from lcf_edge.filter import edge_expert
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, ObjectTable
-from lcf_edge.messages import Cause, ObjectState
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable
+from lcf_edge.messages import Cause
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
 SETTINGS = Settings(Filter(), PINHOLE)
@@ -59,26 +59,3 @@ def test_the_prediction_keeps_its_weight_where_nothing_accelerates(
     weight = TR_MAX - SETTINGS.tr_cr
     off = float(np.hypot(behind_px, aside_px))
     assert left_behind(step_px, behind_px, aside_px) == pytest.approx(off * weight / (weight + 1))
-
-
-@pytest.mark.parametrize(
-    ("trust", "moves_pxps"), [(SETTINGS.tr_s, (-40.0, 24.0)), (SETTINGS.tr_cr, (90.0, 0.0))], ids=["known", "unsure"]
-)
-def test_a_new_edge_in_a_rebel_circle_starts_with_the_motion_of_its_object(
-    trust: float, moves_pxps: tuple[float, float]
-) -> None:
-    """The object goes to the left and looms; while it is not sure, its circle tells."""
-    edges, rebel, objects = EdgeTable(4, 2, 2), CircleTable(2), ObjectTable(2)
-    around = Situation(Config(), PINHOLE)
-    around.dt_s, around.speed_mps = DT_S, 1.0
-    row = edges.append(1).start
-    edges.x[row], edges.y[row] = around.focus_x + 20.0, around.horizon_y + 60.0
-    rebel.active[0], rebel.trust[0], rebel.square[0], rebel.cause[0] = True, TR_MAX, 0, Cause.CROSSING
-    rebel.x[0], rebel.y[0], rebel.radius[0] = edges.x[row], edges.y[row], 20.0
-    rebel.beta[0], rebel.speed[0], rebel.ttc[0] = 0.0, 90.0, np.inf
-    objects.active[0], objects.trust[0], objects.state[0] = True, trust, ObjectState.SEEN
-    objects.looming[0], objects.sideways[0], objects.reference[0] = 0.4, -48.0 / PINHOLE.fx, around.speed_mps
-    edge_expert.join_rebels(edges.columns, row, rebel.columns, objects.columns, around, SETTINGS)
-    velocity = edges.speed[row] * np.array([np.cos(edges.beta[row]), np.sin(edges.beta[row])])
-    assert velocity == pytest.approx(moves_pxps)
-    assert edges.suspect_keys[row] == 1

@@ -212,3 +212,28 @@ def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
                     of_both = getattr(circles, number)[c], getattr(objects, number)[o]
                     assert of_both[0] == pytest.approx(of_both[1], nan_ok=True)
     assert circles_reported > 5
+
+
+# New edges in its circles
+
+
+@pytest.mark.parametrize(
+    ("trust", "moves_pxps"), [(TR_S, (-40.0, 30.0)), (SETTINGS.tr_cr, (90.0, 0.0))], ids=["known", "unsure"]
+)
+def test_a_new_edge_in_a_rebel_circle_starts_with_the_motion_of_its_object(
+    situation: Situation, trust: float, moves_pxps: tuple[float, float]
+) -> None:
+    """The object goes to the left and looms; while it is not sure, its circle tells."""
+    known = Known(situation())
+    known.add_circle(0, 350.0, TR_S, square=0)
+    circles, objects, edges, around = known.circles, known.objects, known.edges, known.around
+    circles.beta[0], circles.speed[0], circles.radius[0], circles.ttc[0] = 0.0, 90.0, 20.0, np.inf
+    circles.cause[0] = Cause.CROSSING
+    objects.trust[0], objects.sideways[0] = trust, -50.0 / around.pinhole.fx
+    row = edges.append(1).start
+    edges.x[row], edges.y[row] = around.focus_x + 20.0, around.horizon_y + 60.0
+    circles.x[0], circles.y[0] = edges.x[row], edges.y[row]
+    object_circles.join_rebels(edges.columns, row, circles.columns, objects.columns, around, SETTINGS)
+    velocity = edges.speed[row] * np.array([np.cos(edges.beta[row]), np.sin(edges.beta[row])])
+    assert velocity == pytest.approx(moves_pxps)
+    assert edges.suspect_keys[row] == 1
