@@ -12,6 +12,7 @@ cdef double SWING_SHARE
 cdef double MIN_ORIGIN_PX
 cdef double MIN_RADIUS_PX
 cdef double STRAY_GATE_SHARE
+cdef double JOIN_GATE_SHARE
 cdef double ROTATION_SIGMAS
 cdef double FIRST_SPEED_SHARE
 cdef int FIXED_PX
@@ -31,3 +32,4 @@ cpdef void delete(EdgeColumns edges, ImagePlane plane, unsigned char[::1] dead, 
 cpdef int count_unclaimed(CornerColumns corners) noexcept nogil
 cpdef void add(EdgeColumns edges, CircleColumns normal, CornerColumns corners, GroupColumns groups, Situation around, Py_ssize_t room, int key_number, Settings settings) noexcept nogil
 cdef double first_expansion(double x, double y, CircleColumns normal, GroupColumns groups, Situation around, Settings settings) noexcept nogil
+cdef void suspect(EdgeColumns edges, Py_ssize_t i, double vx, double vy, Situation around, Settings settings) noexcept nogil

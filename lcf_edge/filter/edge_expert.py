@@ -20,6 +20,7 @@ ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
 FIRST_SPEED_SHARE = 0.5  # 1 sigma of V of a new landmark, as a share of it: its depth is not known
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
+JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 
 
 def direct(edges: EdgeColumns, i: int, around: Situation) -> float:
@@ -273,3 +274,13 @@ def first_expansion(
         if math.fabs(ground) > math.fabs(expansion):
             return ground
     return expansion
+
+
+def suspect(edges: EdgeColumns, i: int, vx: float, vy: float, around: Situation, settings: Settings) -> None:
+    """Start a new landmark in α, with the motion of the rebel circle that it is in, px/s."""
+    edges.suspect_keys[i] = 1
+    edges.beta[i] = math.atan2(vy, vx)
+    edges.speed[i] = lengths.of(vx, vy)
+    edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]
+    step = JOIN_GATE_SHARE * edges.speed[i] * around.dt_s
+    edges.bl[i] = max(STRAY_GATE_SHARE * settings.bl0_px, step)

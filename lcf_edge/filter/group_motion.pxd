@@ -23,7 +23,7 @@ cdef class MotionSums:
     cdef double[::1] elapsed, common
     cdef double[::1] b2v0, b4v0, b1v1, b2v1, b0v2
     cdef readonly double[::1] left, top, right, bottom
-    cdef double[::1] xx, yy, xvx, yvy
+    cdef readonly double[::1] xx, yy, xvx, yvy
     cdef double expansion, spread
 
 cdef void clear(MotionSums sums, Py_ssize_t k) noexcept nogil

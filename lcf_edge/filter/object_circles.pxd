@@ -8,7 +8,6 @@ from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
-cdef double JOIN_GATE_SHARE
 cdef double LEFT_SHARE
 cdef int UNKNOWN
 cdef int STANDING

@@ -11,7 +11,6 @@ from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import Cause, ObjectClass, ObjectState
 
-JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 LEFT_SHARE = 0.25  # of an object's width: with no more in the image it has left
 UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
 LEADING, CUTTING_IN = int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
@@ -167,9 +166,4 @@ def join_rebels(
         else:
             vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
             vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)
-        edges.suspect_keys[i] = 1
-        edges.beta[i] = math.atan2(vy, vx)
-        edges.speed[i] = lengths.of(vx, vy)
-        edges.origin_x[i], edges.origin_y[i] = edges.x[i], edges.y[i]
-        step = JOIN_GATE_SHARE * edges.speed[i] * around.dt_s
-        edges.bl[i] = max(edge_expert.STRAY_GATE_SHARE * settings.bl0_px, step)
+        edge_expert.suspect(edges, i, vx, vy, around, settings)

@@ -48,7 +48,6 @@ cdef double FAR_LINK_SHARE
 cdef double FAR_LINK_RAD
 cdef double NEAR_LINK_M
 cdef double NEAR_LIKE_HZ
-cdef double STAND_SIGMAS
 cdef double STAND_SHARE
 cdef double FAR_LIKE_SPEED
 cdef double COAST_SHARE
@@ -66,7 +65,7 @@ cdef class RebelGroups:
     cdef public Py_ssize_t count, groups
     cdef readonly int[::1] verdict, label
     cdef int[::1] group
-    cdef readonly double[::1] vx, vy, elapsed_s, inverse, inverse_sigma
+    cdef readonly double[::1] vx, vy, elapsed_s, inverse
     cdef readonly Members members
     cdef readonly double[::1] mean_s, closing_mps, focus_rate, focus_r2
     cdef double[::1] mean_vx, mean_vy, below2, below_vy

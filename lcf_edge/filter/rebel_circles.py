@@ -64,8 +64,7 @@ FAR_LINK_SHARE = 0.08  # or in this share, where they move almost the same,
 FAR_LINK_RAD = 0.35  # but no farther
 NEAR_LINK_M = 0.3  # distance over which standing rebels link, and on the ground groups are merged
 NEAR_LIKE_HZ = 0.3  # that move alike but for an expansion of this
-STAND_SIGMAS = 2.0  # of both, by which 1/Z of linked standing rebels may differ,
-STAND_SHARE = 0.1  # plus this share: things have depth
+STAND_SHARE = 0.3  # by which 1/Z of linked standing rebels may differ
 FAR_LIKE_SPEED = 0.3  # difference of those, and their noise, at most, as a share of the faster one's speed
 COAST_SHARE = 0.25  # nearer contacts, in horizons, grow too fast for their corners to be tracked, and coast
 COAST_TIME_SHARE = 0.1  # for this long
@@ -81,8 +80,8 @@ class RebelGroups:
     """The rebel edges of a frame, clustered into groups.
 
     One row per rebel: ``verdict``, its row of ``Verdicts``; ``vx``, ``vy``, px/s, measured over ``elapsed_s``;
-    ``inverse``, 1/Z of one that stands in the way, else 0, and ``inverse_sigma``, 1/m; ``label``, parent in its
-    cluster; ``group``, its group, -1: too small.
+    ``inverse``, 1/Z of one that stands in the way, else 0, 1/m; ``label``, parent in its cluster; ``group``, its group,
+    -1: too small.
 
     One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, number of incoming edges;
     ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``, ``focus_r2``, means
@@ -97,7 +96,7 @@ class RebelGroups:
         self.count = self.groups = 0
         self.verdict, self.label, self.group = [integers(rebels) for _ in range(3)]
         self.vx, self.vy, self.elapsed_s = [doubles(rebels) for _ in range(3)]
-        self.inverse, self.inverse_sigma = [doubles(rebels) for _ in range(2)]
+        self.inverse = doubles(rebels)
         self.members = Members(rebels)
         self.mean_vx, self.mean_vy, self.mean_s = [doubles(rebels) for _ in range(3)]
         self.closing_mps, self.focus_rate = [doubles(rebels) for _ in range(2)]
@@ -228,11 +227,9 @@ def take_rebels(
         groups.verdict[k], groups.elapsed_s[k], groups.label[k] = j, elapsed_s, k
         groups.vx[k] = (edges.x[i] - verdicts.x[j]) / elapsed_s
         groups.vy[k] = (edges.y[i] - verdicts.y[j]) / elapsed_s
-        groups.inverse[k] = groups.inverse_sigma[k] = 0.0
+        groups.inverse[k] = 0.0
         if verdicts.incoming[j]:
-            lever = rebel_detection.lever_of(verdicts, j, baselines)
-            groups.inverse[k] = verdicts.outward[j] / lever
-            groups.inverse_sigma[k] = rebel_detection.sigma_px(verdicts, j) / lever
+            groups.inverse[k] = verdicts.outward[j] / rebel_detection.lever_of(verdicts, j, baselines)
 
 
 def noise_between(groups: RebelGroups, a: int, b: int) -> float:
@@ -275,7 +272,7 @@ def stand_together(groups: RebelGroups, a: int, b: int, distance: float, around:
     nearer, farther = max(groups.inverse[a], groups.inverse[b]), min(groups.inverse[a], groups.inverse[b])
     if not farther > 0 or distance >= NEAR_LINK_M * around.pinhole.fx * nearer:
         return False
-    return nearer - farther < STAND_SIGMAS * (groups.inverse_sigma[a] + groups.inverse_sigma[b]) + STAND_SHARE * nearer
+    return nearer - farther < STAND_SHARE * nearer
 
 
 def lowest_label(groups: RebelGroups, k: int) -> int:

@@ -121,6 +121,7 @@ cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges
 cpdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
 @cython.locals(weight=double)
 cdef bint is_moving(MotionSums parts, Py_ssize_t c, Settings settings) noexcept nogil
+cdef bint expands_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double looming) noexcept nogil
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
 cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil

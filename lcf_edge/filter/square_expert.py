@@ -275,6 +275,14 @@ def is_moving(parts: MotionSums, c: int, settings: Settings) -> bool:
     return speed > LIKE_SIGMAS / math.sqrt(weight) + LIKE_SHARE_OF_LINK * settings.rebel_link_px
 
 
+def expands_alike(objects: ObjectColumns, o: int, parts: MotionSums, c: int, looming: float) -> bool:
+    """Whether a circle expands as an object looms: near O, things at different ranges move much the same."""
+    group_motion.fit_expansion(parts, c)
+    apart = math.fabs(parts.expansion - looming)
+    sigmas = LIKE_SIGMAS * math.sqrt(NOISE_GAIN * NOISE_GAIN / parts.spread + objects.mm[o])
+    return apart < sigmas + LIKE_SHARE * max(math.fabs(parts.expansion), math.fabs(looming))
+
+
 def moves_alike(
     objects: ObjectColumns,
     o: int,
@@ -289,6 +297,8 @@ def moves_alike(
     x, y = parts.x[c] / weight, parts.y[c] / weight
     vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
     looming = looming_at(objects, o, parts.forward[c] / weight)
+    if not expands_alike(objects, o, parts, c, looming):
+        return False
     dx, dy = vx - velocity_x(objects, o, x, looming, around), vy - velocity_y(y, looming, around)
     fx, fy = around.pinhole.fx, around.pinhole.fy
     across, down = (x - around.focus_x) / fx, (y - around.horizon_y) / fy

@@ -138,6 +138,29 @@ def test_across_a_wide_gap_only_motion_shows_that_two_are_one(
     assert bool(square_expert.belongs(objects.columns, 0, circles.columns, 0, parts, around, SETTINGS)) == one
 
 
+@pytest.mark.parametrize(("range_m", "one"), [(2.7, True), (3.2, True), (6.2, False)])
+def test_near_the_focus_the_expansion_shows_what_stands_behind_an_object(
+    situation: Callable[..., Any], range_m: float, one: bool
+) -> None:
+    """There things at different ranges move much the same. The object stands at 2.7 m, the circle is beside it."""
+    objects, circles, parts = ObjectTable(1), CircleTable(1), MotionSums(1)
+    around = situation(speed_mps=2.0)
+    left, y = around.focus_x - 35.0, around.horizon_y
+    objects.x[0], objects.y[0], objects.width[0], objects.height[0] = left, y, 50.0, 250.0
+    objects.looming[0], objects.reference[0], objects.mm[0], objects.qq[0] = 2.0 / 2.7, 2.0, 0.04**2, 0.01**2
+    circles.x[0], circles.y[0], circles.width[0], circles.height[0] = around.focus_x + 40.0, y, 40.0, 130.0
+    weight, looming = 3.0, 2.0 / range_m  # seen for 0.75 s
+    x, below = (part.ravel() for part in np.meshgrid(np.linspace(20, 60, 5), np.linspace(-65, 65, 4)))
+    vx, vy = looming * x, looming * below
+    x, y = x + around.focus_x, below + y
+    parts.count[0], parts.weight[0], parts.forward[0] = len(x), weight * len(x), weight * len(x) * 2.0
+    for name, value in (
+        ("x", x), ("y", y), ("vx", vx), ("vy", vy), ("xx", x * x), ("yy", y * y), ("xvx", x * vx), ("yvy", y * vy)
+    ):  # fmt: skip
+        np.asarray(getattr(parts, name))[0] = weight * value.sum()
+    assert bool(square_expert.belongs(objects.columns, 0, circles.columns, 0, parts, around, SETTINGS)) == one
+
+
 @pytest.mark.parametrize(("speed_mps", "aside_mps", "ahead_m"), [(0.5, 0.3, 5.0), (1.0, 0.3, 6.0), (0.3, 0.25, 5.0)])
 def test_two_who_part_before_the_vehicle_come_no_nearer_than_their_height_shows(
     drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, aside_mps: float, ahead_m: float
