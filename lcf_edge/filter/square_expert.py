@@ -297,8 +297,6 @@ def moves_alike(
     x, y = parts.x[c] / weight, parts.y[c] / weight
     vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
     looming = looming_at(objects, o, parts.forward[c] / weight)
-    if not expands_alike(objects, o, parts, c, looming):
-        return False
     dx, dy = vx - velocity_x(objects, o, x, looming, around), vy - velocity_y(y, looming, around)
     fx, fy = around.pinhole.fx, around.pinhole.fy
     across, down = (x - around.focus_x) / fx, (y - around.horizon_y) / fy
@@ -311,6 +309,7 @@ def moves_alike(
     return (
         math.fabs(dx) < min(LIKE_SIGMAS * math.sqrt(variance_x), largest) + like
         and math.fabs(dy) < min(LIKE_SIGMAS * math.sqrt(variance_y), largest) + like
+        and expands_alike(objects, o, parts, c, looming)
     )
 
 

@@ -31,14 +31,14 @@ Situation = Callable[..., Any]
 # Paint
 
 
-def lies_flat(around: Any, top_px: float, foot_px: float, *, short: bool = True, level: bool = True) -> bool:
-    """A group from ``top_px`` to ``foot_px`` under the horizon."""
+def lies_flat(around: Any, top_px: float, foot_px: float, *, short: int = 8, level: bool = True) -> bool:
+    """A group of 8 edges from ``top_px`` to ``foot_px`` under the horizon; ``short``: that fall short of the flow."""
     groups = RebelGroups(10, 2)
     groups.groups = 1
     members = groups.members
     members.size[0], members.y[0] = 8, around.horizon_y + 0.5 * (top_px + foot_px)
     members.variance_y[0] = ((foot_px - top_px) / EXTENT_SIGMAS) ** 2
-    groups.inwards[0], groups.mean_s[0] = (8 if short else 0), 0.4
+    groups.inwards[0], groups.mean_s[0] = short, 0.4
     if level:  # upright: everywhere the same expansion
         groups.focus_rate[0], groups.focus_r2[0] = 100.0, 1e4
     return bool(rebel_circles.is_flat(groups, 0, members, around))
@@ -52,8 +52,9 @@ def test_what_reaches_up_from_its_foot_is_not(situation: Situation) -> None:
     assert not lies_flat(situation(camera_height_m=0.3), 40.0, 80.0)
 
 
-def test_what_does_not_fall_short_of_the_flow_is_no_paint(situation: Situation) -> None:
-    assert not lies_flat(situation(camera_height_m=0.3), 70.0, 80.0, short=False)
+@pytest.mark.parametrize("short", [0, 1, 4])
+def test_what_does_not_mostly_fall_short_of_the_flow_is_no_paint(situation: Situation, short: int) -> None:
+    assert not lies_flat(situation(camera_height_m=0.3), 70.0, 80.0, short=short)
 
 
 def test_what_is_about_the_horizon_is_not_flat(situation: Situation) -> None:

@@ -216,6 +216,10 @@ def test_where_rebels_show_more_it_is_left_to_them(drive: Drive, clutter: Landma
     assert Cause.NONE not in causes
 
 
+def test_it_is_turmoil_though_one_edge_in_seven_is_found_again(calm: Any) -> None:
+    assert after(Storm(replace(calm, speed_mps=0.0, frames=40), stay=9))[1] > 0
+
+
 @pytest.mark.parametrize(("stay", "goes_on"), [(13, True), (40, False)], ids=["one in five found", "two in three"])
 def test_a_circle_goes_on_while_most_edges_are_still_lost(calm: Any, stay: int, goes_on: bool) -> None:
     """As many as that make no circle, and end none."""
