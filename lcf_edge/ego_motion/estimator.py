@@ -63,6 +63,7 @@ _LAG_SHARE = 0.5  # of the correction by the flow that may belong to earlier int
 _TURN_SHARE = 0.05  # of the rate: error by the gyro's scale and time, and a shaken focus
 _ROLL_SHARE = 0.5  # roll moves the image's edge by this share of what yaw does
 
+_SUPPORTS_S = 1.0  # for which the ground seen last still corrects the speed by the accelerometer
 _DRIVES_S = 0.5  # an object that comes close to a stationary vehicle may cause flow too, but not for this long
 
 
@@ -119,6 +120,7 @@ class EgoMotionEstimator:
         self._odometry = Ring("speed", SPEED_CAPACITY, 2, self.refused)  # speed, yaw rate
         self._inertial = InertialSpeed(imu.gyro_noise_radps)
         self._ground = GroundBelief()
+        self._ground_s = inf  # since the ground last showed the speed
         self._drove_ns: int | None = None  # when the image last showed that it drives,
         self._driven_s = 0.0  # and for how long it has
         self._path_yaw = PathYaw()
@@ -210,6 +212,7 @@ class EgoMotionEstimator:
         if interval.measured and not self.bias.known:
             interval.notes.append("gyro bias unknown")
         self._ground.advance(span.dt_s)
+        self._ground_s += span.dt_s
         if still:
             self._ground.stand()
         self._speed_mps = self._choose_speed(span, odometry_mps, interval.notes)
@@ -325,9 +328,11 @@ class EgoMotionEstimator:
         if isfinite(interval.odometry_mps) or not isfinite(ground.speed_mps) or interval.span.dt_s == 0:
             return
         self._ground.see(ground, interval.span.dt_s)
-        if isfinite(ground.measured_mps):
-            again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
-            self._inertial.see_ground(ground.speed_mps - ground.measured_mps, ground.sigma_mps * sqrt(again))
+        again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
+        self._inertial.see_mean(ground.speed_mps, ground.sigma_mps * sqrt(again), ground.elapsed_s)
+        self._ground_s = 0.0
+        if ground.elapsed_s * 1e9 <= _REST_NS:
+            self._drove_ns = self._stamp_ns
 
     def see_driving(self, drives: bool) -> None:
         """Take whether the flow of the present image shows that the vehicle drives.
@@ -459,13 +464,13 @@ class EgoMotionEstimator:
         source, constant_mps = self._vehicle.speed_source, self._vehicle.speed_mps
         if source in ("auto", "odometry", "zenoh") and isfinite(odometry_mps):
             if self._odometry.age_s(span.end_ns) <= span.dt_s:  # not just held from before
-                self._inertial.correct(odometry_mps)
+                self._inertial.see_odometry(odometry_mps, span.dt_s)
             return odometry_mps
         if source in ("auto", "constant") and constant_mps is not None:
             return constant_mps
         if source in ("auto", "imu") and isfinite(self._inertial.mean_mps):
             if self._inertial.sigma_mps > 0:
-                notes.append("speed drifts")
+                notes.append("speed from ground" if self._ground_s < _SUPPORTS_S else "speed drifts")
             return self._inertial.mean_mps
         if source in ("auto", "imu") and isfinite(self._ground.speed_mps):
             notes.append("speed from ground")

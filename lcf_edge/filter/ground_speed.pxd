@@ -20,10 +20,10 @@ cdef double MIN_SIGMA
 cdef double NAN
 
 cdef class GroundSpeed:
-    cdef public double speed_mps, sigma_mps, measured_mps, elapsed_s
+    cdef public double speed_mps, sigma_mps, elapsed_s
     cdef int[::1] votes
     cdef int count
-    cdef double below, rows, squares, sum, measured, elapsed
+    cdef double below, rows, squares, sum, elapsed
 
 @cython.locals(outward=double)
 cdef double says_mps(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

@@ -32,16 +32,15 @@ NAN = float("nan")
 class GroundSpeed:
     """``speed_mps``: V from the ground, mean over the window, NaN: unknown; ``sigma_mps``: 1 sigma of it.
 
-    ``measured_mps``: V over the same window by IMU, odometry or configuration. ``elapsed_s``: length of the window.
-    ``votes``: (BINS,).
+    ``elapsed_s``: length of the window. ``votes``: (BINS,).
     """
 
     def __init__(self) -> None:
-        self.speed_mps = self.sigma_mps = self.measured_mps = NAN
+        self.speed_mps = self.sigma_mps = NAN
         self.elapsed_s = 0.0
         self.votes = integers(BINS)
         self.count = 0
-        self.below = self.rows = self.squares = self.sum = self.measured = self.elapsed = 0.0
+        self.below = self.rows = self.squares = self.sum = self.elapsed = 0.0
 
 
 def says_mps(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> float:
@@ -79,7 +78,7 @@ def measure(
     ground: GroundSpeed, edges: EdgeColumns, verdicts: Verdicts, baselines: Baselines, around: Situation
 ) -> None:
     """Measure the speed in this frame."""
-    ground.speed_mps = ground.sigma_mps = ground.measured_mps = NAN
+    ground.speed_mps = ground.sigma_mps = NAN
     if not around.camera_height_m > 0:
         return
     ground.count = 0
@@ -95,7 +94,7 @@ def measure(
         return
     middle = math.log(SLOWEST_MPS) + (best + 0.5) * BIN_RATIO
     n = 0
-    ground.below = ground.rows = ground.squares = ground.sum = ground.measured = ground.elapsed = 0.0
+    ground.below = ground.rows = ground.squares = ground.sum = ground.elapsed = 0.0
     for j in range(verdicts.count):
         says = says_mps(verdicts, j, edges, baselines, around)
         if says > SLOWEST_MPS and math.fabs(math.log(says) - middle) < SPREAD:
@@ -106,11 +105,10 @@ def measure(
             ground.below += below
             ground.rows += math.log(below)
             ground.squares += math.log(below) * math.log(below)
-            ground.measured += baselines.depth_m[slot] / baselines.elapsed_s[slot]
             ground.elapsed += baselines.elapsed_s[slot]
     if n < MIN_EDGES or ground.squares / n - (ground.rows / n) * (ground.rows / n) < MIN_ROWS * MIN_ROWS:
         return
     ground.speed_mps = math.exp(ground.sum / n)
     tilt = SLOPE_SIGMA_RAD * around.pinhole.focal / (ground.below / n)
     ground.sigma_mps = ground.speed_mps * math.sqrt(MIN_SIGMA * MIN_SIGMA + tilt * tilt)
-    ground.measured_mps, ground.elapsed_s = ground.measured / n, ground.elapsed / n
+    ground.elapsed_s = ground.elapsed / n

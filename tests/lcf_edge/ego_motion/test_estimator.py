@@ -1,6 +1,6 @@
 """Ego-motion against motions that are known exactly."""
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Iterator
 from math import inf, isnan, nan
 
 import cv2
@@ -14,6 +14,7 @@ from lcf_edge.config import Imu, Vehicle
 from lcf_edge.ego_motion.axis_bias import PRIOR_RADPS
 from lcf_edge.ego_motion.estimator import IMU_CAPACITY, EgoMotion, EgoMotionEstimator
 from lcf_edge.ego_motion.gyro_bias import GyroBias
+from lcf_edge.filter.ground_speed import GroundSpeed
 
 G = 9.81
 LEVEL = (0.0, -G, 0.0)
@@ -237,6 +238,12 @@ class TestUncertainty:
 BIAS = (0.02, -0.03, 0.01)
 
 
+def ground_of(speed_mps: float, window_s: float) -> GroundSpeed:
+    ground = GroundSpeed()
+    ground.speed_mps, ground.sigma_mps, ground.elapsed_s = speed_mps, 0.06 * speed_mps, window_s
+    return ground
+
+
 def about(bias: GyroBias, truth: Iterable[float], sigmas: float = 3.0) -> bool:
     """Whether the truth lies within the sigmas that are stated."""
     return bool((np.abs(bias.mean_radps - np.array(list(truth))) <= sigmas * bias.sigma_radps).all())
@@ -343,6 +350,16 @@ class TestBias:
         else:
             assert np.isnan(motion.speed_mps)
             assert "no speed" in motion.notes
+
+    @pytest.mark.parametrize("window_s", [0.2, 0.8])
+    def test_a_steady_acceleration_is_no_rest_if_the_ground_moved_within_half_a_second(self, window_s: float) -> None:
+        """The IMU is as quiet as at rest. What the ground showed longer ago leaves that open."""
+        ego = calibrated()
+        feed(ego, np.arange(0, 2, 0.01), accel=lambda _: (0.0, LEVEL[1], 1.0))
+        for t in np.arange(0.1, 2, 0.05):
+            ego.advance(ns(t))
+            ego.see_ground(ground_of(0.6, window_s))
+        assert (ego.advance(ns(2.0)).speed_mps == 0) == (window_s > 0.5)
 
     @pytest.mark.parametrize(("flows_s", "is_known"), [(0.4, True), (0.7, False)])
     def test_the_speed_0_of_a_rest_is_discarded_after_half_a_second_of_flow(
@@ -506,13 +523,14 @@ class Drive:
         forward, up = self.acceleration(t), G
         return (0.0, -c * up + s * forward, s * up + c * forward)
 
-    def run(self, ego: EgoMotionEstimator, until_s: float = 8.0) -> list[tuple[float, EgoMotion]]:
-        motions = []
+    def play(self, ego: EgoMotionEstimator, until_s: float = 8.0) -> Iterator[tuple[float, EgoMotion]]:
         for k in range(1, round(until_s / 0.05)):
             t = k * 0.05
             feed(ego, t - 0.05 + np.arange(1, 11) * 0.005, self.gyro, self.accel)
-            motions.append((t, ego.advance(ns(t))))
-        return motions
+            yield t, ego.advance(ns(t))
+
+    def run(self, ego: EgoMotionEstimator, until_s: float = 8.0) -> list[tuple[float, EgoMotion]]:
+        return list(self.play(ego, until_s))
 
 
 class TestSpeedByAccelerometer:
@@ -522,6 +540,16 @@ class TestSpeedByAccelerometer:
             assert motion.speed_mps == pytest.approx(drive.speed(t - 0.025), abs=0.05), t
             if 1.1 < t < 5.9:
                 assert motion.notes == ("speed drifts",)
+
+    def test_its_note_says_whether_the_ground_corrects_it(self) -> None:
+        ego = estimator(speed_source="imu")
+        notes = []
+        for t, motion in Drive().play(ego, 4.0):
+            notes.append((t, motion.notes))
+            if t < 2.0:
+                ego.see_ground(ground_of(motion.speed_mps, 0.2))
+        assert all(note == ("speed from ground",) for t, note in notes if 1.2 < t < 2.9)
+        assert all(note == ("speed drifts",) for t, note in notes if t > 3.1)
 
     def test_is_zero_again_after_the_stop(self) -> None:
         motions = Drive().run(estimator(speed_source="imu"))
