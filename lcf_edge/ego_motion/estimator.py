@@ -469,8 +469,10 @@ class EgoMotionEstimator:
         if source in ("auto", "constant") and constant_mps is not None:
             return constant_mps
         if source in ("auto", "imu") and isfinite(self._inertial.mean_mps):
-            if self._inertial.sigma_mps > 0:
-                notes.append("speed from ground" if self._ground_s < _SUPPORTS_S else "speed drifts")
+            if self._inertial.sigma_mps > 0 and self._ground_s > _SUPPORTS_S:
+                notes.append("speed drifts")
+            elif self._inertial.sigma_mps > 0:
+                notes.append("speed from ground")
             return self._inertial.mean_mps
         if source in ("auto", "imu") and isfinite(self._ground.speed_mps):
             notes.append("speed from ground")
