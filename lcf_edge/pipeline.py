@@ -171,7 +171,9 @@ class Pipeline:
         ego = self._see_rotation(look, self._motion.advance(frame.stamp_ns, look.still))
         before = time.perf_counter_ns()
         self._dirt.look(look.small, ego.rotation, look.still)
-        step = self.filter.step(corners, ego.to_motion(), frame.image, look.small)
+        if self._dirt.is_seen:
+            corners = corners.of(self._dirt.shows_world(corners.pixel))
+        step = self.filter.step(corners, ego.to_motion(), frame.image, look.small, self._dirt.hidden)
         self._lost = step.residual is None
         self._motion.see_ground(self.filter.ground)
         self._motion.see_driving(self.filter.drives)

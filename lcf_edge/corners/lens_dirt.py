@@ -26,15 +26,21 @@ MAX_SHARE = 0.2  # of the textured pixels; if more are still, the camera has not
 MIN_SIDE, MIN_AREA = 4, 20  # of a region, small px
 MAX_ASPECT = 3.0
 MIN_FILLED = 0.35  # of its bounding box
+MARGIN = 2  # small px around a region, where its rim blends into the world
 SURE, MOST = 2, 4  # times found, more often than not found
 
 
 class LensDirt:
-    """``is_seen``: whether there is some. ``visible``: uint8 (height, width) of the input image, 0 on own parts."""
+    """``is_seen``: whether there is some. ``hidden``: where, uint8 of the downscaled image, 0: the world is seen there.
+
+    ``visible``: uint8 (height, width) of the input image, 0 on own parts.
+    """
 
     def __init__(self, lens: Lens, visible: Grey | None) -> None:
         size = SmallImage(lens.width, lens.height)
         self.is_seen = False
+        self.hidden: Grey = np.zeros((size.height, size.width), np.uint8)
+        self._side = size.side
         self._focal = math.sqrt(lens.fx * lens.fy) / size.side
         self._sums = np.zeros((3, size.height, size.width), np.float32)  # of gradients across and down, of squares
         self._images = 0.0
@@ -55,8 +61,20 @@ class LensDirt:
         self._turned = np.eye(3)
         self._add(small)
         if self._images >= MIN_IMAGES:
-            self._times = min(self._times + 1, MOST) if self._is_found() else max(self._times - 1, 0)
+            found = self._find()
+            self._times = min(self._times + 1, MOST) if found.any() else max(self._times - 1, 0)
             self.is_seen = self._times >= (1 if self.is_seen else SURE)
+            if not self.is_seen:
+                self.hidden[:] = 0
+            elif found.any():
+                self.hidden[:] = found
+
+    def shows_world(self, pixel: npt.NDArray[np.int32]) -> npt.NDArray[np.bool_]:
+        """Return whether corners, (n, 2) px of the input image, are beside the dirt."""
+        height, width = self.hidden.shape
+        across, down = (np.minimum(pixel // self._side, (width - 1, height - 1))).T
+        beside: npt.NDArray[np.bool_] = self.hidden[down, across] == 0
+        return beside
 
     def _add(self, small: Grey) -> None:
         kept = 1 - 1 / MEMORY
@@ -68,19 +86,21 @@ class LensDirt:
         down[1:-1, 1:-1] += dy
         squares[1:-1, 1:-1] += dx * dx + dy * dy
 
-    def _is_found(self) -> bool:
+    def _find(self) -> Grey:
+        """Return where there is dirt now, as ``hidden``."""
         across, down, squares = self._sums
         textured = squares > TEXTURED * TEXTURED * self._images
         textured &= self._world
         still = across * across + down * down > STILL * STILL * self._images * squares
         still &= textured
+        dirt = np.zeros(still.shape, np.uint8)
         if np.count_nonzero(still) > MAX_SHARE * np.count_nonzero(textured):
-            return False
-        *_, stats, _ = cv2.connectedComponentsWithStats(still.view(np.uint8))
+            return dirt
+        _, regions, stats, _ = cv2.connectedComponentsWithStats(still.view(np.uint8))
         height, width = still.shape
-        for left, top, wide, high, area in stats[1:].tolist():  # the first is all that is not still
+        for number, (left, top, wide, high, area) in enumerate(stats.tolist()):
             inside = left > 1 and top > 1 and left + wide < width - 1 and top + high < height - 1
             compact = max(wide, high) <= MAX_ASPECT * min(wide, high) and area >= MIN_FILLED * wide * high
-            if inside and compact and min(wide, high) >= MIN_SIDE and area >= MIN_AREA:
-                return True
-        return False
+            if number > 0 and inside and compact and min(wide, high) >= MIN_SIDE and area >= MIN_AREA:
+                dirt[regions == number] = 1  # region 0 is all that is not still
+        return np.asarray(cv2.dilate(dirt, np.ones((2 * MARGIN + 1, 2 * MARGIN + 1), np.uint8)), np.uint8)

@@ -21,6 +21,7 @@ cdef double ROTATION_SIGMAS
 cdef double TURN_SIGMAS
 cdef double MAX_OFF_FLOW
 cdef double PLAIN_GREY
+cdef int NO_WORLD
 cdef double CALM_GREY
 cdef double BESIDE_PX
 cdef double LIKENESS
@@ -42,7 +43,7 @@ cdef int WORST
 
 cdef class CoarseMotion:
     cdef readonly int width, height, side, columns, rows
-    cdef unsigned char[::1] now, kept, pieces, pieces_last, then
+    cdef unsigned char[::1] now, kept, hidden, pieces, pieces_last, then
     cdef unsigned long long[::1] words, words_last, words_then
     cdef double[:, :, ::1] turned
     cdef Homography back
@@ -61,6 +62,8 @@ cpdef void take(CoarseMotion coarse, const unsigned char[::1] small) noexcept no
 @cython.locals(x=int, y=int, word=cython.ulonglong, grey=cython.ulonglong)
 cdef void lay_out(CoarseMotion coarse, const unsigned char[::1] picture, int first, unsigned long long[::1] words) noexcept nogil
 @cython.locals(i=int, j=int)
+@cython.locals(k=int)
+cpdef void hide(CoarseMotion coarse, const unsigned char[::1] hidden) noexcept nogil
 cpdef void turn(CoarseMotion coarse, const double[:, :, ::1] rotation) noexcept nogil
 @cython.locals(k=cython.Py_ssize_t, first=cython.Py_ssize_t, pixels=cython.Py_ssize_t)
 cpdef void keep(CoarseMotion coarse, int slot) noexcept nogil

@@ -32,6 +32,7 @@ ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
 TURN_SIGMAS = 2.0  # or the lens, in a turn
 MAX_OFF_FLOW = 3.0  # with more tolerance nothing is measured
 PLAIN_GREY = 2.0  # least texture of a piece: mean grey difference of neighbouring px, both directions together
+NO_WORLD = 100_000  # grey levels, more than the texture of a piece
 CALM_GREY = 3.0  # tolerated matching error: noise for each pixel,
 BESIDE_PX = 0.6  # and the effect of a sub-pixel offset of this many small px
 LIKENESS = 0.5  # largest error where it moves, as a share of the least where it is stationary
@@ -52,8 +53,8 @@ WORST = 256 * 64
 class CoarseMotion:
     """The downscaled image, ``width`` by ``height``; each of its px is ``side`` px of the input frame.
 
-    Pixels, row-major: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far. ``turned``:
-    (1, 3, 3), the rotation since the last image.
+    Pixels, row-major: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far; ``hidden``, 0
+    where the world is seen. ``turned``: (1, 3, 3), the rotation since the last image.
 
     Pixels repacked so that those of a piece are contiguous: for each column the ``WINDOW`` px to the right of it, row
     by row. ``pieces``, ``pieces_last``, of this image and the last one; ``words``, ``words_last``, ``words_then``: the
@@ -79,7 +80,7 @@ class CoarseMotion:
         self.columns = max((self.width - WINDOW) // STEP + 1, 0)
         self.rows = max((self.height - WINDOW) // STEP + 1, 0)
         pieces, pixels = self.columns * self.rows, self.width * self.height
-        self.now, self.kept = octets(pixels), octets(KEYS * pixels)
+        self.now, self.kept, self.hidden = octets(pixels), octets(KEYS * pixels), octets(pixels)
         laid_out = max(self.width - WINDOW + 1, 0) * self.height
         words = np.zeros((3, laid_out), np.uint64)
         self.words, self.words_last, self.words_then = [memory_of(each) for each in words]
@@ -117,6 +118,12 @@ def take(coarse: CoarseMotion, small: Bytes) -> None:
         for j in range(3):
             coarse.turned[0, i, j] = 1.0 if i == j else 0.0
     coarse.pictures = min(coarse.pictures + 1, 2)
+
+
+def hide(coarse: CoarseMotion, hidden: Bytes) -> None:
+    """Set where no world is seen: 1, else 0; row-major."""
+    for k in range(coarse.width * coarse.height):
+        coarse.hidden[k] = hidden[k]
 
 
 def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> None:
@@ -192,7 +199,10 @@ def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
 
 
 def roughen(coarse: CoarseMotion) -> None:
-    """Measure the texture of each piece: the sum of absolute differences of neighbouring pixels."""
+    """Measure the texture of each piece: the sum of absolute differences of neighbouring pixels.
+
+    It is negative where a part of the piece is hidden.
+    """
     across = coarse.columns + 1
     for b in range(across * (coarse.rows + 1)):
         total = 0
@@ -203,6 +213,7 @@ def roughen(coarse: CoarseMotion) -> None:
                 total += abs(coarse.now[here + k] - coarse.now[here + k + 1])
             for k in range(STEP):
                 total += abs(coarse.now[here + k] - coarse.now[below + k])
+                total -= NO_WORLD * coarse.hidden[here + k]
         coarse.block[b] = total
     for k in range(coarse.columns * coarse.rows):
         b = k // coarse.columns * across + k % coarse.columns

@@ -26,6 +26,10 @@ class Corners:
     def __len__(self) -> int:
         return len(self.pixel)
 
+    def of(self, chosen: npt.NDArray[np.bool_]) -> "Corners":
+        """Return the corners for which ``chosen``, (n,), is true."""
+        return Corners(self.pixel[chosen], self.position[chosen], self.appearance[chosen])
+
 
 NO_CORNERS = Corners(
     np.empty((0, 2), np.int32), np.empty((0, 2), np.float32), np.empty((0, APPEARANCE_SAMPLES), np.uint8)

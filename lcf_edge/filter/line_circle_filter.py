@@ -179,7 +179,7 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
-            "coarse motion": (KEYS + 25) * self._coarse.width * self._coarse.height,  # its images, three repacked
+            "coarse motion": (KEYS + 26) * self._coarse.width * self._coarse.height,  # its images, three repacked
         }
 
     @property
@@ -210,14 +210,24 @@ class LineCircleFilter:
         """Whether the image says that the vehicle drives, whatever speed is measured."""
         return bool(self._driving.drives)
 
-    def step(self, corners: Corners, motion: Motion, image: Grey | None = None, small: Grey | None = None) -> Step:
+    def step(
+        self,
+        corners: Corners,
+        motion: Motion,
+        image: Grey | None = None,
+        small: Grey | None = None,
+        hidden: Grey | None = None,
+    ) -> Step:
         """Process one frame. ``motion.dt_s`` must be positive.
 
         ``image``: uint8 (height, width), from which the corners come; without it no patches are tracked.
         ``small``: the same, downscaled by ``small_image``; without it no coarse motion is measured.
+        ``hidden``: uint8 like ``small``, 1 where no world is seen, 0 elsewhere; without it, as in the last frame.
         """
         motion = self._rested(motion)
         self._take(corners)
+        if hidden is not None:
+            coarse_motion.hide(self._coarse, memory_of(hidden.reshape(-1)))
         if small is not None:
             coarse_motion.take(self._coarse, memory_of(small.reshape(-1)))
         self._derotate(motion)

@@ -50,6 +50,22 @@ def test_a_drop_is_seen_and_no_longer_when_it_is_wiped_away() -> None:
     assert not any(seen[70:])
 
 
+def test_it_is_known_where_the_drop_hides_the_world_until_it_is_wiped_away() -> None:
+    dirt = LensDirt(LENS, None)
+    images = list(world(images=80))
+    for image in behind_a_drop(images[:40]):
+        dirt.look(image, LEFT, still=False)
+    beside = dirt.hidden.copy()
+    beside[HERE[0].start - 3 : HERE[0].stop + 3, HERE[1].start - 3 : HERE[1].stop + 3] = 0
+    assert dirt.hidden[HERE].all()
+    assert not beside.any()
+    in_the_drop, elsewhere, corner = (360, 240), (100, 240), (639, 479)
+    assert dirt.shows_world(np.array([in_the_drop, elsewhere, corner], np.int32)).tolist() == [False, True, True]
+    for image in images[40:]:
+        dirt.look(image, LEFT, still=False)
+    assert not dirt.hidden.any()
+
+
 @pytest.mark.parametrize("seed", range(10))
 def test_a_clean_lens_is_clean(seed: int) -> None:
     assert not any(watched(world(seed)))

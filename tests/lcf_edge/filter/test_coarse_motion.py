@@ -122,6 +122,15 @@ def test_at_a_speed_that_is_not_known_what_moves_past_o_crosses_all_the_same() -
     assert rebels(Passing(speed_mps=math.nan))[-1] == 1
 
 
+@pytest.mark.parametrize("hidden", [False, True])
+def test_where_no_world_is_seen_nothing_moves(hidden: bool) -> None:
+    tables = LineCircleFilter(CONFIG, LENS)
+    for motion, image in Passing():
+        small = SMALL.of(image)
+        tables.step(NO_CORNERS, motion, image, small, np.full_like(small, hidden))
+    assert bool(tables.rebel.active.any()) != hidden
+
+
 def test_it_becomes_an_object() -> None:
     objects = [bool((tables.objects.active & (tables.objects.trust >= 3)).any()) for _, tables in driven(Passing())]
     assert objects[-1]
