@@ -26,13 +26,14 @@ cdef double MAX_GROWTH
 cdef double MAX_EXCESS
 cdef double MIN_SHOWN_PX
 cdef double LEADER_HEIGHT_SHARE
+cdef double MIRROR_NOISE_PX
 cdef double MIRROR_SIGMAS
 cdef double SURE_REBELS
 cdef double MOVER_SHARE
 cdef double LIKELY_OWN_S
 cdef double SEEN_TO_MOVE_PX
 cdef double OWN_SHARE
-cdef double NOISE_GAIN
+cdef double SPREAD_NOISE_PX
 cdef int STRAY_ROUNDS
 cdef double STRAY_SIGMAS
 cdef double STRAY_SHARE
@@ -66,7 +67,7 @@ cdef class RebelGroups:
     cdef int[::1] group
     cdef readonly double[::1] vx, vy, elapsed_s, inverse
     cdef readonly Members members
-    cdef readonly double[::1] mean_s, noise, closing_mps, focus_rate, focus_r2
+    cdef readonly double[::1] mean_s, closing_mps, focus_rate, focus_r2
     cdef double[::1] mean_vx, mean_vy, below2, below_vy
     cdef readonly double[::1] then_x, then_y, spread
     cdef double[::1] rate_below, r2_below2, spreading

@@ -41,13 +41,14 @@ MAX_GROWTH = 1.5  # of a circle in one frame
 MAX_EXCESS = 2.0  # size of a circle, at most, in extents of the edges that show it,
 MIN_SHOWN_PX = 12.0  # which count as at least this
 LEADER_HEIGHT_SHARE = 0.3  # least height of a leader, as a share of the camera's; paint and reflections have less
-MIRROR_SIGMAS = 1.8  # of its edges' motion, by which a level plane must fit a group better than something upright
+MIRROR_NOISE_PX = 0.6  # 1 sigma of an edge's motion
+MIRROR_SIGMAS = 3.0  # of it, by which a level plane must fit a group better than something upright
 SURE_REBELS = 5.0  # smaller groups must be seen once more before their circle is published
 MOVER_SHARE = 0.25  # of the edges in a moving circle that must be rebels: in repetitive texture, edges swap places
 LIKELY_OWN_S = 0.9  # an edge that has not moved in the image for this long may be an own part,
 SEEN_TO_MOVE_PX = 3.0  # if the ground there would have moved by this; otherwise it may just be far off
 OWN_SHARE = 0.1  # of a group's rebels: with more likely own parts among them, the group is one too
-NOISE_GAIN = 1.4  # parts of a thing wander more than the noise of their places suggests
+SPREAD_NOISE_PX = 0.85  # 1 sigma of an edge's motion, with the noise of two positions
 STRAY_ROUNDS = 2
 STRAY_SIGMAS = 2.0  # of its noise, and of
 STRAY_SHARE = 0.25  # this share of the expansion: width beyond which an edge is an outlier
@@ -82,12 +83,12 @@ class RebelGroups:
     ``inverse``, 1/Z of one that stands in the way, else 0, 1/m; ``label``, parent in its cluster; ``group``, its group,
     -1: too small.
 
-    One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``, ``noise``; ``standing``, number of
-    incoming edges; ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``,
-    ``focus_r2``, means of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h and r²·h², h px below the
-    horizon; ``below2``, ``below_vy``, means of h² and h·v_y; ``then_x``, ``then_y``, mean of the earlier positions;
-    ``spread``, ``spreading``, sums about that of squared distance, and of distance times velocity; ``expansion``, V_e/r
-    about O, from the sums ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, makes no circle;
+    One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, number of incoming edges;
+    ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``, ``focus_r2``, means
+    of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h and r²·h², h px below the horizon; ``below2``,
+    ``below_vy``, means of h² and h·v_y; ``then_x``, ``then_y``, mean of the earlier positions; ``spread``,
+    ``spreading``, sums about that of squared distance, and of distance times velocity; ``expansion``, V_e/r about O,
+    from the sums ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, makes no circle;
     ``circle``, row of C_r, -1: none; ``votes`` for each circle.
     """
 
@@ -97,7 +98,7 @@ class RebelGroups:
         self.vx, self.vy, self.elapsed_s = [doubles(rebels) for _ in range(3)]
         self.inverse = doubles(rebels)
         self.members = Members(rebels)
-        self.mean_vx, self.mean_vy, self.mean_s, self.noise = [doubles(rebels) for _ in range(4)]
+        self.mean_vx, self.mean_vy, self.mean_s = [doubles(rebels) for _ in range(3)]
         self.closing_mps, self.focus_rate = [doubles(rebels) for _ in range(2)]
         self.focus_r2, self.below2, self.below_vy = [doubles(rebels) for _ in range(3)]
         self.rate_below, self.r2_below2 = [doubles(rebels) for _ in range(2)]
@@ -357,7 +358,7 @@ def number_groups(groups: RebelGroups, support: int) -> None:
 def clear_group(groups: RebelGroups, g: int) -> None:
     """Reset a group."""
     shared.clear(groups.members, g)
-    groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = groups.noise[g] = 0.0
+    groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
     groups.rate_below[g] = groups.r2_below2[g] = 0.0
     groups.then_x[g] = groups.then_y[g] = groups.spread[g] = groups.spreading[g] = 0.0
@@ -396,7 +397,6 @@ def average(
         groups.mean_vx[g] += share * groups.vx[k]
         groups.mean_vy[g] += share * groups.vy[k]
         groups.mean_s[g] += share * groups.elapsed_s[k]
-        groups.noise[g] += share * verdicts.noise[j]
         groups.closing_mps[g] += share * baselines.depth_m[slot] / groups.elapsed_s[k]
         groups.focus_rate[g] += share * verdicts.expansion[j] * r2
         groups.focus_r2[g] += share * r2
@@ -438,8 +438,7 @@ def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
             if g < 0:
                 continue
             r2 = verdicts.r[j] * verdicts.r[j]
-            noise = NOISE_GAIN * verdicts.noise[j] / groups.elapsed_s[k] / verdicts.r[j]
-            noise += STRAY_SHARE * math.fabs(groups.expansion[g])
+            noise = SPREAD_NOISE_PX / groups.elapsed_s[k] / verdicts.r[j] + STRAY_SHARE * math.fabs(groups.expansion[g])
             off = (verdicts.expansion[j] - groups.expansion[g]) / (STRAY_SIGMAS * noise)
             weight = r2 / ((1 + off * off) * (1 + off * off))
             groups.weight[g] += weight
@@ -456,7 +455,7 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
     """
     if 2 * groups.standing[g] < members.size[g]:
         return False
-    sigma = NOISE_GAIN * groups.noise[g] / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
+    sigma = SPREAD_NOISE_PX / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
     spreads = groups.spreading[g] / max(groups.spread[g], MIN_EXTENT2_PX)
     return spreads + SPREAD_SIGMAS * sigma < SPREAD_SHARE * groups.expansion[g]
 
@@ -469,7 +468,7 @@ def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
     """
     level = groups.focus_rate[g] * groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
     slope = groups.rate_below[g] * groups.rate_below[g] / max(groups.r2_below2[g], MIN_EXTENT2_PX)
-    noise = groups.noise[g] / groups.mean_s[g]
+    noise = MIRROR_NOISE_PX / groups.mean_s[g]
     better = (slope - level) * members.size[g]
     return groups.rate_below[g] > 0 and better > MIRROR_SIGMAS * MIRROR_SIGMAS * noise * noise
 
