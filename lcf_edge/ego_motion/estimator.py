@@ -331,8 +331,6 @@ class EgoMotionEstimator:
         again = max(ground.elapsed_s / interval.span.dt_s, 1.0)
         self._inertial.see_mean(ground.speed_mps, ground.sigma_mps * sqrt(again), ground.elapsed_s)
         self._ground_s = 0.0
-        if ground.elapsed_s * 1e9 <= _REST_NS:
-            self._drove_ns = self._stamp_ns
 
     def see_driving(self, drives: bool) -> None:
         """Take whether the flow of the present image shows that the vehicle drives.

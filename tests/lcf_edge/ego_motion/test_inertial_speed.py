@@ -94,3 +94,13 @@ def test_up_is_not_found_in_a_force_that_is_not_gravity() -> None:
         speed.advance(FRAME_S, (0.0, 0.0, 0.0), STEADY, 0.0)
         speed.see_mean(1.0, 0.1, FRAME_S)
     assert np.isnan(speed.mean_mps)
+
+
+def test_a_rest_that_is_interrupted_is_no_motion_by_an_up_of_before() -> None:
+    """Up was found while speeding up, and nothing has shown the speed."""
+    speed = InertialSpeed(0.005)
+    for _ in range(8):
+        speed.advance(FRAME_S, forwards(2.0), STEADY, 0.0)
+    speed.rest(UP, FRAME_S, UP, STEADY)
+    speed.advance(FRAME_S, UP, STEADY, 0.0)
+    assert speed.mean_mps == pytest.approx(0, abs=1e-9)
