@@ -8,6 +8,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.ego_motion.speed_and_rate import SpeedAndRate
+
 Floats = npt.NDArray[np.float64]
 
 GRAVITY_MPS2 = 9.81
@@ -49,22 +51,25 @@ class InertialSpeed:
 
     def __init__(self, gyro_noise_radps: float) -> None:
         self.mean_mps = nan  # over the last interval
-        self.sigma_mps = inf
-        self._speed_mps = self._error_mps2 = 0.0
-        self._covariance = self._error_var = 0.0  # of the speed's and the accelerometer's error; of the latter
+        self._state = SpeedAndRate()  # rate: what the accelerometer does not measure, its error with the sign reversed
         self._up: tuple[float, float, float] | None = None  # unit vector in camera axes
         self._gravity_mps2 = GRAVITY_MPS2  # as this accelerometer measures it
         self._noise_radps = gyro_noise_radps
         self._late: deque[_Moment] = deque()
         self._gains: deque[tuple[float, float]] = deque()  # of the last frames: time, s, and measured gain of speed
 
+    @property
+    def sigma_mps(self) -> float:
+        """1 sigma of the speed, infinite: unknown."""
+        return self._state.sigma_mps
+
     def may_stand(self) -> bool:
         """Whether the vehicle may be stationary, within the uncertainty; true while the speed is unknown."""
-        return not self.sigma_mps <= _SIGMA_LIMIT_MPS or abs(self._speed_mps) <= 2 * self.sigma_mps
+        return not self.sigma_mps <= _SIGMA_LIMIT_MPS or abs(self._state.speed_mps) <= 2 * self.sigma_mps
 
     def is_zero(self) -> bool:
         """Whether the speed is known to be about 0."""
-        return abs(self._speed_mps) + 2 * self.sigma_mps <= _ZERO_MPS
+        return abs(self._state.speed_mps) + 2 * self.sigma_mps <= _ZERO_MPS
 
     def rest(self, mean_mps2: Sequence[float], dt_s: float, accel_mps2: Sequence[float], rotation: Floats) -> None:
         """Zero-velocity update, with the mean specific force (3,) of the rest, and what ``advance`` takes."""
@@ -75,13 +80,14 @@ class InertialSpeed:
             late.popleft()
         self._gravity_mps2 = hypot(*mean_mps2)
         self._turn(*mean_mps2)
-        self._speed_mps = self.mean_mps = self.sigma_mps = self._error_mps2 = self._covariance = 0.0
-        self._error_var = _SIGMA_REST_MPS2**2
+        self.mean_mps = 0.0
+        self._state.begin(0.0, 0.0, _SIGMA_REST_MPS2)
         self._remember(dt_s, 0.0)
 
     def lose(self) -> None:
         """Make the speed unknown: nothing was measured."""
-        self.mean_mps, self.sigma_mps, self._up = nan, inf, None
+        self.mean_mps, self._up = nan, None
+        self._state.lose()
         self._late.clear()
         self._gains.clear()
 
@@ -106,9 +112,9 @@ class InertialSpeed:
         along_up = x * ax + y * ay + z * az
         measured_mps = (az - z * along_up) / sqrt(max(1 - z * z, 0.01)) * dt_s
         self._remember(dt_s, measured_mps)
-        gained_mps = measured_mps - self._error_mps2 * dt_s
-        self.mean_mps = self._speed_mps + gained_mps / 2 if self.sigma_mps < inf else nan
-        self._speed_mps += gained_mps
+        gained_mps = measured_mps + self._state.rate_mps2 * dt_s
+        self.mean_mps = self._state.speed_mps + gained_mps / 2 if self.sigma_mps < inf else nan
+        self._state.speed_mps += gained_mps
         self._doubt(dt_s, gap_s)
         if abs(hypot(*accel_mps2) - self._gravity_mps2) < _LEVEL_GRAVITY_ERROR_MPS2:
             share, gravity_mps2 = min(1.0, dt_s / _LEVEL_TIME_S), self._gravity_mps2
@@ -136,25 +142,7 @@ class InertialSpeed:
         if self._up is None or seen_s <= window_s / 2:
             return
         since_mps = sum_m / seen_s * (window_s / seen_s)  # by how much it is faster now, by the accelerometer
-        self._correct(speed_mps + since_mps, sigma_mps, window_s / 2)
-
-    def _correct(self, now_mps: float, sigma_mps: float, ago_s: float) -> None:
-        """Kalman update by a speed of ``ago_s`` ago, to which was added what the accelerometer measured since."""
-        if not self.sigma_mps < inf:
-            self._speed_mps = now_mps - ago_s * self._error_mps2
-            self.sigma_mps = hypot(sigma_mps, ago_s * sqrt(self._error_var))
-            self._covariance = -ago_s * self._error_var
-            return
-        shared_speed = self.sigma_mps**2 + ago_s * self._covariance
-        shared_error = self._covariance + ago_s * self._error_var
-        total = shared_speed + ago_s * shared_error + sigma_mps**2
-        news_mps = now_mps - (self._speed_mps + ago_s * self._error_mps2)
-        variance = self.sigma_mps**2 - shared_speed**2 / total
-        self._speed_mps += shared_speed / total * news_mps
-        self._error_mps2 += shared_error / total * news_mps
-        self._covariance -= shared_speed * shared_error / total
-        self._error_var -= shared_error**2 / total
-        self.sigma_mps = sqrt(max(variance, 0.0))
+        self._state.see(speed_mps + since_mps, sigma_mps, window_s / 2)
 
     def _begin(self, moment: _Moment) -> None:
         """Find up from the mean force of the first moments; the speed is not known by that."""
@@ -168,7 +156,7 @@ class InertialSpeed:
             return
         self._gravity_mps2 = GRAVITY_MPS2
         self._turn(*mean_mps2)
-        self._error_mps2, self._error_var = 0.0, _SIGMA_BEGIN_MPS2**2
+        self._state.begin(0.0, inf, _SIGMA_BEGIN_MPS2)
         self._late = deque()
         for each in late:
             self.advance(each.dt_s, each.accel_mps2, each.rotation, 0.0)
@@ -181,13 +169,13 @@ class InertialSpeed:
 
     def _doubt(self, dt_s: float, gap_s: float) -> None:
         """Let the uncertainty of a frame accrue."""
-        tilted_mps2 = self._noise_radps * self._gravity_mps2
-        variance = self.sigma_mps**2 - 2 * dt_s * self._covariance + dt_s**2 * self._error_var
-        self._covariance -= dt_s * self._error_var
-        self._error_var += tilted_mps2**2 * _TILT_TIME_S * dt_s
-        self.sigma_mps = sqrt(max(variance, 0.0) + (_SIGMA_GAP_MPS2 * gap_s) ** 2)
-        if self.sigma_mps > _SIGMA_LIMIT_MPS or abs(self._speed_mps) > MAX_SPEED_MPS:
-            self.mean_mps, self.sigma_mps, self._covariance = nan, inf, 0.0
+        state, tilted_mps2 = self._state, self._noise_radps * self._gravity_mps2
+        state.advance(dt_s)
+        state.rate_var += tilted_mps2**2 * _TILT_TIME_S * dt_s
+        state.sigma_mps = hypot(state.sigma_mps, _SIGMA_GAP_MPS2 * gap_s)
+        if state.sigma_mps > _SIGMA_LIMIT_MPS or abs(state.speed_mps) > MAX_SPEED_MPS:
+            self.mean_mps = nan
+            state.lose()
 
     def _turn(self, x: float, y: float, z: float) -> None:
         """Set the direction of up."""
