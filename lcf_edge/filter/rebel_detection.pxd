@@ -15,6 +15,7 @@ cdef double LINK_RATIO
 cdef double GROUND_DIPS
 cdef double COMMON_NOISE_PX
 cdef double ALIKE_SIGMAS
+cdef double OWN_SIGMAS
 cdef double NEAR_PATH
 cdef double NEAR_SIGMAS
 cdef int MAX_CANDIDATES
@@ -23,6 +24,7 @@ cdef double RANGE_SIGMAS
 cdef double GROUND_SIGMAS
 cdef double SLOWER_HORIZONS
 cdef double MIN_INVERSE_RANGE
+cdef double MIN_LEVER2
 cdef double MIN_OUTWARD_PX
 cdef double MIN_R_PX
 cdef double LINK_NOISE_SIGMAS
@@ -34,10 +36,10 @@ cdef class Verdicts:
     cdef readonly int[::1] row, slot, near
     cdef int[::1] oldest
     cdef readonly double[::1] x, y, r, drift, short, over, outward, expansion, sigma, astray, noise, inverse, inverse_sigma
-    cdef double[::1] near_x, near_y, weight
+    cdef double[::1] near_x, near_y, lever_x, lever_y, weight, common, level
     cdef readonly unsigned char[::1] mover, incoming
     cdef Py_ssize_t near_count
-    cdef double shared, ground, total
+    cdef double shared, shared_sigma, worse
     cdef MotionError error
 
 cpdef void link(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Py_ssize_t i, Py_ssize_t slot, Baselines baselines) noexcept nogil
@@ -48,9 +50,10 @@ cdef double sigma_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef double common_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
 cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(total=double, shared=double, ground=double)
-cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, Situation around, Settings settings) noexcept nogil
-cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
+cdef bint are_alike(Verdicts verdicts, Py_ssize_t a, Py_ssize_t b) noexcept nogil
+@cython.locals(number=double, total=double, mx=double, my=double, mm=double, lx=double, ly=double, ll=double, lm=double, gx=double, gy=double, gg=double, gm=double)
+cdef void ask_neighbours(Verdicts verdicts, Py_ssize_t a, Settings settings) noexcept nogil
+cdef bint will_be_met(Verdicts verdicts, Py_ssize_t a, EdgeColumns edges, Situation around) noexcept nogil
 cpdef void find_incoming(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around, Settings settings) noexcept nogil
 cpdef bint agree(Verdicts whole, Py_ssize_t j, Verdicts recent, Py_ssize_t k, Baselines baselines) noexcept nogil
 cdef bint rates_agree(double old, double new, double slack) noexcept nogil

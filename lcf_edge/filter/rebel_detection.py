@@ -23,15 +23,17 @@ PARALLAX_DRIFT = 0.25  # drift, as a share of the outward motion, of a corner be
 LINK_RATIO = 1.8  # factor by which the rates of two links of a chain may differ
 GROUND_DIPS = 0.8  # share of the camera's height by which the ground may lie deeper, before it is a leader
 COMMON_NOISE_PX = 0.3  # noise above this is common to neighbours, and does not average out
-ALIKE_SIGMAS = 2.0  # of both, by which neighbours at the same depth may differ in 1/Z
+ALIKE_SIGMAS = 2.0  # of both, by which neighbours at the same depth, or on the same level plane, may differ,
+OWN_SIGMAS = 2.0  # and an edge from what they show together
 NEAR_PATH = 1.5  # half widths from the path within which edges are candidates
 NEAR_SIGMAS = 2.0  # by which a candidate may move slower than it should
 MAX_CANDIDATES = 200  # all pairs are compared
 NEW_THREAT = 0.97  # share of the horizon within which a threat begins; hysteresis against flicker
 RANGE_SIGMAS = 4.0  # by which 1/Z of an incoming edge exceeds zero,
-GROUND_SIGMAS = 1.0  # and that of the ground
+GROUND_SIGMAS = 4.0  # and by which the ground fits worse
 SLOWER_HORIZONS = 1.5  # time to contact, one sigma slower, in horizons at most
 MIN_INVERSE_RANGE = 1e-6  # 1/m
+MIN_LEVER2 = 1e-9  # m²
 MIN_OUTWARD_PX = 1e-3
 MIN_R_PX = 1.0
 LINK_NOISE_SIGMAS = 1.5  # of noise in the rate of a mover over the younger link
@@ -50,8 +52,9 @@ class Verdicts:
     ``mover``, ``incoming``: the verdict.
 
     ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
-    (``inverse``, 1/m) with 1 sigma (``inverse_sigma``; ``weight``: 1/σ²). ``shared``, ``ground``, ``total``: result
-    of ``ask_neighbours``.
+    (``inverse``, 1/m) with 1 sigma (``inverse_sigma``), ``lever_x`` and ``lever_y``, px m, their motion for 1/Z = 1/m,
+    ``weight``, 1/σ² of their noise, 1/px², ``common``, 1 sigma of what they share with neighbours, px, and ``level``,
+    1/Z of the ground there, 1/m. ``shared``, ``shared_sigma``, 1/m, and ``worse``: result of ``ask_neighbours``.
     """
 
     def __init__(self, capacity: int) -> None:
@@ -62,9 +65,10 @@ class Verdicts:
         self.mover, self.incoming = [octets(capacity) for _ in range(2)]
         self.sigma, self.astray, self.noise = [doubles(capacity) for _ in range(3)]
         self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(2)]
-        self.near_x, self.near_y, self.weight = [doubles(capacity) for _ in range(3)]
+        self.near_x, self.near_y, self.lever_x, self.lever_y = [doubles(capacity) for _ in range(4)]
+        self.weight, self.common, self.level = [doubles(capacity) for _ in range(3)]
         self.near_count = 0
-        self.shared = self.ground = self.total = 0.0
+        self.shared = self.shared_sigma = self.worse = 0.0
         self.error = MotionError()
 
 
@@ -150,61 +154,94 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
             near += 1
     stride = 1 + near // MAX_CANDIDATES
     verdicts.near_count = (near + stride - 1) // stride
+    lowest_y = around.horizon_y - around.pinhole.focal * around.horizon_sigma_rad
     for a in range(verdicts.near_count):
         j = verdicts.near[a * stride]
-        lever = lever_of(verdicts, j, baselines)
+        slot, lever = verdicts.slot[j], lever_of(verdicts, j, baselines)
         verdicts.near[a] = j
+        verdicts.near_x[a], verdicts.near_y[a] = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
         verdicts.inverse[a] = verdicts.outward[j] / lever
         verdicts.inverse_sigma[a] = sigma_px(verdicts, j) / lever
-        verdicts.weight[a] = 1 / (verdicts.inverse_sigma[a] * verdicts.inverse_sigma[a])
-        verdicts.near_x[a], verdicts.near_y[a] = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
+        verdicts.lever_x[a] = baselines.depth_m[slot] * (verdicts.x[j] - baselines.focus_x[slot])
+        verdicts.lever_y[a] = baselines.depth_m[slot] * (verdicts.y[j] - baselines.focus_y[slot])
+        verdicts.weight[a] = 1 / (verdicts.noise[j] * verdicts.noise[j])
+        verdicts.common[a] = common_px(verdicts, j) + max(around.noise_px - COMMON_NOISE_PX, 0.0)
+        verdicts.level[a] = 0.0
+        if around.camera_height_m > 0:
+            below = max(verdicts.near_y[a] - lowest_y, 0.0)
+            verdicts.level[a] = below / (around.camera_height_m * around.pinhole.focal)
 
 
-def ask_neighbours(verdicts: Verdicts, a: int, around: Situation, settings: Settings) -> None:
-    """1/Z of a candidate, and of the ground there, by least squares over its neighbours at the same depth.
+def are_alike(verdicts: Verdicts, a: int, b: int) -> bool:
+    """Whether two candidates may be at one depth, or on one level plane."""
+    one, other = verdicts.inverse_sigma[a], verdicts.inverse_sigma[b]
+    if math.fabs(verdicts.inverse[a] - verdicts.inverse[b]) < ALIKE_SIGMAS * (one + other):
+        return True
+    apart = math.fabs(verdicts.level[b] * verdicts.inverse[a] - verdicts.level[a] * verdicts.inverse[b])
+    return apart < ALIKE_SIGMAS * (verdicts.level[b] * one + verdicts.level[a] * other)
 
-    ``shared`` = Σ w·(1/Z) / Σ w and ``ground`` = Σ w·(px below the lowest horizon) / Σ w, w = 1/σ²; ``total`` = Σ w.
+
+def ask_neighbours(verdicts: Verdicts, a: int, settings: Settings) -> None:
+    """Fit the motion of a candidate and its neighbours by something upright, and by the ground.
+
+    With m, their motion, l, their levers, and s, the sigma of what they share: m = ρ·l + s·t, and m = k·g·l + s·t,
+    g the ground's 1/Z; t ~ N(0, 1) is the same for all, k at most 1 + ``filter.ground_margin``. By least squares,
+    ``shared`` = ρ, and ``worse`` = χ² of the ground - χ² of the upright; both for the noise that is left, which few
+    edges show badly.
     """
-    x, y = verdicts.near_x[a], verdicts.near_y[a]
-    inverse, inverse_sigma = verdicts.inverse[a], verdicts.inverse_sigma[a]
-    lowest_y = around.horizon_y - around.pinhole.focal * around.horizon_sigma_rad
     reach2 = settings.neighbour_px * settings.neighbour_px
-    total = shared = ground = 0.0
+    number = total = mx = my = mm = lx = ly = ll = lm = gx = gy = gg = gm = 0.0
     for b in range(verdicts.near_count):
-        dx, dy = x - verdicts.near_x[b], y - verdicts.near_y[b]
-        if dx * dx + dy * dy >= reach2:
+        dx, dy = verdicts.near_x[a] - verdicts.near_x[b], verdicts.near_y[a] - verdicts.near_y[b]
+        if dx * dx + dy * dy >= reach2 or not are_alike(verdicts, a, b):
             continue
-        if math.fabs(inverse - verdicts.inverse[b]) >= ALIKE_SIGMAS * (inverse_sigma + verdicts.inverse_sigma[b]):
-            continue
-        total += verdicts.weight[b]
-        shared += verdicts.weight[b] * verdicts.inverse[b]
-        ground += verdicts.weight[b] * max(verdicts.near_y[b] - lowest_y, 0.0)
-    verdicts.total, verdicts.shared, verdicts.ground = total, shared / total, ground / total
+        j, weight, level = verdicts.near[b], verdicts.weight[b], verdicts.level[b]
+        across, down = verdicts.near_x[b] - verdicts.x[j], verdicts.near_y[b] - verdicts.y[j]
+        lever_x, lever_y, common = verdicts.lever_x[b], verdicts.lever_y[b], weight * verdicts.common[b]
+        number += 1
+        total += common * verdicts.common[b]
+        mx += common * across
+        my += common * down
+        mm += weight * (across * across + down * down)
+        lx += common * lever_x
+        ly += common * lever_y
+        ll += weight * (lever_x * lever_x + lever_y * lever_y)
+        lm += weight * (lever_x * across + lever_y * down)
+        gx += common * level * lever_x
+        gy += common * level * lever_y
+        gg += weight * level * level * (lever_x * lever_x + lever_y * lever_y)
+        gm += weight * level * (lever_x * across + lever_y * down)
+    taken = 1 / (total + 1)  # t, eliminated
+    mm -= taken * (mx * mx + my * my)
+    ll = max(ll - taken * (lx * lx + ly * ly), MIN_LEVER2)
+    lm -= taken * (lx * mx + ly * my)
+    gg -= taken * (gx * gx + gy * gy)
+    gm -= taken * (gx * mx + gy * my)
+    left = max(mm - lm * lm / ll, 0.0)
+    noise2 = max(left / (2 * number - 1), 1.0) * (1 + 1 / number) * (1 + 1 / number)
+    times = 1 + settings.ground_margin
+    if gg > 0:
+        times = min(gm / gg, times)
+    verdicts.shared, verdicts.shared_sigma = lm / ll, math.sqrt(noise2 / ll)
+    verdicts.worse = (mm - times * (2 * gm - times * gg) - left) / noise2
 
 
-def will_be_met(
-    verdicts: Verdicts, a: int, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
-) -> bool:
+def will_be_met(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation) -> bool:
     """Whether a candidate, by its neighbours, stands in the way, above the ground, within the horizon."""
-    j = verdicts.near[a]
-    i, shared = verdicts.row[j], verdicts.shared
-    focal = around.pinhole.focal
+    i, inverse, inverse_sigma = verdicts.row[verdicts.near[a]], verdicts.shared, verdicts.shared_sigma
     reach_m = around.speed_mps * around.horizon_s
-    shared_px = common_px(verdicts, j) + max(around.noise_px - COMMON_NOISE_PX, 0.0)  # errors that neighbours share
-    inverse_sigma = 1 / math.sqrt(verdicts.total) + shared_px / lever_of(verdicts, j, baselines)
-    range_m = 1 / max(shared, MIN_INVERSE_RANGE)
+    range_m = 1 / max(inverse, MIN_INVERSE_RANGE)
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
-    excess = shared
-    if around.camera_height_m > 0:
-        excess -= verdicts.ground * (1 + settings.ground_margin) / (around.camera_height_m * focal)
+    below_m = (edges.y[i] - around.horizon_y) / around.pinhole.focal * range_m
     soon_m = reach_m if edges.rebel[i] else reach_m * NEW_THREAT
     return (
         path.way_to(right_m, range_m, around) < soon_m
         and math.fabs(path.miss(right_m, range_m, around)) < around.half_width_m
-        and around.camera_height_m - (edges.y[i] - around.horizon_y) / focal * range_m < around.height_m
-        and (shared - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1
-        and shared > RANGE_SIGMAS * inverse_sigma
-        and excess > GROUND_SIGMAS * inverse_sigma
+        and around.camera_height_m - below_m < around.height_m
+        and (inverse - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1
+        and inverse > RANGE_SIGMAS * inverse_sigma
+        and math.fabs(inverse - verdicts.inverse[a]) < OWN_SIGMAS * verdicts.inverse_sigma[a]
+        and verdicts.worse > GROUND_SIGMAS * GROUND_SIGMAS
     )
 
 
@@ -213,15 +250,15 @@ def find_incoming(
 ) -> None:
     """Mark the edges that stand in the way.
 
-    Near the focus a single edge hardly moves; it is judged together with its neighbours at the same depth. 1/Z =
-    V_e/(r V), by least squares over the neighbours, with its standard deviation.
+    Near the focus a single edge hardly moves, and a small thing moves much as the ground under it: an edge is judged
+    together with its neighbours.
     """
     if not around.speed_mps > 0:
         return
     near_path(verdicts, edges, baselines, around)
     for a in range(verdicts.near_count):
-        ask_neighbours(verdicts, a, around, settings)
-        verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, baselines, around, settings) else 0
+        ask_neighbours(verdicts, a, settings)
+        verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, around) else 0
 
 
 def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines) -> bool:

@@ -6,7 +6,7 @@ from lcf_edge.config import Filter
 from lcf_edge.filter.flow import Pinhole
 
 REFERENCE_FOCAL_PX = 320 / math.tan(0.525)  # of the camera to which px in the configuration refer: 640 px over 1.05 rad
-NEIGHBOUR_PX = 28.0  # edges nearer than this, at the same depth, are judged together
+NEIGHBOUR_PX = 40.0  # edges nearer than this, at the same depth, are judged together
 MEMBER_MARGIN_PX = 8.0  # around a rebel circle, within which edges may belong to it
 MIN_COAST_PX = 40.0  # a circle so near that it grows too fast to be tracked is at least this large
 PSI_MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow

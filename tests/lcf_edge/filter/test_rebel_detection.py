@@ -297,6 +297,85 @@ def test_what_may_as_well_be_the_ground_is_not_met(watch: Watch, horizon_sigma_r
     assert seen.incoming.all() if is_met else not seen.incoming.any()
 
 
+def box_ahead(z: float, top: float, foot: float) -> list[tuple[float, float, float]]:
+    """Corners of something upright on the path, from ``top`` down to its ``foot``; y down from the camera, m."""
+    return [(x, float(y), z) for x in (-0.15, 0.0, 0.15) for y in np.linspace(top, foot, 6)]
+
+
+def test_a_small_box_is_told_from_the_ground_by_its_upright_shape(watch: Watch) -> None:
+    """Its foot moves as the ground does there; higher up the ground would lie far behind it."""
+    box = box_ahead(6.0, 0.0, 0.28)
+    verdict = watch(box, corner_var=0.1).verdict()
+    above = np.array([y for _, y, _ in box]) < 0.2
+    assert verdict.incoming[above].all()
+
+
+@given(st.floats(1.2, 6.0), st.floats(-0.4, 0.4), st.floats(0.85, 1.15))
+def test_the_ground_is_not_taken_for_something_upright_even_if_misjudged(
+    watch: Watch, z: float, x: float, deeper: float
+) -> None:
+    """By less than ``filter.ground_margin``: a patch of it is flat, however exactly its range is known."""
+    height_m = HEIGHT_M * deeper
+    patch = [(x + across, height_m, z + ahead) for across in (-0.1, 0.0, 0.1) for ahead in (0.0, 0.1, 0.2, 0.3)]
+    assert not watch(patch, corner_var=0.01, horizon_sigma_rad=0.002).verdict().incoming.any()
+
+
+def test_what_a_wrong_rotation_shifts_alike_does_not_seem_near(watch: Watch) -> None:
+    """Far away and high up, everything shifts outwards by two sigmas of the rotation."""
+    far = [(x, y, 40.0) for x in (-0.5, 0.0, 0.5) for y in (-7.0, -6.6, -6.2)]
+    watched = watch(far, corner_var=0.1, height_m=20.0, horizon_s=8.0, half_width_m=2.0)
+    edges, baselines = watched.seen()
+    np.asarray(baselines.sigma_px)[:] = 2.0
+    edges.y[:] -= 4.0
+    verdicts = watched.judged(edges, baselines, 0)
+    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    assert not np.asarray(verdicts.incoming).any()
+
+
+def test_an_edge_that_contradicts_its_neighbours_is_not_met_with_them(watch: Watch) -> None:
+    """One corner of what stands 3 m behind a wall, where it shows its range better than each of them."""
+    wall = [(x, y, 6.0) for x in (-0.09, -0.03, 0.03, 0.09) for y in (-0.2, -0.15, -0.1)]
+    verdict = watch([*wall, (0.0, -0.525, 9.0)], corner_var=0.1).verdict()
+    assert verdict.incoming[:-1].all()
+    assert not verdict.incoming[-1]
+
+
+def test_edges_of_the_ground_that_happen_to_agree_do_not_make_it_upright(watch: Watch) -> None:
+    """On small tiles corners seem to move by whole tiles, so that some show one range, over several rows."""
+    tile_px, number, rng = 3.0, 100, np.random.default_rng(1)
+    across, ahead = rng.uniform(-0.2, 0.2, number), rng.uniform(1.8, 2.8, number)
+    watched = watch(np.stack([across, np.full(number, 0.28), ahead], axis=1), horizon_sigma_rad=0.002, corner_var=0.04)
+    edges, baselines = watched.seen()
+    then_y = np.asarray(watched.judged(edges, baselines, 0).y)
+    edges.y[:number] = then_y + tile_px * np.round((edges.y[:number] - then_y) / tile_px)
+    verdicts = watched.judged(edges, baselines, 0)
+    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    assert not np.asarray(verdicts.incoming).any()
+
+
+@pytest.mark.parametrize(("edges", "are_met"), [(1, False), (6, True)])
+def test_the_fewer_edges_the_surer_they_must_be(watch: Watch, edges: int, are_met: bool) -> None:
+    watched = watch([(0.02 * k - 0.05, -0.35, 6.0) for k in range(edges)], corner_var=0.6)
+    verdicts = watched.judged(*watched.seen(), 0)
+    sigmas = verdicts.outward[0] / math.hypot(verdicts.sigma[0], verdicts.astray[0], verdicts.noise[0])
+    assert 5.0 < sigmas < 7.0  # of each
+    assert bool(watched.verdict().incoming.all()) is are_met
+
+
+def test_edges_that_scatter_more_than_their_noise_are_believed_less(watch: Watch) -> None:
+    """Sideways, where it does not change the range that each shows."""
+    watched = watch([(x, y, 6.0) for x in (-0.1, 0.0, 0.1) for y in (-0.35, -0.25)], corner_var=0.4)
+    edges, baselines = watched.seen()
+    verdicts = watched.judged(edges, baselines, 0)
+    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    assert np.asarray(verdicts.incoming).all()
+    edges.x[: edges.count] += [3.0, -3.0, -3.0, 3.0, 3.0, -3.0]
+    verdicts = watched.judged(edges, baselines, 0)
+    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    assert not np.asarray(verdicts.mover).any()
+    assert not np.asarray(verdicts.incoming).any()
+
+
 # Movers
 
 
