@@ -198,6 +198,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, settings: Settings) -> None:
         j, weight, level = verdicts.near[b], verdicts.weight[b], verdicts.level[b]
         across, down = verdicts.near_x[b] - verdicts.x[j], verdicts.near_y[b] - verdicts.y[j]
         lever_x, lever_y, common = verdicts.lever_x[b], verdicts.lever_y[b], weight * verdicts.common[b]
+        lever2, along = lever_x * lever_x + lever_y * lever_y, lever_x * across + lever_y * down
         number += 1
         total += common * verdicts.common[b]
         mx += common * across
@@ -205,12 +206,12 @@ def ask_neighbours(verdicts: Verdicts, a: int, settings: Settings) -> None:
         mm += weight * (across * across + down * down)
         lx += common * lever_x
         ly += common * lever_y
-        ll += weight * (lever_x * lever_x + lever_y * lever_y)
-        lm += weight * (lever_x * across + lever_y * down)
+        ll += weight * lever2
+        lm += weight * along
         gx += common * level * lever_x
         gy += common * level * lever_y
-        gg += weight * level * level * (lever_x * lever_x + lever_y * lever_y)
-        gm += weight * level * (lever_x * across + lever_y * down)
+        gg += weight * level * level * lever2
+        gm += weight * level * along
     taken = 1 / (total + 1)  # t, eliminated
     mm -= taken * (mx * mx + my * my)
     ll = max(ll - taken * (lx * lx + ly * ly), MIN_LEVER2)
