@@ -13,23 +13,32 @@ MIN_SPEED_MPS = 0.05  # below, the yaw rate does not define a path
 SMALL_TURN_RAD = 0.4  # turns up to this may be noise, or soon be over
 
 
-def arc_radius_m(around: Situation) -> float:
-    """Radius of the path, m, positive to the left; infinite: straight, or speed unknown."""
+def arc_radius_m(yaw_rate_radps: float, around: Situation) -> float:
+    """Radius of the path at a yaw rate, m, positive to the left; infinite: straight, or speed unknown."""
     speed = around.speed_mps
     least = MIN_CURVATURE * max(math.fabs(speed), MIN_SPEED_MPS)
-    if not math.isfinite(speed) or math.fabs(around.yaw_rate_radps) < least:
+    if not math.isfinite(speed) or math.fabs(yaw_rate_radps) < least:
         return INFINITY
-    return speed / around.yaw_rate_radps
+    return speed / yaw_rate_radps
 
 
-def miss(right_m: float, ahead_m: float, around: Situation) -> float:
-    """Lateral miss: distance of a point from the vehicle's path, m, right positive."""
-    radius = arc_radius_m(around)
+def miss_by(radius: float, right_m: float, ahead_m: float, around: Situation) -> float:
+    """Distance of a point from an arc, m, right positive. ``radius``: m, positive to the left."""
     if not math.isfinite(radius):
         return right_m
     before_axle_m = ahead_m + around.lever_m
     distance = math.sqrt((right_m + radius) * (right_m + radius) + before_axle_m * before_axle_m) - math.fabs(radius)
     return -distance if radius < 0 else (distance if radius > 0 else 0.0)
+
+
+def miss(right_m: float, ahead_m: float, around: Situation) -> float:
+    """Lateral miss: distance of a point from the vehicle's path, m, right positive."""
+    return miss_by(arc_radius_m(around.yaw_rate_radps, around), right_m, ahead_m, around)
+
+
+def lasting_miss(right_m: float, ahead_m: float, around: Situation) -> float:
+    """Lateral miss of a point on the path as it has lasted, m, right positive: a swerve will soon be over."""
+    return miss_by(arc_radius_m(around.lasting_yaw_radps, around), right_m, ahead_m, around)
 
 
 def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
@@ -47,7 +56,7 @@ def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
 
 def way_to(right_m: float, ahead_m: float, around: Situation) -> float:
     """Distance along the path until a point is abeam, m."""
-    radius = arc_radius_m(around)
+    radius = arc_radius_m(around.yaw_rate_radps, around)
     if not math.isfinite(radius):
         return ahead_m
     outside = right_m + radius if radius > 0 else (-right_m - radius if radius < 0 else 0.0)

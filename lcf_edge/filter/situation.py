@@ -6,6 +6,7 @@ from lcf_edge.config import Config
 from lcf_edge.filter.flow import Pinhole
 
 SLOWEST_MPS = 0.05  # a slower vehicle is at rest: its scene does not flow, and would bound all motion by 0
+LASTING_TURN_S = 0.6  # a turn that has lasted so long is no swerve
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -16,14 +17,14 @@ class Situation:
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
     unknown. ``scene_flow_pxps``: image speed at V_ν, or ``SLOWEST_MPS`` if more, of a point at the configured scene
     depth, one focal length from O, which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown.
-    ``dt_s``: t_f. ``noise_px``: 1 sigma of an edge's position; ``corner_var``: variance of a corner's, px², at least
-    ``least_corner_var``; ``excess``: factor by which this image leaves more than they explain. ``focus_var_x``,
-    ``focus_var_y``: variance of O at one instant, px²; ``lasting_var_x``, ``lasting_var_y``: without the shaking of the
-    heading. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it. ``pitch_sigma_rad``: 1 sigma of
-    the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance of the
-    camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``: enough of
-    the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is found
-    again: something covers it.
+    ``dt_s``: t_f. ``lasting_yaw_radps``: yaw rate, averaged over ``LASTING_TURN_S``. ``noise_px``: 1 sigma of an edge's
+    position; ``corner_var``: variance of a corner's, px², at least ``least_corner_var``; ``excess``: factor by which
+    this image leaves more than they explain. ``focus_var_x``, ``focus_var_y``: variance of O at one instant, px²;
+    ``lasting_var_x``, ``lasting_var_y``: without the shaking of the heading. ``turn_share``: 1 sigma of the image
+    motion by a turn, as a share of it. ``pitch_sigma_rad``: 1 sigma of the horizon as configured,
+    ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance of the camera ahead of the axle.
+    ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``: enough of the static scene is in
+    view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -43,6 +44,7 @@ class Situation:
         self.excess, self.focus_var_x, self.focus_var_y = 1.0, 0.0, 0.0
         self.lasting_var_x = self.lasting_var_y = 0.0
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
+        self.lasting_yaw_radps = NAN
 
 
 def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_rate_radps: float, dt_s: float) -> None:
@@ -50,6 +52,8 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
     around.focus_x = around.pinhole.cx + around.pinhole.fx * ray_x
     around.focus_y = around.horizon_y = around.pinhole.cy + around.pinhole.fy * ray_y
     around.dt_s, around.speed_mps, around.yaw_rate_radps = dt_s, speed_mps, yaw_rate_radps
+    before = yaw_rate_radps if math.isnan(around.lasting_yaw_radps) else around.lasting_yaw_radps
+    around.lasting_yaw_radps = before + (yaw_rate_radps - before) * min(dt_s / LASTING_TURN_S, 1.0)
     around.scene_flow_pxps = INFINITY
     if math.isfinite(speed_mps):
         around.scene_flow_pxps = max(math.fabs(speed_mps), SLOWEST_MPS) * around.pinhole.focal / around.scene_depth_m

@@ -217,6 +217,18 @@ def test_on_an_arc_what_stands_on_it_is_incoming_and_what_lies_straight_ahead_is
     assert not verdict.mover.any()
 
 
+@pytest.mark.parametrize(
+    ("known", "lasting_yaw_radps", "is_met"), [(False, 0.5, True), (False, 0, False), (True, 0, True)]
+)
+def test_a_new_threat_also_lies_near_the_arc_that_has_lasted(
+    watch: Watch, known: bool, lasting_yaw_radps: float, is_met: bool
+) -> None:
+    arc_m, turn = 2.0 / 0.5, 0.9  # rad, from the start to contact
+    on_it = (-arc_m * (1 - math.cos(turn)), -0.5, arc_m * math.sin(turn))
+    swerving = watch([on_it], yaw_rate_radps=0.5, lasting_yaw_radps=lasting_yaw_radps)
+    assert swerving.verdict(known=known).incoming.tolist() == [is_met]
+
+
 @pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5])
 def test_the_miss_is_the_distance_from_the_arc_to_the_right(situation: Around, yaw_rate_radps: float) -> None:
     around = situation(speed_mps=2.0, yaw_rate_radps=yaw_rate_radps)
