@@ -40,6 +40,7 @@ _FRESH_S = 0.5  # older odometry is stale
 # At rest, for this long.
 _REST_NS = 500_000_000
 _REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # where only a quiet IMU indicates rest,
+_NOISELESS_MPS2 = 1e-9  # but not, where the image moves, one without noise: simulated, it is so at any steady speed
 _REST_GYRO_RADPS = 0.1  # and the largest bias that is accepted then
 _SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # where odometry or the image indicates it: motors vibrate
 _REST_GRAVITY_ERROR_MPS2 = 0.8
@@ -429,7 +430,8 @@ class EgoMotionEstimator:
             rests = steady and gyro_std <= _SHAKEN_GYRO_STD_RADPS and accel_std <= _SHAKEN_ACCEL_STD_MPS2
         else:
             quiet = gyro_std <= _REST_GYRO_STD_RADPS and accel_std <= _REST_ACCEL_STD_MPS2
-            rests = quiet and level and (self.bias.known or hypot(*at[:3]) <= _REST_GYRO_RADPS)
+            simulated = still is False and accel_std < _NOISELESS_MPS2
+            rests = quiet and level and not simulated and (self.bias.known or hypot(*at[:3]) <= _REST_GYRO_RADPS)
         if not rests:
             return None
         rate_radps = at[:3]

@@ -337,6 +337,20 @@ class TestBias:
         assert not any(rests for t, rests in seen if 0.7 < t < 1.9)
         assert all(rests for t, rests in seen if t > 2.1)
 
+    @pytest.mark.parametrize(
+        ("noise_mps2", "still", "rests"), [(0.0, False, False), (0.02, False, True), (0.0, None, True)]
+    )
+    def test_a_simulated_imu_without_noise_shows_no_rest_while_the_image_moves(
+        self, noise_mps2: float, still: bool | None, rests: bool
+    ) -> None:
+        """At any steady speed it is as quiet as at rest."""
+        ego = calibrated()
+        noise = iter(np.random.default_rng(0).normal(0, noise_mps2, 200).tolist())
+        feed(ego, np.arange(0, 2, 0.01), accel=lambda _: (next(noise), LEVEL[1], 0.0))
+        for t in np.arange(0.1, 2, 0.05):
+            motion = ego.advance(ns(t), still=still)
+        assert (motion.speed_mps == 0.0) == rests
+
     @pytest.mark.parametrize("forward_mps2", [0.0, 0.6], ids=["too gently to be measured", "measurably"])
     def test_the_speed_of_a_start_is_unknown_only_if_the_accelerometer_missed_it(self, forward_mps2: float) -> None:
         """It rests for a second; half a second after the flow has begun it drives at a steady speed."""
