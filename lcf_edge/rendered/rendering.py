@@ -255,11 +255,14 @@ def _paint(canvas: Image, surface: Surface, texture: Image, share: float = 1.0) 
 
 
 def _cover(image: Image, drop: Drop) -> None:
-    """Blend what a drop shows into the image."""
+    """Blend what a drop shows into the image; nothing if it lies outside."""
     height, width = image.shape
     reach = round(2 * drop.radius_px)
-    left, top = max(round(drop.x_px) - reach, 0), max(round(drop.y_px) - reach, 0)
-    region = image[top : round(drop.y_px) + reach, left : round(drop.x_px) + reach]
+    left, right = (max(round(drop.x_px) + side, 0) for side in (-reach, reach))
+    top, bottom = (max(round(drop.y_px) + side, 0) for side in (-reach, reach))
+    region = image[top:bottom, left:right]
+    if not region.size:
+        return
     x, y = np.meshgrid(np.arange(region.shape[1]) + left - drop.x_px, np.arange(region.shape[0]) + top - drop.y_px)
     opaque = 1 / (1 + np.exp((np.hypot(x, y) / drop.radius_px - 1) / _DROP_RIM))
     shown = np.full(region.shape, float(_DIRT_GREY))

@@ -402,6 +402,13 @@ def test_a_drop_hides_the_world_and_shows_it_upside_down_and_dirt_is_dark():
         assert (covered[inside].mean() < 80) == is_dirt
 
 
+@pytest.mark.parametrize("place", [(-200.0, 200.0), (320.0, -200.0), (900.0, 200.0), (320.0, 700.0)])
+def test_a_drop_beside_the_image_hides_nothing(place: tuple[float, float]) -> None:
+    """As a drive has that is rendered for a smaller image."""
+    bare = first_image(drive(lens=Lens()))
+    assert np.array_equal(first_image(drive(lens=Lens(), drops=(Drop(*place, 60.0),))), bare)
+
+
 def test_the_floor_mirrors_lamps_where_their_images_are():
     lamp = Lamp(0.5, 10.0, 0.6, 0.8)
     spec = drive(lamps=(lamp,), ceiling_m=2.5, gloss=0.5)
