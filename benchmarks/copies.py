@@ -1,8 +1,9 @@
 """``python -m benchmarks.copies RECORDINGS INTO``: copies of recordings that differ in light, noise or start.
 
 Whether something is found in one run may hang on a single corner. The mean over copies that a user would call the same
-recording tells two versions of the filter apart: ``lcf-edge evaluate INTO`` scores them. EuRoC/ASL folders are copied;
-other recordings, and folders without a file ``settings``, are left out.
+recording tells two versions of the filter apart: ``lcf-edge evaluate INTO`` scores them. With ``--sensors`` the images
+stay, but IMU or odometry fail. EuRoC/ASL folders are copied; other recordings, and folders without a file ``settings``,
+are left out.
 """
 
 import argparse
@@ -61,6 +62,38 @@ SELECTIONS = {f"from-{first}": slice(first, None) for first in range(10, 61, 10)
 SELECTIONS |= {"every-second": slice(None, None, 2)}
 DROPPED = 5  # one image in so many
 
+Rows = list[list[str]]
+IMU, ODOMETRY = "mav0/imu0", "mav0/odom0"
+DRIFT_RADPS, BIAS_RADPS = 0.035, 0.087  # 2 °/s by the end; 5 °/s
+
+
+def _add_rate(rows: Rows, offset_radps: Callable[[float], float]) -> Rows:
+    """Add to the axes that the gyro has. ``offset_radps``: by the share of the recording that has passed."""
+    measured = [any(float(row[axis]) for row in rows) for axis in (1, 2, 3)]
+    changed = []
+    for number, row in enumerate(rows):
+        offset = offset_radps(number / len(rows))
+        rates = (float(rate) + has * offset for rate, has in zip(row[1:4], measured, strict=True))
+        changed.append([row[0], *map(str, rates), *row[4:]])
+    return changed
+
+
+def _stick(rows: Rows) -> Rows:
+    middle = len(rows) // 2
+    return [*rows[:middle], *([row[0], *rows[middle][1:]] for row in rows[middle:])]
+
+
+# What happens to the samples of a sensor; None: there are none.
+FAILURES: dict[str, dict[str, Callable[[Rows], Rows] | None]] = {
+    "gyro-drifts": {IMU: lambda rows: _add_rate(rows, lambda share: share * DRIFT_RADPS)},
+    "gyro-biased": {IMU: lambda rows: _add_rate(rows, lambda _: BIAS_RADPS)},
+    "imu-dies": {IMU: lambda rows: rows[: len(rows) // 2]},
+    "imu-sticks": {IMU: _stick},
+    "no-imu": {IMU: None},
+    "no-turn": {IMU: None, ODOMETRY: lambda rows: [[*row[:2], "nan"] for row in rows]},
+    "no-odometry": {ODOMETRY: None},
+}
+
 
 def write(recording: Path, into: Path) -> Iterator[str]:
     """Write all copies of an ASL recording into a folder; yield the name of each. Raises ``OSError``."""
@@ -76,6 +109,30 @@ def write(recording: Path, into: Path) -> Iterator[str]:
         (copy / "mav0/cam0/data.csv").write_text("\n".join([*head, *chosen]) + "\n", "utf-8")
         _copy_images(recording, copy, chosen, ALTERATIONS.get(name))
         _keep_truth(copy / "truth.jsonl", {int(row.split(",")[0]) for row in chosen})
+        yield copy.name
+
+
+def write_failing(recording: Path, into: Path) -> Iterator[str]:
+    """Write copies of an ASL recording whose sensors fail, as far as it has them; yield the name of each.
+
+    Raises ``OSError``, and ``ValueError`` for samples that are no numbers.
+    """
+    for name, failures in FAILURES.items():
+        if not all((recording / sensor).is_dir() for sensor in failures):
+            continue
+        copy = into / f"{recording.name}@{name}"
+        shutil.copytree(recording, copy)
+        for sensor, change in failures.items():
+            if change is None:
+                shutil.rmtree(copy / sensor)
+                continue
+            path = copy / sensor / "data.csv"
+            lines = [line for line in path.read_text("utf-8").splitlines() if line.strip()]
+            head, rows = (
+                [line for line in lines if line[0] == "#"],
+                [line.split(",") for line in lines if line[0] != "#"],
+            )
+            path.write_text("\n".join([*head, *map(",".join, change(rows))]) + "\n", "utf-8")
         yield copy.name
 
 
@@ -108,15 +165,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.copies", description=__doc__)
     parser.add_argument("recordings", type=Path, help="folder of recordings, each a folder with a file settings")
     parser.add_argument("into", type=Path, help="new folder")
+    parser.add_argument("--sensors", action="store_true", help="copies whose IMU or odometry fails")
     options = parser.parse_args(arguments)
     try:
         found = [each.path for each in find([options.recordings]) if each.settings]
         written = 0
         for path in found:
             if (path / "mav0/cam0/data.csv").is_file():
-                written += sum(1 for _ in write(path, options.into))
+                written += sum(1 for _ in (write_failing if options.sensors else write)(path, options.into))
         sys.stdout.write(f"{written} copies in {options.into}: lcf-edge evaluate {options.into}\n")
-    except (LcfError, OSError) as error:
+    except (LcfError, OSError, ValueError) as error:
         sys.stderr.write(f"benchmarks.copies: {error}\n")
         return 1
     return 0

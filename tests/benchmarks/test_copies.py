@@ -1,13 +1,15 @@
 """Copies of recordings that a user would call the same: what is in them."""
 
 import json
+import shutil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from benchmarks import copies
-from drivers.samples import Frame
+from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import load
 from lcf_edge.recording.read import open_recording
 from lcf_edge.rendered import scenes
@@ -73,3 +75,57 @@ def test_a_folder_that_exists_and_an_image_that_does_not_are_refused_in_one_line
     error = capsys.readouterr().err
     assert error.endswith(": no image\n")
     assert error.count("\n") == 1
+
+
+def samples_of(folder: Path, kind: type) -> list[Any]:
+    return [each for each in open_recording(folder, load(None, [])) if isinstance(each, kind)]
+
+
+def test_sensors_fail_as_the_name_of_the_copy_says(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    into = tmp_path / "copies"
+    assert copies.main(["--sensors", str(recording.parent), str(into)]) == 0
+    assert f"{len(copies.FAILURES)} copies in {into}" in capsys.readouterr().out
+    assert {each.name.partition("@")[2] for each in into.iterdir()} == set(copies.FAILURES)
+    inertial = {name: samples_of(into / f"yard@{name}", ImuSample) for name in copies.FAILURES}
+    speeds = {name: samples_of(into / f"yard@{name}", SpeedSample) for name in copies.FAILURES}
+    whole, half = samples_of(recording, ImuSample), len(samples_of(recording, ImuSample)) // 2
+    rates = {name: np.array([each.gyro for each in samples]) for name, samples in inertial.items()}
+    true = np.array([each.gyro for each in whole])
+    assert np.allclose(rates["gyro-biased"], true + copies.BIAS_RADPS)
+    assert np.allclose(rates["gyro-drifts"][0], true[0])
+    assert np.allclose(rates["gyro-drifts"][-1], true[-1] + copies.DRIFT_RADPS, atol=1e-3)
+    assert inertial["imu-dies"] == whole[:half]
+    assert inertial["imu-sticks"][:half] == whole[:half]
+    assert len({(each.gyro, each.accel) for each in inertial["imu-sticks"][half:]}) == 1
+    assert not inertial["no-imu"]
+    assert not inertial["no-turn"]
+    assert inertial["no-odometry"] == whole
+    assert not speeds["no-odometry"]
+    assert speeds["no-imu"] == samples_of(recording, SpeedSample)
+    assert len(speeds["no-turn"]) == len(speeds["no-imu"])
+    assert all(np.isnan(each.yaw_rate_radps) for each in speeds["no-turn"])
+    assert all(images_of(into / f"yard@{name}").keys() == images_of(recording).keys() for name in copies.FAILURES)
+
+
+def test_an_axis_that_the_gyro_lacks_has_no_bias(recording: Path, tmp_path: Path) -> None:
+    path = recording / copies.IMU / "data.csv"
+    head, *rows = [line.split(",") for line in path.read_text().splitlines()]
+    path.write_text("\n".join(",".join([*row[:1], "0", *row[2:]]) for row in (head, *rows)))
+    list(copies.write_failing(recording, tmp_path / "copies"))
+    rates = np.array([each.gyro for each in samples_of(tmp_path / "copies/yard@gyro-biased", ImuSample)])
+    assert (rates == 0).any(axis=0).sum() == 1
+
+
+def test_a_sensor_that_a_recording_lacks_cannot_fail(recording: Path, tmp_path: Path) -> None:
+    shutil.rmtree(recording / copies.IMU)
+    assert list(copies.write_failing(recording, tmp_path / "copies")) == ["yard@no-odometry"]
+
+
+def test_samples_that_are_no_numbers_are_told_in_one_line(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (recording / copies.IMU / "data.csv").write_text("#head\n1,nothing,0,0,0,0,0\n")
+    assert copies.main(["--sensors", str(recording.parent), str(tmp_path / "copies")]) == 1
+    assert capsys.readouterr().err.count("\n") == 1
