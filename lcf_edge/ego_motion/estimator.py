@@ -40,7 +40,7 @@ _FRESH_S = 0.5  # older odometry is stale
 # At rest, for this long.
 _REST_NS = 500_000_000
 _REST_GYRO_STD_RADPS, _REST_ACCEL_STD_MPS2 = 0.01, 0.1  # where only a quiet IMU indicates rest,
-_NOISELESS_MPS2 = 1e-9  # but not, where the image moves, one without noise: simulated, it is so at any steady speed
+_NOISELESS_MPS2 = 1e-9  # though not one simulated without noise, quiet at any steady speed, if the image moves
 _REST_GYRO_RADPS = 0.1  # and the largest bias that is accepted then
 _SHAKEN_GYRO_STD_RADPS, _SHAKEN_ACCEL_STD_MPS2 = 0.5, 5.0  # where odometry or the image indicates it: motors vibrate
 _REST_GRAVITY_ERROR_MPS2 = 0.8
