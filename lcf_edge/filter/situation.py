@@ -6,7 +6,7 @@ from lcf_edge.config import Config
 from lcf_edge.filter.flow import Pinhole
 
 SLOWEST_MPS = 0.05  # a slower vehicle is at rest: its scene does not flow, and would bound all motion by 0
-LASTING_TURN_S = 0.6  # a turn that has lasted so long is no swerve
+LASTING_TURN_S = 0.3  # a turn that has lasted so long is no swerve
 INFINITY = float("inf")
 NAN = float("nan")
 

@@ -73,7 +73,7 @@ def test_the_mounting_prevails_in_the_long_run() -> None:
 
 def test_a_turn_that_lasts_is_told_from_a_swerve() -> None:
     around = Situation(Config(), PINHOLE)
-    for yaw_rate_radps, seconds, lasting in ((0.3, 0.1, 0.3), (0.0, 3.0, 0.0), (0.3, 0.2, 0.08), (0.3, 3.0, 0.3)):
+    for yaw_rate_radps, seconds, lasting in ((0.3, 0.1, 0.3), (0.0, 3.0, 0.0), (0.3, 0.1, 0.09), (0.3, 3.0, 0.3)):
         for _ in range(round(seconds / 0.05)):
             follow(around, 0.0, 0.0, 2.0, yaw_rate_radps, 0.05)
         assert around.lasting_yaw_radps == pytest.approx(lasting, abs=0.02)
