@@ -95,11 +95,15 @@ FAILURES: dict[str, dict[str, Callable[[Rows], Rows] | None]] = {
 }
 
 
+def _lines(path: Path) -> tuple[list[str], list[str]]:
+    """Comments and rows of a CSV file."""
+    lines = [line for line in path.read_text("utf-8").splitlines() if line.strip()]
+    return [line for line in lines if line[0] == "#"], [line for line in lines if line[0] != "#"]
+
+
 def write(recording: Path, into: Path) -> Iterator[str]:
     """Write all copies of an ASL recording into a folder; yield the name of each. Raises ``OSError``."""
-    source = recording / "mav0/cam0/data.csv"
-    lines = [line for line in source.read_text("utf-8").splitlines() if line.strip()]
-    head, rows = [line for line in lines if line.startswith("#")], [line for line in lines if line[0] != "#"]
+    head, rows = _lines(recording / "mav0/cam0/data.csv")
     selections = {name: rows[chosen] for name, chosen in SELECTIONS.items()}
     selections["dropped"] = [row for number, row in enumerate(rows) if number % DROPPED]
     selections |= dict.fromkeys(ALTERATIONS, rows)
@@ -127,12 +131,9 @@ def write_failing(recording: Path, into: Path) -> Iterator[str]:
                 shutil.rmtree(copy / sensor)
                 continue
             path = copy / sensor / "data.csv"
-            lines = [line for line in path.read_text("utf-8").splitlines() if line.strip()]
-            head, rows = (
-                [line for line in lines if line[0] == "#"],
-                [line.split(",") for line in lines if line[0] != "#"],
-            )
-            path.write_text("\n".join([*head, *map(",".join, change(rows))]) + "\n", "utf-8")
+            head, rows = _lines(path)
+            changed = change([row.split(",") for row in rows])
+            path.write_text("\n".join([*head, *map(",".join, changed)]) + "\n", "utf-8")
         yield copy.name
 
 
