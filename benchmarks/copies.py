@@ -119,7 +119,7 @@ def write(recording: Path, into: Path) -> Iterator[str]:
 def write_failing(recording: Path, into: Path) -> Iterator[str]:
     """Write copies of an ASL recording whose sensors fail, as far as it has them; yield the name of each.
 
-    Raises ``OSError``, and ``ValueError`` for samples that are no numbers.
+    Raises ``OSError``, and ``RecordingError`` for a row that is no sample.
     """
     for name, failures in FAILURES.items():
         if not all((recording / sensor).is_dir() for sensor in failures):
@@ -132,7 +132,10 @@ def write_failing(recording: Path, into: Path) -> Iterator[str]:
                 continue
             path = copy / sensor / "data.csv"
             head, rows = _lines(path)
-            changed = change([row.split(",") for row in rows])
+            try:
+                changed = change([row.split(",") for row in rows])
+            except (ValueError, IndexError) as error:
+                raise RecordingError(f"{recording / sensor}/data.csv: a row is no sample: {error}") from error
             path.write_text("\n".join([*head, *map(",".join, changed)]) + "\n", "utf-8")
         yield copy.name
 
@@ -175,7 +178,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if (path / "mav0/cam0/data.csv").is_file():
                 written += sum(1 for _ in (write_failing if options.sensors else write)(path, options.into))
         sys.stdout.write(f"{written} copies in {options.into}: lcf-edge evaluate {options.into}\n")
-    except (LcfError, OSError, ValueError) as error:
+    except (LcfError, OSError) as error:
         sys.stderr.write(f"benchmarks.copies: {error}\n")
         return 1
     return 0

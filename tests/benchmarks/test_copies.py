@@ -123,9 +123,13 @@ def test_a_sensor_that_a_recording_lacks_cannot_fail(recording: Path, tmp_path: 
     assert list(copies.write_failing(recording, tmp_path / "copies")) == ["yard@no-odometry"]
 
 
-def test_samples_that_are_no_numbers_are_told_in_one_line(
-    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize("row", ["1,nothing,0,0,0,0,0", "1,0"])
+def test_a_row_that_is_no_sample_is_told_in_one_line_with_its_file(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], row: str
 ) -> None:
-    (recording / copies.IMU / "data.csv").write_text("#head\n1,nothing,0,0,0,0,0\n")
+    path = recording / copies.IMU / "data.csv"
+    path.write_text(f"#head\n{row}\n")
     assert copies.main(["--sensors", str(recording.parent), str(tmp_path / "copies")]) == 1
-    assert capsys.readouterr().err.count("\n") == 1
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert str(path) in told
