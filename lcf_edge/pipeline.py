@@ -155,7 +155,7 @@ class Pipeline:
         if self._repeats.is_repeat(frame.stamp_ns, frame.image):
             took_ns = time.perf_counter_ns() - started
             return Look(frame, NO_IMAGE, NO_CORNERS, 0, (), None, 0, took_ns, self._scene)
-        corners, cut = self._detector.detect(frame.image, self._highest_row())
+        corners, cut = self._detector.detect(frame.image, self._highest_row(), self.filter.focus[1])
         detect_ns = time.perf_counter_ns() - started
         notes = self._quality.notes(frame.image, len(corners))
         still = self._stillness.look(frame.stamp_ns, corners.pixel)

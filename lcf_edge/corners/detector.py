@@ -17,7 +17,10 @@ from lcf_edge.lens import Lens
 
 SQUARES = 192  # approximate number that an image is divided into
 MAX_TIMES_MEAN = 4.0  # corners of a square, at most
-FEW = 2  # a square with fewer is poor
+FEW = 2  # a square with fewer is poor;
+HORIZON_RAD = 0.15  # within this of the horizon, where what can be met first shows,
+APART_RAD = 0.056  # one with fewer than a corner for each square of this side,
+APART_PX = 12.6  # or of this, if larger
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 CLOSE_PX = 3  # corners as close as this are mistaken for each other if they look alike
 THRESHOLDS = (13, 90)
@@ -51,7 +54,8 @@ class CornerDetector:
         self._fast = Fast(*size)
         self._budget_squares = Squares(*size, SPREAD_PX)
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
-        self._most = max(round(MAX_TIMES_MEAN * settings.corners_target / SQUARES), FEW)
+        most = max(round(MAX_TIMES_MEAN * settings.corners_target / SQUARES), FEW)
+        self._most = np.full(self._squares.rows, most, np.int32)
         self._rectangles = np.asarray(self._squares.rectangles)
         self._among = memory_of(self._touched(visible))
         self._strong = FollowingThreshold(settings.fast_threshold, *THRESHOLDS)
@@ -62,16 +66,17 @@ class CornerDetector:
         """Threshold of the next frame, grey levels."""
         return self._strong.value
 
-    def detect(self, image: Grey, highest_row: float = math.nan) -> tuple[Corners, int]:
+    def detect(self, image: Grey, highest_row: float = math.nan, horizon_row: float = math.nan) -> tuple[Corners, int]:
         """Corners of a (height, width) image, and how many were left out because the budget was full.
 
-        ``highest_row``: px, above it nothing can be met, and faint corners are not looked for; NaN: unknown.
+        ``highest_row``: px, above it nothing can be met, and faint corners are not looked for. ``horizon_row``: px,
+        that of the horizon, around which more of them are. NaN: unknown.
         """
         image = np.ascontiguousarray(image)
         self._fast.look(image)
         found = self._look(image, self._strong.value, self._whole)
         if self._settings.fast_adaptive:
-            found = self._shared_out(image, found, highest_row)
+            found = self._shared_out(image, found, self._few(highest_row, horizon_row))
         pixel, strength, samples = found
         position = self._lens.undistort_pixels(pixel[:, 0], pixel[:, 1])
         if self._lens.is_distorted:
@@ -100,22 +105,36 @@ class CornerDetector:
             pixel, strength, samples = pixel[:count], strength[:count], samples[:count]
         return pixel, strength, samples
 
-    def _shared_out(self, image: Grey, looked: Found, highest_row: float) -> Found:
+    def _few(self, highest_row: float, horizon_row: float) -> npt.NDArray[np.int32]:
+        """Return with fewer corners than how many a square of each row is poor."""
+        side, rows = self._squares.side_px, self._squares.rows
+        few = np.full(rows, FEW, np.int32)
+        focal_px = math.sqrt(self._lens.fx * self._lens.fy)
+        top = np.arange(rows) * side - horizon_row
+        near = (top < HORIZON_RAD * focal_px) & (top + side > -HORIZON_RAD * focal_px)
+        few[near] = max(round((side / max(APART_RAD * focal_px, APART_PX)) ** 2), FEW)
+        if highest_row > 0:  # NaN is not
+            few[: max(int(highest_row / side) - ROWS_ABOVE, 0)] = 0
+        return few
+
+    def _shared_out(self, image: Grey, looked: Found, few: npt.NDArray[np.int32]) -> Found:
         """Limit every square to its share, and search poor ones again."""
         squares = self._squares
         pixel, strength, samples = strongest(squares, looked, self._most)
         found = 0
         if self._weak.value < self._strong.value:  # else it would find the same again
-            first_row = max(int(highest_row / squares.side_px) - ROWS_ABOVE, 0) if highest_row > 0 else 0  # NaN is not
             square = np.empty(len(pixel), np.int32)
-            poor = find_poor(squares, pixel.data, square.data, FEW, self._among, first_row)
+            poor = find_poor(squares, pixel.data, square.data, few.data, self._among)
+            poorest = np.bincount(square, minlength=squares.rows * squares.columns) < FEW
             threshold = self._weak.value
             parts = self._inside(self._rectangles[:poor])
             faint = self._look(image, threshold, parts, round(DARK_SHARE * threshold))
-            found = len(faint[0])
-            if found:  # includes the corners already found there
+            column, row = (faint[0] // squares.side_px).T
+            # where there are some already, many more would keep the threshold too high for what has next to none
+            found = int(np.count_nonzero(poorest[row * squares.columns + column]))
+            if len(faint[0]):  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, samples.data, square.data)
-                faint = strongest(squares, faint, FEW)
+                faint = strongest(squares, faint, few)
                 pixel = np.concatenate([pixel[:rich], faint[0]])
                 strength = np.concatenate([strength[:rich], faint[1]])
                 samples = np.concatenate([samples[:rich], faint[2]])
@@ -136,11 +155,11 @@ class CornerDetector:
         return np.maximum.reduceat(across, np.arange(rows) * side, axis=0)
 
 
-def strongest(squares: Squares, found: Found, share: int) -> Found:
-    """The ``share`` strongest corners of each square, in the same order; the arrays are written."""
+def strongest(squares: Squares, found: Found, share: npt.NDArray[np.int32]) -> Found:
+    """The ``share`` (of each row) strongest corners of each square, in the same order; the arrays are written."""
     pixel, strength, samples = found
     order, square = np.empty((2, len(pixel)), np.int32)
-    count = keep_strongest(squares, pixel.data, strength.data, samples.data, order.data, square.data, share)
+    count = keep_strongest(squares, pixel.data, strength.data, samples.data, order.data, square.data, share.data)
     return pixel[:count], strength[:count], samples[:count]
 
 

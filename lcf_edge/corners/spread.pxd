@@ -31,9 +31,9 @@ cpdef void keep_spread(Squares squares, const int[:, ::1] pixel, const float[::1
                        int[::1] place, int capacity) noexcept nogil
 @cython.locals(s=cython.int, i=cython.Py_ssize_t)
 cpdef int keep_strongest(Squares squares, int[:, ::1] pixel, float[::1] strength, unsigned char[:, ::1] samples,
-                         int[::1] order, int[::1] square, int share) noexcept nogil
-cpdef int find_poor(Squares squares, const int[:, ::1] pixel, int[::1] square, int few,
-                    const unsigned char[:, ::1] among, int first_row) noexcept nogil
+                         int[::1] order, int[::1] square, const int[::1] share) noexcept nogil
+cpdef int find_poor(Squares squares, const int[:, ::1] pixel, int[::1] square, const int[::1] few,
+                    const unsigned char[:, ::1] among) noexcept nogil
 @cython.locals(below=bint)
 cdef int add_rectangle(Squares squares, int found, int left, int right, int row) noexcept nogil
 cpdef int leave_poor(Squares squares, int[:, ::1] pixel, float[::1] strength, unsigned char[:, ::1] samples,

@@ -143,11 +143,12 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, order: Column, 
 
 
 def keep_strongest(
-    squares: Squares, pixel: Grid, strength: Column, samples: Grid, order: Column, square: Column, share: int
+    squares: Squares, pixel: Grid, strength: Column, samples: Grid, order: Column, square: Column, share: Column
 ) -> int:
-    """Move the ``share`` strongest corners of each square to the front, in the same order. Return how many.
+    """Move the strongest corners of each square to the front, in the same order. Return how many.
 
-    ``strength``: whole, below ``LEVELS``. ``order``, ``square``: int32 (n,), written.
+    ``share``: int32 (rows,), of a square of each row, how many at most. ``strength``: whole, below ``LEVELS``.
+    ``order``, ``square``: int32 (n,), written.
     """
     counted = squares.counted
     count(squares, pixel, square)
@@ -155,7 +156,7 @@ def keep_strongest(
     for k in range(pixel.shape[0] - 1, -1, -1):
         i = order[k]
         s = square[i]
-        if counted[s] > share:
+        if counted[s] > share[s // squares.columns]:
             counted[s] -= 1
             square[i] = LEAVES
     kept = 0
@@ -166,18 +167,18 @@ def keep_strongest(
     return kept
 
 
-def find_poor(squares: Squares, pixel: Grid, square: Column, few: int, among: Grid, first_row: int) -> int:
+def find_poor(squares: Squares, pixel: Grid, square: Column, few: Column, among: Grid) -> int:
     """Mark the squares that have less than ``few`` corners, and make rectangles of them.
 
-    ``square``: int32 (n,), written. ``among``: uint8 (rows, columns), 0: not this one; nor those above ``first_row``.
-    Neighbours in a row are one rectangle, and so are rows with the same ones below each other. Return how many there
-    are.
+    ``few``: int32 (rows,), for the squares of each row. ``square``: int32 (n,), written. ``among``: uint8 (rows,
+    columns), 0: not this one. Neighbours in a row are one rectangle, and so are rows with the same ones below each
+    other. Return how many there are.
     """
     count(squares, pixel, square)
     for row in range(squares.rows):
         for column in range(squares.columns):
             s = row * squares.columns + column
-            squares.poor[s] = squares.counted[s] < few and row >= first_row and among[row, column] != 0
+            squares.poor[s] = squares.counted[s] < few[row] and among[row, column] != 0
     found = 0
     for row in range(squares.rows):
         column = 0

@@ -1,6 +1,7 @@
 """Corners: where they are found, how many are kept, and what they look like."""
 
 import itertools
+import math
 from collections import Counter
 from collections.abc import Callable
 from typing import Any
@@ -162,6 +163,22 @@ def test_a_dark_body_before_a_bright_skyline_has_corners_of_its_own() -> None:
     inside = 210, 290, 430, 390
     assert within(np.array([each.pt for each in everywhere]), *inside) == 0
     assert within(corners.pixel, *inside) >= 15
+
+
+def test_near_the_horizon_a_wide_lens_has_more_corners_because_all_is_smaller() -> None:
+    image = dark_body()
+
+    def inside(focal_px: float, horizon_row: float) -> int:
+        lens = Lens(640, 480, focal_px, focal_px, 319.5, 239.5)
+        adaptive = CornerDetector(Filter(), lens, 1500)
+        for _ in range(40):
+            corners, _ = adaptive.detect(image, horizon_row=horizon_row)
+        return within(corners.pixel, 210, 290, 430, 390)
+
+    narrow, wide = 500.0, 224.0
+    assert inside(narrow, 340.0) == inside(narrow, math.nan)
+    assert inside(wide, 60.0) == inside(wide, math.nan)  # not the horizon
+    assert inside(wide, 340.0) > 3 * inside(wide, math.nan)
 
 
 @pytest.mark.parametrize(("darkest", "some"), [(20, True), (110, False)])

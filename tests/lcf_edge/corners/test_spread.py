@@ -8,7 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.corners.detector import FEW, SQUARES, side_px, strongest, strongest_spread
+from lcf_edge.corners.detector import SQUARES, side_px, strongest, strongest_spread
 from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, leave_poor
 
 SIDE_PX = 40
@@ -122,8 +122,12 @@ def image() -> Squares:
     return Squares(WIDTH, HEIGHT, side_px(WIDTH, HEIGHT))
 
 
-@given(places=PLACES, most=st.integers(1, 5), seed=st.integers(0, 99))
-def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, seed: int) -> None:
+BY_ROW = st.lists(st.integers(0, 5), min_size=12, max_size=12)
+"""A number for the squares of each row."""
+
+
+@given(places=PLACES, most=BY_ROW, seed=st.integers(0, 99))
+def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: list[int], seed: int) -> None:
     pixel = in_image(places)
     strength = np.random.default_rng(seed).permutation(len(pixel)).astype(np.float32)
     square = squares(pixel, image().side_px)
@@ -131,30 +135,27 @@ def test_of_every_square_the_strongest(places: set[tuple[int, int]], most: int, 
     expected = []
     for row, name in enumerate(square):
         stronger = sum(strength[other] > strength[row] for other, each in enumerate(square) if each == name)
-        if stronger < most:
+        if stronger < most[name[1]]:
             expected.append((pixel[row].tolist(), float(strength[row]), looks[row].tolist()))
-    found = strongest(image(), (pixel.copy(), strength.copy(), looks.copy()), most)
+    found = strongest(image(), (pixel.copy(), strength.copy(), looks.copy()), np.array(most, np.int32))
     assert list(zip(*(each.tolist() for each in found), strict=True)) == expected
 
 
-@given(places=PLACES, first_row=st.integers(0, 5), without=st.sets(st.integers(0, 191)))
+@given(places=PLACES, few=BY_ROW, without=st.sets(st.integers(0, 191)))
 def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
-    places: set[tuple[int, int]], first_row: int, without: set[int]
+    places: set[tuple[int, int]], few: list[int], without: set[int]
 ) -> None:
     looked_at, pixel = image(), in_image(places)
     among = np.ones((looked_at.rows, looked_at.columns), np.uint8)
     among.ravel()[list(without)] = 0
     square = np.empty(len(pixel), np.int32)
-    count = find_poor(looked_at, pixel.data, square.data, FEW, among.data, first_row)
+    count = find_poor(looked_at, pixel.data, square.data, np.array(few, np.int32).data, among.data)
     covered = np.zeros((looked_at.rows * looked_at.side_px, looked_at.columns * looked_at.side_px), np.int32)
     for left, top, right, bottom in np.asarray(looked_at.rectangles)[:count].tolist():
         covered[top:bottom, left:right] += 1
     held = Counter(squares(pixel, looked_at.side_px))
     poor = [
-        [
-            int(held[column, row] < FEW and row >= first_row and among[row, column] != 0)
-            for column in range(looked_at.columns)
-        ]
+        [int(held[column, row] < few[row] and among[row, column] != 0) for column in range(looked_at.columns)]
         for row in range(looked_at.rows)
     ]
     assert np.array_equal(covered, np.kron(poor, np.ones((looked_at.side_px, looked_at.side_px), np.int32)))
