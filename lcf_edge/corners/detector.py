@@ -19,7 +19,7 @@ SQUARES = 192  # approximate number that an image is divided into
 MAX_TIMES_MEAN = 4.0  # corners of a square, at most
 FEW = 2  # a square with fewer is poor;
 HORIZON_RAD = 0.15  # within this of the horizon, where what can be met first shows,
-APART_RAD = 0.056  # one with fewer than a corner for each square of this side,
+APART_RAD = 0.056  # so is one with fewer than a corner for each patch of this side,
 APART_PX = 12.6  # or of this, if larger
 SPREAD_PX = 40  # a frame with too many corners keeps the strongest of each such square first
 CLOSE_PX = 3  # corners as close as this are mistaken for each other if they look alike
@@ -106,7 +106,7 @@ class CornerDetector:
         return pixel, strength, samples
 
     def _few(self, highest_row: float, horizon_row: float) -> npt.NDArray[np.int32]:
-        """Return with fewer corners than how many a square of each row is poor."""
+        """Return, for each row of squares, the number of corners below which a square is poor; int32 (rows,)."""
         side, rows = self._squares.side_px, self._squares.rows
         few = np.full(rows, FEW, np.int32)
         focal_px = math.sqrt(self._lens.fx * self._lens.fy)

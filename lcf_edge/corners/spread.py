@@ -168,7 +168,7 @@ def keep_strongest(
 
 
 def find_poor(squares: Squares, pixel: Grid, square: Column, few: Column, among: Grid) -> int:
-    """Mark the squares that have less than ``few`` corners, and make rectangles of them.
+    """Mark the squares that have fewer than ``few`` corners, and make rectangles of them.
 
     ``few``: int32 (rows,), for the squares of each row. ``square``: int32 (n,), written. ``among``: uint8 (rows,
     columns), 0: not this one. Neighbours in a row are one rectangle, and so are rows with the same ones below each

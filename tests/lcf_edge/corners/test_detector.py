@@ -165,6 +165,15 @@ def test_a_dark_body_before_a_bright_skyline_has_corners_of_its_own() -> None:
     assert within(corners.pixel, *inside) >= 15
 
 
+def test_above_what_can_be_met_no_faint_corners_are_looked_for() -> None:
+    image = dark_body()
+    adaptive = detector(image, Filter())
+    for _ in range(40):
+        corners, _ = adaptive.detect(image, highest_row=450.0)
+    assert within(corners.pixel, 210, 290, 430, 350) == 0
+    assert within(settled(image, Filter())[1].pixel, 210, 290, 430, 350) > 5
+
+
 def test_near_the_horizon_a_wide_lens_has_more_corners_because_all_is_smaller() -> None:
     image = dark_body()
 
