@@ -130,7 +130,7 @@ class CornerDetector:
             parts = self._inside(self._rectangles[:poor])
             faint = self._look(image, threshold, parts, round(DARK_SHARE * threshold))
             column, row = (faint[0] // squares.side_px).T
-            # where there are some already, many more would keep the threshold too high for what has next to none
+            # only the poorest steer the threshold: what the others ask for would raise it above what these show
             found = int(np.count_nonzero(poorest[row * squares.columns + column]))
             if len(faint[0]):  # includes the corners already found there
                 rich = leave_poor(squares, pixel.data, strength.data, samples.data, square.data)
