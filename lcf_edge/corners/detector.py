@@ -110,9 +110,10 @@ class CornerDetector:
         side, rows = self._squares.side_px, self._squares.rows
         few = np.full(rows, FEW, np.int32)
         focal_px = math.sqrt(self._lens.fx * self._lens.fy)
-        top = np.arange(rows) * side - horizon_row
-        near = (top < HORIZON_RAD * focal_px) & (top + side > -HORIZON_RAD * focal_px)
-        few[near] = max(round((side / max(APART_RAD * focal_px, APART_PX)) ** 2), FEW)
+        if math.isfinite(horizon_row):
+            first, end = horizon_row - HORIZON_RAD * focal_px, horizon_row + HORIZON_RAD * focal_px
+            near = slice(max(math.floor(first / side), 0), max(math.ceil(end / side), 0))
+            few[near] = max(round((side / max(APART_RAD * focal_px, APART_PX)) ** 2), FEW)
         if highest_row > 0:  # NaN is not
             few[: max(int(highest_row / side) - ROWS_ABOVE, 0)] = 0
         return few
