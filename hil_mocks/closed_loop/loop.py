@@ -59,7 +59,7 @@ class Log:
     cruise_mps: list[float] = field(default_factory=list)
     target_mps: list[float] = field(default_factory=list)
     speed_mps: list[float] = field(default_factory=list)
-    in_view: list[frozenset[int]] = field(default_factory=list)  # numbers of what the camera could see
+    in_view: list[frozenset[int]] = field(default_factory=list)  # numbers of what was in sight
     contacts: list[Contact] = field(default_factory=list)
     distance_m: float = 0.0
     seconds: float = 0.0
@@ -106,7 +106,7 @@ def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
         log.cruise_mps.append(cruise_mps)
         log.target_mps.append(target_mps)
         log.speed_mps.append(speed_mps)
-        log.in_view.append(frozenset(each.number for each in known))
+        log.in_view.append(frozenset(each.number for each in known if each.in_sight))
         advance(seq * steps + LATE_STEPS, (seq + 1) * steps)
         left_m = world.course.length_m - vehicle.travelled_m
         stood_s = stood_s + 1 / world.fps if vehicle.speed_mps < STANDS_MPS else 0.0

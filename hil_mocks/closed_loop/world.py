@@ -16,6 +16,8 @@ _EVEN_SHARE = 0.1  # of its speed: less sideways motion counts as straight ahead
 _PATIENCE_S = 3.0
 _NEAR_M = 8.0
 _TURNING_RADPS = 3.0
+_TURNS_MPS = 0.1  # a slower mover keeps its heading
+_EVADES_MPS2 = 4.0  # acceleration with which it steps aside
 _GONE_M = 1e4
 
 LENS, NOISE, STEADY, GREY = Lens(), SensorNoise(), Profile(((0.0, 1.0),)), Paint(0)
@@ -124,6 +126,7 @@ class _Mover:
         self.leg = 0
         self.rests_s = 0.0
         self.speed_mps = 0.0
+        self.evades: Floats = np.zeros(2)  # its velocity less the one that its legs demand, m/s
         self.side = 0  # that it goes round what is in its way, 1: to the right of what it wants
         self.hindered_s = 0.0
         self.patience_s = _PATIENCE_S
@@ -159,12 +162,11 @@ class Bodies:
         """Advance all movers by one step."""
         for mover in self._movers:
             wish = self._wish(mover, dt_s, vehicle.travelled_m)
-            if wish.any():
-                wish = self._around(mover, wish, vehicle, dt_s)
+            wish += self._evades(mover, wish, vehicle, dt_s)
             row = mover.row
             self.velocity[row] = wish
             self.position[row] += wish * dt_s
-            if wish.any():
+            if math.hypot(*wish) > _TURNS_MPS:
                 way = math.atan2(-wish[0], wish[1]) - self.heading[row]
                 way = math.remainder(way, math.tau)
                 self.heading[row] += min(max(way, -_TURNING_RADPS * dt_s), _TURNING_RADPS * dt_s)
@@ -188,6 +190,15 @@ class Bodies:
             mover.rests_s = leg.rest_s
         velocity: Floats = rest * (mover.speed_mps / max(left_m, 1e-9))
         return velocity
+
+    def _evades(self, mover: _Mover, wish: Floats, vehicle: Vehicle, dt_s: float) -> Floats:
+        """Its deviation from a wanted velocity; it changes steadily, so that who is hemmed in does not tremble."""
+        if not wish.any():
+            mover.evades = np.zeros(2)
+            return mover.evades
+        change = self._around(mover, wish, vehicle, dt_s) - wish - mover.evades
+        mover.evades = mover.evades + change * min(_EVADES_MPS2 * dt_s / max(float(np.hypot(*change)), 1e-9), 1.0)
+        return mover.evades
 
     def _around(self, mover: _Mover, wish: Floats, vehicle: Vehicle, dt_s: float) -> Floats:
         """Adapt a wanted velocity to avoid others nearby, and the vehicle, if that is slow or cannot see the mover.

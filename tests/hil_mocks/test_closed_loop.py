@@ -147,6 +147,19 @@ def test_nobody_walks_through_a_box() -> None:
     assert bodies.position[0, 1] == pytest.approx(12.0, abs=0.1)
 
 
+@pytest.mark.parametrize("aside_m", [1.1, 1.2, 1.3, 1.4])
+def test_who_is_hemmed_in_moves_steadily(aside_m: float) -> None:
+    boxes = (body(side * aside_m, 0.5, name=f"box_{side}", width=1.0, length=1.0) for side in (-1, 1))
+    drawn = world(body(0.1, 3.0, Leg(0.0, -3.0, 1.0)), *boxes, start_mps=0.0)
+    vehicle, bodies = Vehicle(drawn.build, drawn.course), Bodies(drawn)
+    before, turned = bodies.velocity[0].copy(), bodies.heading[0]
+    for _ in range(800):
+        bodies.step(0.01, vehicle)
+        assert np.hypot(*(bodies.velocity[0] - before)) <= (3.0 + 4.0) * 0.01  # what legs and evading demand
+        assert bodies.heading[0] == turned or np.hypot(*bodies.velocity[0]) > 0.1
+        before, turned = bodies.velocity[0].copy(), bodies.heading[0]
+
+
 def test_a_leg_waits_for_the_vehicle() -> None:
     driver = Watching(1.0)
     ended(world(body(-1.5, 6.0, Leg(3.0, 6.0, 1.0, from_m=2.0))), driver, 4.0)
@@ -278,6 +291,12 @@ def log_of(*targets_mps: float, contacts: tuple[Contact, ...] = ()) -> Log:
     count = len(targets_mps)
     in_view: list[frozenset[int]] = [frozenset()] * count
     return Log([1.0] * count, list(targets_mps), list(targets_mps), in_view, list(contacts), 10.0, 10.0)
+
+
+def test_a_sliver_at_the_border_is_not_in_sight() -> None:
+    edge_m = 5.0 * SMALL.width / 2 / SMALL.focal_px
+    log = ended(world(body(edge_m + 0.4, 5.2), body(0.5, 8.0, name="box"), start_mps=0.0), Watching(0.0), 0.1)
+    assert log.in_view[0] == {1}
 
 
 def test_a_braking_is_one_until_it_is_over() -> None:
