@@ -35,6 +35,7 @@ cdef double DEPTH_SHARE
 cdef double MIN_DEPTH
 cdef double MIN_WEIGHT
 cdef double MIN_SHARE
+cdef double UNSTEADY
 cdef double CALIBRATION
 cdef double RANGE_SHARE
 cdef int RANGE
@@ -65,7 +66,7 @@ cdef double memory_likelihood(Evidence evidence, double inverse, Situation aroun
 cdef double speed_change_log(Evidence evidence, double inverse) noexcept nogil
 cdef double small_log(Evidence evidence, double inverse) noexcept nogil
 cdef double walking_mps(Situation around) noexcept nogil
-@cython.locals(most=double, stands=double, moves=double, inverse=double, place=double)
+@cython.locals(most=double, stands=double, moves=double, inverse=double, place=double, changed=double)
 cdef void weigh(Belief belief, Evidence evidence, Situation around) noexcept nogil
 @cython.locals(expected=double, wrong=double, expected_var=double, measured=double, gain=double)
 cdef void suppose_standing(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil

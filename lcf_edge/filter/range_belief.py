@@ -46,6 +46,7 @@ MAX_HALF_WIDTH = 1.0  # which counts up to this share of the range: a wider box 
 DEPTH_SHARE = 0.2  # 1 sigma of that distance, as a share of half the width,
 MIN_DEPTH = 0.015  # plus this share of the range
 MIN_WEIGHT = 0.2  # total weight of the pairs that a mean needs
+UNSTEADY = 0.1  # likelihood of any range of a mover by the change of its looming: its own velocity may have changed
 CALIBRATION = 0.9  # of all sigmas: then they hold the truth as often as they should, in worlds of the closed loop
 RANGE_SHARE = 0.18  # 1 sigma of the range, as a share, that images of one object have in common
 MIN_SHARE = 1e-5  # pairs with less weight are left out
@@ -162,14 +163,16 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
     for k in range(RANGES):
         belief.inverse[k] = inverse
         place = math.log(memory_likelihood(evidence, inverse, around))
-        place += small_log(evidence, inverse) + speed_change_log(evidence, inverse)
+        place += small_log(evidence, inverse)
         if around.camera_height_m > 0:
             place += math.log(foot_likelihood(evidence, inverse, around))
+        changed = speed_change_log(evidence, inverse)
         dm = evidence.looming - inverse * evidence.reference
         wrong = SPEED_SHARE * inverse * evidence.reference
         floor = MIN_SIGMA_HZ * MIN_SIGMA_HZ
         mm, qq = evidence.mm + wrong * wrong + floor, evidence.qq + floor
-        belief.standing[k] = place + ODDS + evidence.log_odds + log_normal2(dm, evidence.sideways, mm, qq, evidence.mq)
+        belief.standing[k] = place + changed + ODDS + evidence.log_odds
+        belief.standing[k] += log_normal2(dm, evidence.sideways, mm, qq, evidence.mq)
         free, along = inverse * walks, inverse * ALONG_MPS
         slow = inverse * SLOW_MPS
         slow_log = log_normal2(dm, evidence.sideways, mm + slow * slow, qq + slow * slow, evidence.mq)
@@ -177,7 +180,7 @@ def weigh(belief: Belief, evidence: Evidence, around: Situation) -> None:
         free_log = log_normal2(dm, evidence.sideways, mm, qq + free * free, evidence.mq)
         along_log = log_normal2(dm, evidence.sideways, mm, qq + along * along, evidence.mq)
         likelihood = ALONG * math.exp(along_log) + SLOW * math.exp(slow_log) + (1 - ALONG - SLOW) * math.exp(free_log)
-        belief.moving[k] = place + math.log(likelihood + TINY)
+        belief.moving[k] = place + math.log(UNSTEADY + math.exp(changed)) + math.log(likelihood + TINY)
         most = max(most, belief.standing[k], belief.moving[k])
         inverse *= ratio
     stands = moves = 0.0

@@ -177,6 +177,14 @@ def test_a_foot_that_shows_no_edge_lies_below_by_less_than_a_metre(situation: Si
     assert belief.mean[RANGE] == pytest.approx(range_m, rel=0.15 if lifted_m == 0 else 0.8)
 
 
+def test_who_changes_his_velocity_with_the_vehicle_is_not_put_behind_his_feet(situation: Situation) -> None:
+    """While the vehicle brakes he starts to walk: by how the looming changed, he would be far beyond his feet."""
+    changed = {"inverse": 0.4, "inverse_var": 0.1**2}
+    evidence = evidence_of(0.6, 0.15, 0.0, 0.0, 0.05, is_cut=True, **changed)
+    belief = belief_of(evidence, situation(speed_mps=0.05))
+    assert belief.mean[RANGE] < 0.75
+
+
 def test_a_belief_does_not_jump(situation: Situation) -> None:
     """A poor foot alone says 8 m; before, the thing was at 3 m."""
     around = situation(speed_mps=1.0)
