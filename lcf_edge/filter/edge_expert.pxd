@@ -6,6 +6,9 @@ from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.settings cimport Settings
 from lcf_edge.filter.situation cimport Situation
 
+cdef double USUAL_SHARE
+cdef double LEAST_SHARPNESS
+cdef int MIN_TRUSTED
 cdef double MIN_CORR
 cdef int CROSSING
 cdef double SWING_SHARE
@@ -22,6 +25,7 @@ cdef double direct(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept n
 cpdef void predict(EdgeColumns edges, CircleColumns normal, Situation around, Settings settings) noexcept nogil
 cdef int relation_of(EdgeColumns edges, Py_ssize_t i, double x, double y, double delta_px, Settings settings) noexcept nogil
 cdef void go_on(EdgeColumns edges, Py_ssize_t i) noexcept nogil
+cdef double sharpness(EdgeColumns edges, Settings settings) noexcept nogil
 cpdef void update(EdgeColumns edges, CircleColumns normal, CircleColumns rebel, CornerColumns corners, double sigma_px, Situation around, Settings settings) noexcept nogil
 cdef void take_corner(EdgeColumns edges, Py_ssize_t i, CornerColumns corners, Py_ssize_t corner, double dt_s) noexcept nogil
 cdef void correct(EdgeColumns edges, Py_ssize_t i, CircleColumns normal, CircleColumns rebel, double x, double y, Situation around, Settings settings) noexcept nogil

@@ -20,6 +20,9 @@ ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
 FIRST_SPEED_SHARE = 0.5  # 1 sigma of V of a new landmark, as a share of it: its depth is not known
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
+USUAL_SHARE = 0.6  # of the trusted edges of a sharp image are found; where fewer are, a miss tells less
+LEAST_SHARPNESS = 0.2  # but it always tells something
+MIN_TRUSTED = 15  # edges by which that is judged
 JOIN_GATE_SHARE = 0.25  # gate of a new edge in a rebel circle, as a share of the circle's motion
 
 
@@ -78,6 +81,21 @@ def go_on(edges: EdgeColumns, i: int) -> None:
     edges.x[i], edges.y[i], edges.speed[i] = edges.predicted_x[i], edges.predicted_y[i], edges.predicted_speed[i]
 
 
+def sharpness(edges: EdgeColumns, settings: Settings) -> float:
+    """Share of the trusted edges that found a corner, of what is usual; 1 where there are too few to judge by.
+
+    Motion blur loses most corners of an image, though their edges go on.
+    """
+    found = trusted = 0
+    for i in range(edges.count):
+        if edges.trust[i] >= settings.tr_s and not edges.held[i]:
+            trusted += 1
+            found += 1 if edges.corner[i] >= 0 else 0
+    if trusted < MIN_TRUSTED:
+        return 1.0
+    return min(max(found / (USUAL_SHARE * trusted), LEAST_SHARPNESS), 1.0)
+
+
 def update(
     edges: EdgeColumns,
     normal: CircleColumns,
@@ -92,12 +110,13 @@ def update(
     ``sigma_px``: 1 sigma of the image motion by the rotation.
     """
     delta_px, dt_s = settings.delta_px + ROTATION_SIGMAS * sigma_px, around.dt_s
+    unmatched = sharpness(edges, settings) * edge_equations.UNMATCHED
     for i in range(edges.count):
         edges.matched[i] = 0
         error_matrix.predict(edges, i, dt_s)
         corner = edges.corner[i]
         if corner < 0:
-            change = 0.0 if edges.held[i] else edge_equations.UNMATCHED
+            change = 0.0 if edges.held[i] else unmatched
             edges.trust[i] = edge_equations.change_trust(edges.trust[i], change, settings.tr_max)
             go_on(edges, i)
             continue

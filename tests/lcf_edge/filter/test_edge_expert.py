@@ -1,4 +1,4 @@
-"""What crosses and comes near is followed although it accelerates in the image."""
+"""What crosses and comes near is followed although it accelerates in the image; blur does not end what it hides."""
 
 import numpy as np
 import pytest
@@ -59,3 +59,36 @@ def test_the_prediction_keeps_its_weight_where_nothing_accelerates(
     weight = TR_MAX - SETTINGS.tr_cr
     off = float(np.hypot(behind_px, aside_px))
     assert left_behind(step_px, behind_px, aside_px) == pytest.approx(off * weight / (weight + 1))
+
+
+# Edges without a corner
+
+
+def lost(trusted: int, found: int) -> float:
+    """Trust that a new edge without a corner loses beside ``trusted`` edges, of which so many are found."""
+    edges, normal, rebel, corners = EdgeTable(50, 2, 2), CircleTable(2), CircleTable(2), CornerTable(50)
+    edges.append(trusted + 1)
+    rows = np.arange(trusted + 1)
+    edges.x[rows] = edges.predicted_x[rows] = corners.x[rows] = 100.0 + 10 * rows
+    edges.y[rows] = edges.predicted_y[rows] = corners.y[rows] = 200.0
+    edges.cos[rows], edges.sin[rows], edges.bl[rows] = 1.0, 0.0, 12.0
+    edges.trust[rows], edges.corner[rows] = TR_MAX, np.where(rows < found, rows, -1)
+    edges.trust[trusted], edges.corner[trusted] = SETTINGS.tr_new, -1
+    around = Situation(Config(), PINHOLE)
+    around.dt_s = DT_S
+    edge_expert.update(edges.columns, normal.columns, rebel.columns, corners.columns, 0.0, around, SETTINGS)
+    return float(SETTINGS.tr_new - edges.trust[trusted])
+
+
+@pytest.mark.parametrize("found", [24, 32, 40])
+def test_in_a_sharp_image_a_missing_corner_costs_a_whole_point(found: int) -> None:
+    assert lost(40, found) == 1.0
+
+
+@pytest.mark.parametrize(("found", "cost"), [(0, 0.2), (4, 0.2), (6, 0.25), (12, 0.5)])
+def test_where_blur_loses_most_it_costs_as_much_less(found: int, cost: float) -> None:
+    assert lost(40, found) == pytest.approx(cost)
+
+
+def test_a_few_edges_show_no_blur() -> None:
+    assert lost(14, 0) == 1.0
