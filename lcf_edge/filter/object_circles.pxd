@@ -22,7 +22,6 @@ cdef double INFINITY
 
 cdef bint is_sure(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-cdef double contact_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(o=Py_ssize_t)
 cdef void correct(ObjectColumns objects, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint is_inside(CircleColumns circles, Py_ssize_t c, ObjectColumns objects, Py_ssize_t o) noexcept nogil

@@ -31,17 +31,11 @@ def cause_of(objects: ObjectColumns, o: int) -> int:
     return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
 
 
-def contact_of(objects: ObjectColumns, o: int) -> float:
-    """Time to contact of the circles of an object, s, INFINITY: it does not come."""
-    return objects.ttc[o] if objects.ttc[o] > 0 else INFINITY
-
-
 def correct(objects: ObjectColumns, circles: CircleColumns, settings: Settings) -> None:
     """Circles of moving objects take cause, range and lateral miss from their object.
 
-    They keep their own time to contact, on which their prediction rests, while they are seen themselves; else their
-    contact would come though the object shows that it does not. Circles of stationary objects measure better by
-    themselves; an incoming circle is corrected only where the object crosses.
+    They keep their own time to contact, on which their prediction rests. Circles of stationary objects measure better
+    by themselves; an incoming circle is corrected only where the object crosses.
     """
     for c in range(circles.capacity):
         o = circles.square[c]
@@ -49,8 +43,6 @@ def correct(objects: ObjectColumns, circles: CircleColumns, settings: Settings) 
             continue
         if objects.class_id[o] == UNKNOWN or objects.class_id[o] == STANDING:
             continue
-        if circles.unseen_s[c] > 0:
-            circles.ttc[c] = contact_of(objects, o)
         if circles.cause[c] != COMES or objects.class_id[o] == CROSSING:
             circles.cause[c] = cause_of(objects, o)
             circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
@@ -92,7 +84,7 @@ def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around:
     reach = 0.5 * max(objects.width[o], objects.height[o])
     circles.radius[c] = min(max(reach, shared.MIN_RADIUS_PX), settings.bs_px)
     circles.trust[c], circles.support[c], circles.cause[c] = settings.tr_s, objects.support[o], COMES
-    circles.ttc[c] = contact_of(objects, o)
+    circles.ttc[c] = objects.ttc[o] if objects.ttc[o] > 0 else INFINITY
     circles.range[c], circles.lateral[c] = objects.range[o], objects.lateral[o]
 
 

@@ -214,18 +214,6 @@ def test_circles_of_what_crosses_take_cause_range_and_miss_from_their_object(
     assert circles_reported > 5
 
 
-@pytest.mark.parametrize(("ttc_s", "unseen_s", "told_s"), [(np.inf, 0.1, np.inf), (2.0, 0.1, 2.0), (np.inf, 0.0, 0.6)])
-def test_a_circle_that_is_lost_has_the_contact_of_what_is_seen_to_move(
-    situation: Situation, ttc_s: float, unseen_s: float, told_s: float
-) -> None:
-    known = Known(situation(), probability=0.1)
-    known.objects.class_id[0], known.objects.ttc[0] = ObjectClass.LEADING, ttc_s
-    known.add_circle(0, 350.0, 5.0, square=0)
-    known.circles.cause[0], known.circles.ttc[0], known.circles.unseen_s[0] = Cause.LEADING, 0.6, unseen_s
-    known.update()
-    assert known.circles.ttc[0] == told_s
-
-
 # New edges in its circles
 
 
