@@ -14,6 +14,8 @@ RING_PX = (
     (6, 2), (2, 6), (-2, 6), (-6, 2), (-6, -2), (-2, -6), (2, -6), (6, -2),
 )  # fmt: skip
 MEAN_GREY = 128
+NOISE = 3  # grey levels
+ALIKE_SHARE = 0.6  # of the contrast; at half of it one is taken for the other
 
 _RING = np.array(RING_PX)
 
@@ -56,3 +58,13 @@ def sample(image: Column, width: int, pixel: Grid, ring: Column, samples: Grid) 
         for k in range(16):
             grey = samples[i, k] + shift
             samples[i, k] = min(max(grey, 0), 255)
+
+
+def look_alike(samples: Grid, i: int, k: int) -> bool:
+    """Whether two appearances differ by less than noise and a share of the higher one's contrast."""
+    differences = one = other = 0
+    for s in range(16):
+        differences += abs(samples[i, s] - samples[k, s])
+        one += abs(samples[i, s] - MEAN_GREY)
+        other += abs(samples[k, s] - MEAN_GREY)
+    return bool(differences < 16 * NOISE + ALIKE_SHARE * max(one, other))

@@ -101,7 +101,9 @@ class CornerDetector:
         samples = appearance(image, pixel)
         if self._settings.fast_adaptive:
             beaten = np.empty(len(pixel), np.uint8)
-            count = keep_distinct(pixel.data, strength.data, samples.data, beaten.data, CLOSE_PX)
+            count = keep_distinct(
+                pixel.data, strength.data, samples.data, words_of(samples).data, beaten.data, CLOSE_PX
+            )
             pixel, strength, samples = pixel[:count], strength[:count], samples[:count]
         return pixel, strength, samples
 
@@ -134,7 +136,7 @@ class CornerDetector:
             # only the poorest steer the threshold: what the others ask for would raise it above what these show
             found = int(np.count_nonzero(poorest[row * squares.columns + column]))
             if len(faint[0]):  # includes the corners already found there
-                rich = leave_poor(squares, pixel.data, strength.data, samples.data, square.data)
+                rich = leave_poor(squares, pixel.data, strength.data, words_of(samples).data, square.data)
                 faint = strongest(squares, faint, few)
                 pixel = np.concatenate([pixel[:rich], faint[0]])
                 strength = np.concatenate([strength[:rich], faint[1]])
@@ -160,7 +162,9 @@ def strongest(squares: Squares, found: Found, share: npt.NDArray[np.int32]) -> F
     """The ``share`` (of each row) strongest corners of each square, in the same order; the arrays are written."""
     pixel, strength, samples = found
     order, square = np.empty((2, len(pixel)), np.int32)
-    count = keep_strongest(squares, pixel.data, strength.data, samples.data, order.data, square.data, share.data)
+    count = keep_strongest(
+        squares, pixel.data, strength.data, words_of(samples).data, order.data, square.data, share.data
+    )
     return pixel[:count], strength[:count], samples[:count]
 
 
@@ -170,6 +174,11 @@ def strongest_spread(squares: Squares, pixel: Pixels, strength: Strengths, capac
     count = min(capacity, len(pixel))
     keep_spread(squares, pixel.data, strength.data, order.data, place.data, count)
     return place[:count]
+
+
+def words_of(samples: npt.NDArray[np.uint8]) -> npt.NDArray[np.uint64]:
+    """Appearances, uint8 (n, 16), as uint64 (n, 2): the same memory."""
+    return samples.view(np.uint64)
 
 
 def side_px(width: int, height: int) -> int:

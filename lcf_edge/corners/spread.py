@@ -9,14 +9,12 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from lcf_edge.corners import appearance
 from lcf_edge.filter import rounding
 from lcf_edge.filter.memory import integers, memory_of, octets
 
 Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
 Grid: TypeAlias = Any  # and [i, j]
-MEAN_GREY = 128  # of an appearance
-NOISE = 3  # grey levels
-ALIKE_SHARE = 0.6  # of the contrast; at half of it one is taken for the other
 LEVELS = 256  # of strength
 LEAVES = -1  # in place of a square: the corner is surplus
 
@@ -39,18 +37,12 @@ class Squares:
         self.rectangles = integers(self.rows * self.columns, 4)
 
 
-def move(pixel: Grid, strength: Column, samples: Grid, i: int, to: int) -> None:
-    """Move a corner to another row: ``pixel``, int32 (n, 2), ``strength``, float32 (n,), and its appearance."""
-    pixel[to, 0], pixel[to, 1], strength[to] = pixel[i, 0], pixel[i, 1], strength[i]
-    for s in range(16):
-        samples[to, s] = samples[i, s]
-
-
-def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, reach: int) -> int:
+def keep_distinct(pixel: Grid, strength: Column, samples: Grid, words: Grid, beaten: Column, reach: int) -> int:
     """Move the corners without a stronger one that lies close and looks alike to the front, in the same order.
 
     Of equals the first stays. Close: no more than ``reach`` px away, both across and down. ``pixel``: int32 (n, 2),
-    part by part of an image, row by row; parts do not rival each other. ``samples``: uint8 (n, 16), the appearances.
+    part by part of an image, row by row; parts do not rival each other. ``samples``: uint8 (n, 16), the appearances,
+    ``words``: uint64 (n, 2), the same memory, which moves faster.
     ``beaten``: uint8 (n,), written. Return how many are kept.
     """
     corners = pixel.shape[0]
@@ -61,24 +53,15 @@ def keep_distinct(pixel: Grid, strength: Column, samples: Grid, beaten: Column, 
             across, down = pixel[k, 0] - pixel[i, 0], pixel[k, 1] - pixel[i, 1]
             if down < 0 or down > reach:
                 break
-            if abs(across) <= reach and look_alike(samples, i, k):
+            if abs(across) <= reach and appearance.look_alike(samples, i, k):
                 beaten[i if strength[k] > strength[i] else k] = 1
     kept = 0
     for i in range(corners):
         if not beaten[i]:
-            move(pixel, strength, samples, i, kept)
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            words[kept, 0], words[kept, 1] = words[i, 0], words[i, 1]
             kept += 1
     return kept
-
-
-def look_alike(samples: Grid, i: int, k: int) -> bool:
-    """Whether two appearances differ by less than noise and a share of the higher one's contrast."""
-    differences = one = other = 0
-    for s in range(16):
-        differences += abs(samples[i, s] - samples[k, s])
-        one += abs(samples[i, s] - MEAN_GREY)
-        other += abs(samples[k, s] - MEAN_GREY)
-    return bool(differences < 16 * NOISE + ALIKE_SHARE * max(one, other))
 
 
 def count(squares: Squares, pixel: Grid, square: Column) -> None:
@@ -143,7 +126,7 @@ def keep_spread(squares: Squares, pixel: Grid, strength: Column, order: Column, 
 
 
 def keep_strongest(
-    squares: Squares, pixel: Grid, strength: Column, samples: Grid, order: Column, square: Column, share: Column
+    squares: Squares, pixel: Grid, strength: Column, words: Grid, order: Column, square: Column, share: Column
 ) -> int:
     """Move the strongest corners of each square to the front, in the same order. Return how many.
 
@@ -162,7 +145,8 @@ def keep_strongest(
     kept = 0
     for i in range(pixel.shape[0]):
         if square[i] != LEAVES:
-            move(pixel, strength, samples, i, kept)
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            words[kept, 0], words[kept, 1] = words[i, 0], words[i, 1]
             kept += 1
     return kept
 
@@ -208,7 +192,7 @@ def add_rectangle(squares: Squares, found: int, left: int, right: int, row: int)
     return found + 1
 
 
-def leave_poor(squares: Squares, pixel: Grid, strength: Column, samples: Grid, square: Column) -> int:
+def leave_poor(squares: Squares, pixel: Grid, strength: Column, words: Grid, square: Column) -> int:
     """Move the corners outside the poor squares to the front, in the same order. Return how many.
 
     ``square``: as ``find_poor`` has written it.
@@ -216,6 +200,7 @@ def leave_poor(squares: Squares, pixel: Grid, strength: Column, samples: Grid, s
     kept = 0
     for i in range(pixel.shape[0]):
         if not squares.poor[square[i]]:
-            move(pixel, strength, samples, i, kept)
+            pixel[kept, 0], pixel[kept, 1], strength[kept] = pixel[i, 0], pixel[i, 1], strength[i]
+            words[kept, 0], words[kept, 1] = words[i, 0], words[i, 1]
             kept += 1
     return kept

@@ -28,8 +28,8 @@ def distinct(
     """Those of corners that are kept; without ``samples`` all look alike."""
     if samples is None:
         samples = np.tile(EDGE, (len(pixel), 1))
-    pixel, looks = pixel.copy(), samples.copy()
-    count = keep_distinct(pixel.data, strength.copy().data, looks.data, np.empty(len(pixel), np.uint8).data, reach)
+    pixel, looks, beaten = pixel.copy(), samples.copy(), np.empty(len(pixel), np.uint8)
+    count = keep_distinct(pixel.data, strength.copy().data, looks.data, looks.view(np.uint64).data, beaten.data, reach)
     return pixel[:count].tolist()
 
 
@@ -164,7 +164,7 @@ def test_rectangles_cover_the_poor_squares_once_and_nothing_else(
     rich = [at for at in pixel.tolist() if not poor[at[1] // looked_at.side_px][at[0] // looked_at.side_px]]
     strength = np.zeros(len(pixel), np.float32)
     looks = np.zeros((len(pixel), 16), np.uint8)
-    left_over = leave_poor(looked_at, pixel.data, strength.data, looks.data, square.data)
+    left_over = leave_poor(looked_at, pixel.data, strength.data, looks.view(np.uint64).data, square.data)
     assert pixel[:left_over].tolist() == rich
 
 
