@@ -7,6 +7,7 @@ Where nothing can be compiled the package is installed as it is, pure Python: ri
 
 import os
 import re
+import subprocess
 import sys
 import sysconfig
 import tomllib
@@ -57,15 +58,15 @@ FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a t
 LINKED = ["-s", "-flto=auto", "-Wl,-z,noseparate-code"]
 LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of some parts without vectors
 
-# What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower.
-SMALL = ["-Os"]
-LITTLE = {"_memoryviews", "alpha", "axis_bias", "baselines", "circles"}
-LITTLE |= {"coarse_circles", "columns", "derotation", "driving", "edge_rows", "error_matrix"}
-LITTLE |= {"feedback", "flow_fit", "ground_speed", "group_motion", "heading", "image_plane"}
-LITTLE |= {"key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
-LITTLE |= {"object_circles", "patch_circles", "patches", "path", "range_belief", "rebel_circles"}
-LITTLE |= {"rebel_detection", "rest", "sample_ring", "scene_records", "settings", "situation"}
-LITTLE |= {"speed_change", "square_expert", "stillness", "turmoil"}
+# What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower;
+# and what takes hardly any, smaller still.
+SMALL, SMALLEST = "-Os", "-Oz"  # the latter is known to GCC from 12
+LITTLE = {"_memoryviews", "alpha", "coarse_motion", "patches", "range_belief", "rebel_detection", "spread"}
+LEAST = {"axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "columns", "derotation", "driving"}
+LEAST |= {"edge_rows", "error_matrix", "feedback", "flow_fit", "ground_speed", "group_motion", "heading"}
+LEAST |= {"image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
+LEAST |= {"object_circles", "patch_circles", "path", "rebel_circles", "rest", "sample_ring", "scene_records"}
+LEAST |= {"settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))
@@ -94,6 +95,8 @@ class BuildOneExtension(build_ext):
     def build_extension(self, ext: Extension) -> None:
         """Compile what is newer than its object file, and link."""
         bootstrap, *modules = ext.sources
+        asked = [*self.compiler.compiler_so, SMALLEST, "-E", "-xc", os.devnull]
+        self.smallest = SMALLEST if subprocess.run(asked, capture_output=True, check=False).returncode == 0 else SMALL
         with ThreadPoolExecutor(os.cpu_count()) as pool:
             ext.extra_objects = list(pool.map(lambda source: self._compiled(source, ext), modules))
         ext.sources = [bootstrap]
@@ -103,7 +106,9 @@ class BuildOneExtension(build_ext):
     def _compiled(self, source: str, ext: Extension) -> str:
         made = OBJECTS / Path(source).with_suffix(".o")
         if not made.exists() or made.stat().st_mtime < Path(source).stat().st_mtime:
-            flags = ext.extra_compile_args + (SMALL if Path(source).stem in LITTLE else [])
+            stem = Path(source).stem
+            small = [SMALL] if stem in LITTLE else [self.smallest] if stem in LEAST else []
+            flags = ext.extra_compile_args + small
             self.compiler.compile([source], str(OBJECTS), ext.define_macros, extra_postargs=flags)
         return str(made)
 

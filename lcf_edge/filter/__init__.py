@@ -36,7 +36,9 @@ of one step, in the order in which ``line_circle_filter`` calls them:
 ``group_motion``     how edges that go together move: mean velocity and rate of expansion
 ``patches``          image patches near the path, tracked for seconds
 ``patch_circles``    C_r from patches that grow
-``coarse_motion``    pieces of the downscaled image that move independently
+``block_matching``   the downscaled images, and how pieces of them are compared
+``coarse_motion``    pieces of the downscaled image that move independently, or are met soon
+``body_ahead``       C_r from pieces that are met at one time: one large body straight ahead
 ``coarse_circles``   C_r from pieces that move together
 ``turmoil``          C_r where corners come and go and none can be tracked
 ``range_belief``     an object's range and motion over ground, from its motion in the image

@@ -2,16 +2,20 @@
 
 import math
 
-from lcf_edge.filter import edge_equations, lengths
+from lcf_edge.filter import edge_equations, lengths, path
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import doubles, integers
 from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import Cause
 
 RADIUS_SIGMAS = 1.5  # R of a circle, in rms distances of its members from the centre
 MIN_RADIUS_PX = 6.0
 EXTENT_SIGMAS = 3.6  # full width of the members, in standard deviations
 TRUST_A_FRAME = 0.25  # trust above Tr_cr that a predicted contact gets for each frame until then
+MIN_RANGE_M = 0.01
 LAST_ID = 0xFFFFFFFF
+INCOMING = int(Cause.INCOMING)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -74,6 +78,18 @@ def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, setti
     left_s = max(circles.ttc[c], dt_s)
     trust = min(circles.trust[c], settings.tr_cr + TRUST_A_FRAME * left_s / dt_s)
     return edge_equations.update_position(trust, settings.tr_cr, 1 / left_s, rate)
+
+
+def stand(circles: CircleColumns, c: int, x: float, range_m: float, around: Situation, settings: Settings) -> None:
+    """Set cause, motion, time to contact, range and lateral miss of a circle: what it shows, at ``x``, stands."""
+    right_m = (x - around.focus_x) / around.pinhole.fx * range_m
+    rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
+    rate = contact_rate(circles, c, rate, around.dt_s, settings)
+    circles.cause[c] = INCOMING
+    circles.ttc[c], circles.range[c] = 1 / rate, range_m
+    circles.lateral[c] = path.least_miss(right_m, range_m, around)
+    dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
+    circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * lengths.of(dx, dy)
 
 
 def describe(circles: CircleColumns, c: int, members: Members, g: int) -> None:

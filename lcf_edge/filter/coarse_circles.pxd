@@ -1,7 +1,8 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport coarse_motion, edge_equations, lengths, situation
+from lcf_edge.filter cimport body_ahead, coarse_motion, edge_equations, lengths, situation
+from lcf_edge.filter.body_ahead cimport BodyAhead
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
@@ -23,6 +24,7 @@ cdef class CoarseGroups:
     cdef int[::1] group, circle, lasting
     cdef Members members
     cdef double[::1] mean_vx, mean_vy, foot
+    cdef BodyAhead body
 
 @cython.locals(is_any=bint, linked=bint, k=int)
 cdef bint begin(CoarseGroups groups, CoarseMotion coarse) noexcept nogil
@@ -33,4 +35,5 @@ cdef void gather(CoarseGroups groups, Members members, CoarseMotion coarse, doub
 @cython.locals(k=int)
 cdef void set_cause(CoarseGroups groups, CoarseMotion coarse, int g, CircleColumns circles, int c, Situation around) noexcept nogil
 @cython.locals(g=int, c=int, in_the_air=bint, enough=bint)
+cdef void update_moving(CoarseGroups groups, CoarseMotion coarse, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil
 cdef void update(CoarseGroups groups, CoarseMotion coarse, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

@@ -2,8 +2,9 @@
 
 import math
 
+from lcf_edge.filter import body_ahead, coarse_motion, edge_equations, lengths, situation
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import coarse_motion, edge_equations, lengths, situation
+from lcf_edge.filter.body_ahead import BodyAhead
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
@@ -28,13 +29,14 @@ class CoarseGroups:
     """One row per piece: ``group``, lowest piece of its group, -1: none; ``circle``, row of C_r, -1: none.
 
     One row per group: ``members``; mean velocity ``mean_vx``, ``mean_vy``, px/s; ``foot``, its lowest image row, px;
-    ``lasting``: pieces that have moved for ``MIN_S``.
+    ``lasting``: pieces that have moved for ``MIN_S``. ``body``: the body ahead.
     """
 
     def __init__(self, pieces: int) -> None:
         self.group, self.circle, self.lasting = (integers(pieces) for _ in range(3))
         self.members = Members(pieces)
         self.mean_vx, self.mean_vy, self.foot = [doubles(pieces) for _ in range(3)]
+        self.body = BodyAhead(pieces)
 
 
 def begin(groups: CoarseGroups, coarse: CoarseMotion) -> bool:
@@ -112,7 +114,7 @@ def set_cause(
             groups.circle[k] = c
 
 
-def update(
+def update_moving(
     groups: CoarseGroups,
     coarse: CoarseMotion,
     edges: EdgeColumns,
@@ -122,10 +124,7 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> None:
-    """Update C_r from groups that reach below the horizon: what moves stands on the ground.
-
-    ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
-    """
+    """Update C_r from groups that reach below the horizon: what moves stands on the ground."""
     if not begin(groups, coarse):
         return
     join(groups, coarse)
@@ -148,3 +147,23 @@ def update(
             circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
         updated[c] = 1
         set_cause(groups, coarse, g, circles, c, around)
+
+
+def update(
+    groups: CoarseGroups,
+    coarse: CoarseMotion,
+    edges: EdgeColumns,
+    circles: CircleColumns,
+    updated: Bytes,
+    around: Situation,
+    settings: Settings,
+    ids: Ids,
+) -> None:
+    """Update C_r from the pieces that move, and from those of the body ahead.
+
+    ``updated``: circles that other sources have updated, which are left alone; those updated here are marked too.
+    """
+    update_moving(groups, coarse, edges, circles, updated, around, settings, ids)
+    body_ahead.update(
+        groups.body, groups.body.members, coarse, groups.circle, edges, circles, updated, around, settings, ids
+    )

@@ -1,17 +1,14 @@
 cimport cython
 from libc cimport math
-from libc.stdlib cimport abs
-from lcf_edge.filter cimport flow, image_plane, lengths, rounding
+from lcf_edge.filter cimport block_matching, flow, image_plane, lengths, path, rounding, situation
 from lcf_edge.filter.baselines cimport Baselines
+from lcf_edge.filter.block_matching cimport Blocks
 from lcf_edge.filter.flow cimport Homography, Pinhole
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.key_frames cimport KeyFrames
 from lcf_edge.filter.situation cimport Situation
 
 cdef int KEYS
-cdef int WINDOW
-cdef int PIXELS
-cdef int STEP
 cdef double REACH_SHARE
 cdef double DOWN_SHARE
 cdef double NEAREST_M
@@ -21,7 +18,6 @@ cdef double ROTATION_SIGMAS
 cdef double TURN_SIGMAS
 cdef double MAX_OFF_FLOW
 cdef double PLAIN_GREY
-cdef int NO_WORLD
 cdef double CALM_GREY
 cdef double BESIDE_PX
 cdef double LIKENESS
@@ -34,6 +30,7 @@ cdef double SLOW_S
 cdef double MIN_SLOW_S
 cdef double SAME_SMALL_PX
 cdef double SAME_SHARE
+cdef double GROUND_MARGIN
 cdef int LAST
 cdef int OLDER
 cdef int UNKNOWN
@@ -42,43 +39,30 @@ cdef int CHANGED
 cdef int WORST
 
 cdef class CoarseMotion:
-    cdef readonly int width, height, side, columns, rows
-    cdef unsigned char[::1] now, kept, hidden, pieces, pieces_last, then
-    cdef unsigned long long[::1] words, words_last, words_then
+    cdef readonly Blocks blocks
+    cdef int side, columns, rows
     cdef double[:, :, ::1] turned
     cdef Homography back
     cdef double then_s, ahead_m, focus_x, focus_y, off_flow, base_x, base_y, share
-    cdef int pictures, keys, seen, searches, here, across, down, least_still, least_moving
+    cdef int seen, searches, here, across, down, least_still, least_moving
     cdef const double[::1] x, y
-    cdef int[::1] rough, links_before, block
-    cdef int[::1] stance
-    cdef int[::1] links
+    cdef int[::1] links, links_before, stance
     cdef double[::1] came_x, came_y, vx_before, vy_before
     cdef double[:, ::1] shares
-    cdef double[::1] vx, vy, elapsed_s
+    cdef double[::1] vx, vy, elapsed_s, contact_s
 
-@cython.locals(k=cython.Py_ssize_t, pixels=cython.Py_ssize_t, i=int, j=int)
-cpdef void take(CoarseMotion coarse, const unsigned char[::1] small) noexcept nogil
-@cython.locals(x=int, y=int, word=cython.ulonglong, grey=cython.ulonglong)
-cdef void lay_out(CoarseMotion coarse, const unsigned char[::1] picture, int first, unsigned long long[::1] words) noexcept nogil
 @cython.locals(i=int, j=int)
-@cython.locals(k=int)
-cpdef void hide(CoarseMotion coarse, const unsigned char[::1] hidden) noexcept nogil
+cpdef void take(CoarseMotion coarse, const unsigned char[::1] small) noexcept nogil
+@cython.locals(i=int, j=int)
 cpdef void turn(CoarseMotion coarse, const double[:, :, ::1] rotation) noexcept nogil
-@cython.locals(k=cython.Py_ssize_t, first=cython.Py_ssize_t, pixels=cython.Py_ssize_t)
-cpdef void keep(CoarseMotion coarse, int slot) noexcept nogil
 @cython.locals(i=int, j=int)
 cdef void turn_back(CoarseMotion coarse, Pinhole pinhole, const double[:, :, ::1] rotation, int k, KeyFrames keys) noexcept nogil
-@cython.locals(k=cython.Py_ssize_t)
 cdef void look_back(CoarseMotion coarse, KeyFrames keys, Situation around) noexcept nogil
 cdef void look_farther_back(CoarseMotion coarse, int slot, KeyFrames keys, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(k=int, oldest=int, most=double)
 cdef int older_slot(CoarseMotion coarse, Baselines baselines) noexcept nogil
-@cython.locals(across=int, b=int, k=int, row=int, total=int, here=int, below=int)
-cdef void roughen(CoarseMotion coarse) noexcept nogil
 cdef int calm(CoarseMotion coarse, int k) noexcept nogil
 cdef int nearest_px(double x) noexcept nogil
-@cython.locals(total=int, here=cython.Py_ssize_t, there=cython.Py_ssize_t, k=cython.Py_ssize_t)
 cdef int difference(CoarseMotion coarse, int x, int y, int most) noexcept nogil
 @cython.locals(x=int, y=int, most=int)
 cdef bint stands_as_lately(CoarseMotion coarse, int k, double end_x, double end_y) noexcept nogil
@@ -102,6 +86,14 @@ cdef void chain(CoarseMotion coarse, int k, double dt_s) noexcept nogil
 cdef bint put(CoarseMotion coarse, int k, ImagePlane plane) noexcept nogil
 @cython.locals(moves=bint)
 cdef bint see(CoarseMotion coarse, int k, int age, Situation around) noexcept nogil
+cdef double farthest_share(CoarseMotion coarse, int k, Situation around) noexcept nogil
+@cython.locals(x=int, y=int, far=int, near=int, step=int, along_x=int, along_y=int, total=int)
+cdef bint may_be_near(CoarseMotion coarse, double way_x, double way_y, double way, int steps, double far_px) noexcept nogil
+@cython.locals(fits=bint, x=int, y=int, beside=int, nearest=int, level=bint, steps=int, step=int, off=int, along_x=int, along_y=int, across=int, down=int, total=int)
+cdef double seek_near(CoarseMotion coarse, int k, double off_flow, double farthest) noexcept nogil
+cdef bint is_in_way(CoarseMotion coarse, int k, double range_m, Situation around) noexcept nogil
+@cython.locals(k=int, known=bint)
+cdef void seek_all_near(CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(k=int, back=int, pieces=int, known=bint, is_measured=bint)
 cdef void see_all(CoarseMotion coarse, int age, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(k=int, slot=int)

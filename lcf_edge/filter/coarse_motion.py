@@ -3,26 +3,25 @@
 What crosses fast leaves the gates of its corners, and what is dark or plain has few corners that can be tracked.
 Downscaled, noise averages out and outlines remain. A piece that matches nowhere along its flow line, at any depth, is
 searched for all around: in the last frame, and in an older key frame, which shows slower motion. Its motion counts if
-it continues from image to image, as in α.
+it continues from image to image, as in α. A piece that matches on its flow line only nearer than the ground, and soon
+in the way, shows something upright, however few corners it has.
 """
 
 import math
 
 import numpy as np
 
-from lcf_edge.filter import flow, image_plane, lengths, rounding
+from lcf_edge.filter import block_matching, flow, image_plane, lengths, path, rounding, situation
 from lcf_edge.filter.baselines import Baselines
+from lcf_edge.filter.block_matching import Blocks
 from lcf_edge.filter.flow import Homography, Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.key_frames import KeyFrames
-from lcf_edge.filter.memory import Bytes, Doubles, Words, doubles, integers, memory_of, octets
+from lcf_edge.filter.memory import Bytes, Doubles, doubles, integers, memory_of
 from lcf_edge.filter.situation import Situation
 from lcf_edge.lens import Lens
 
-WINDOW = 8  # side of a piece, px of the downscaled image ("small px")
-PIXELS = 64
-STEP = 4  # small px from piece to piece
 REACH_SHARE = 0.16  # horizontal search range, as a share of the image's width,
 DOWN_SHARE = 0.5  # and vertical, as a share of that
 NEAREST_M = 0.25  # depth below which nothing stationary is expected
@@ -32,7 +31,6 @@ ROTATION_SIGMAS = 2.0  # where the rotation is uncertain,
 TURN_SIGMAS = 2.0  # or the lens, in a turn
 MAX_OFF_FLOW = 3.0  # with more tolerance nothing is measured
 PLAIN_GREY = 2.0  # least texture of a piece: mean grey difference of neighbouring px, both directions together
-NO_WORLD = 100_000  # grey levels, more than the texture of a piece
 CALM_GREY = 3.0  # tolerated matching error: noise for each pixel,
 BESIDE_PX = 0.6  # and the effect of a sub-pixel offset of this many small px
 LIKENESS = 0.5  # largest error where it moves, as a share of the least where it is stationary
@@ -45,62 +43,52 @@ SLOW_S = 0.3  # greatest age of the older image,
 MIN_SLOW_S = 0.1  # and least
 SAME_SMALL_PX = 1.0  # by which alike motions may differ,
 SAME_SHARE = 0.25  # plus this share
+GROUND_MARGIN = 0.3  # share by which the ground may be misjudged
 LAST, OLDER = 0, 1
 UNKNOWN, STANDS, CHANGED = 0, 1, 2
 WORST = 256 * 64
 
 
 class CoarseMotion:
-    """The downscaled image, ``width`` by ``height``; each of its px is ``side`` px of the input frame.
+    """The downscaled image, in ``blocks``; each of its px is ``side`` px of the input frame.
 
-    Pixels, row-major: ``now``; ``kept``, of the key frames one after the other, ``keys`` of them so far; ``hidden``, 0
-    where the world is seen. ``turned``: (1, 3, 3), the rotation since the last image.
+    ``turned``: (1, 3, 3), the rotation since the last image. Of the image that is searched: ``then_s``, its age;
+    ``back``, homography of distant points from now to then; ``ahead_m``, ``focus_x``, ``focus_y``: displacement since,
+    and its focus; ``off_flow``, small px. Of the piece that is searched for: ``here``, its first pixel; ``base_x``,
+    ``base_y``, small px, where its upper left corner was if it is at infinity; ``across``, ``down``, offset from there
+    if it moves; ``least_still``, ``least_moving``, matching errors; ``share``: of the way to where the nearest depth
+    would have been, if stationary.
 
-    Pixels repacked so that those of a piece are contiguous: for each column the ``WINDOW`` px to the right of it, row
-    by row. ``pieces``, ``pieces_last``, of this image and the last one; ``words``, ``words_last``, ``words_then``: the
-    same memory, one row of a piece in each word.
-
-    The image that is searched: ``then``, repacked, ``then_s`` ago; ``back``, homography of distant points from now to
-    then; ``ahead_m``, ``focus_x``, ``focus_y``: displacement since, and its focus; ``off_flow``, small px. Of the piece
-    that is searched for: ``here``, its first pixel in ``pieces``; ``base_x``, ``base_y``, small px, where its upper
-    left corner was if it is at infinity; ``across``, ``down``, offset from there if it moves; ``least_still``,
-    ``least_moving``, matching errors; ``share``: of the way to where the nearest depth would have been, if stationary.
-
-    One row per piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its centre, px of the ideal pinhole; ``rough``,
-    its texture; ``came_x``, ``came_y``: ``base`` in the last image, -1: not fully inside it; ``shares`` (2, pieces),
-    latest ``share`` in the last image and in the older one; ``links``: images over which its motion has continued, 0:
-    stationary or unknown; ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which that was measured;
-    ``stance``: whether since the last image it ``STANDS`` or has ``CHANGED`` otherwise; ``links_before``,
-    ``vx_before``, ``vy_before`` of the last image. ``block``: texture of each ``STEP`` by ``STEP`` px.
+    One row per piece, ``columns`` by ``rows`` of them: ``x``, ``y``, its centre, px of the ideal pinhole; ``came_x``,
+    ``came_y``: ``base`` in the last image, -1: not fully inside it; ``shares`` (2, pieces), latest ``share`` in the
+    last image and in the older one; ``links``: images over which its motion has continued, 0: stationary or unknown;
+    ``vx``, ``vy``, px/s, derotated; ``elapsed_s``, over which that was measured; ``contact_s``, time until something
+    upright that it shows is met, 0: it shows none that is in the way soon; ``stance``: whether since the last image it
+    ``STANDS`` or has ``CHANGED`` otherwise; ``links_before``, ``vx_before``, ``vy_before`` of the last image.
     """
 
     def __init__(self, lens: Lens, side: int) -> None:
         self.side = side
-        self.width, self.height = lens.width // side, lens.height // side
-        self.columns = max((self.width - WINDOW) // STEP + 1, 0)
-        self.rows = max((self.height - WINDOW) // STEP + 1, 0)
-        pieces, pixels = self.columns * self.rows, self.width * self.height
-        self.now, self.kept, self.hidden = octets(pixels), octets(KEYS * pixels), octets(pixels)
-        laid_out = max(self.width - WINDOW + 1, 0) * self.height
-        words = np.zeros((3, laid_out), np.uint64)
-        self.words, self.words_last, self.words_then = [memory_of(each) for each in words]
-        self.pieces, self.pieces_last, self.then = [memory_of(each.view(np.uint8)) for each in words]
+        self.blocks = Blocks(lens.width // side, lens.height // side)
+        self.columns, self.rows = self.blocks.columns, self.blocks.rows
+        pieces = self.columns * self.rows
         self.turned = memory_of(np.eye(3).reshape(1, 3, 3))
         self.back = Homography()
         self.then_s = self.ahead_m = self.focus_x = self.focus_y = self.off_flow = 0.0
         self.base_x = self.base_y = self.share = 0.0
-        self.pictures = self.keys = self.seen = self.searches = self.here = self.across = self.down = 0
+        self.seen = self.searches = self.here = self.across = self.down = 0
         self.least_still = self.least_moving = 0
-        half = 0.5 * (WINDOW * side - 1)
-        u, v = np.meshgrid(np.arange(self.columns) * STEP * side + half, np.arange(self.rows) * STEP * side + half)
+        half = 0.5 * (block_matching.WINDOW * side - 1)
+        u, v = np.meshgrid(
+            np.arange(self.columns) * block_matching.STEP * side + half,
+            np.arange(self.rows) * block_matching.STEP * side + half,
+        )
         middles = lens.undistort(np.stack([u.ravel(), v.ravel()], axis=1).astype(np.float32)).astype(np.float64)
         self.x, self.y = memory_of(middles[:, 0]), memory_of(middles[:, 1])
-        self.rough, self.links, self.links_before = [integers(pieces) for _ in range(3)]
-        self.block = integers((self.columns + 1) * (self.rows + 1))
-        self.came_x, self.came_y, self.shares = doubles(pieces), doubles(pieces), doubles(2, pieces)
+        self.links, self.links_before, self.stance = [integers(pieces) for _ in range(3)]
+        self.came_x, self.came_y, self.elapsed_s, self.contact_s = [doubles(pieces) for _ in range(4)]
         self.vx, self.vy, self.vx_before, self.vy_before = [doubles(pieces) for _ in range(4)]
-        self.elapsed_s = doubles(pieces)
-        self.stance = integers(pieces)
+        self.shares = doubles(2, pieces)
 
 
 # Images
@@ -108,33 +96,10 @@ class CoarseMotion:
 
 def take(coarse: CoarseMotion, small: Bytes) -> None:
     """Take the next downscaled image, row-major."""
-    now, pixels = coarse.now, coarse.width * coarse.height
-    for k in range(pixels):
-        now[k] = small[k]
-    for k in range(coarse.words.shape[0]):
-        coarse.words_last[k] = coarse.words[k]
-    lay_out(coarse, coarse.now, 0, coarse.words)
+    block_matching.take(coarse.blocks, small)
     for i in range(3):
         for j in range(3):
             coarse.turned[0, i, j] = 1.0 if i == j else 0.0
-    coarse.pictures = min(coarse.pictures + 1, 2)
-
-
-def hide(coarse: CoarseMotion, hidden: Bytes) -> None:
-    """Set where no world is seen: 1, else 0; row-major."""
-    for k in range(coarse.width * coarse.height):
-        coarse.hidden[k] = hidden[k]
-
-
-def lay_out(coarse: CoarseMotion, picture: Bytes, first: int, words: Words) -> None:
-    """Repack an image that begins at ``first``."""
-    for y in range(coarse.height):
-        word = 0
-        for x in range(coarse.width):
-            grey = picture[first + y * coarse.width + x]
-            word = word >> 8 | grey << 56
-            if x >= WINDOW - 1:
-                words[(x - WINDOW + 1) * coarse.height + y] = word
 
 
 def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
@@ -143,15 +108,6 @@ def turn(coarse: CoarseMotion, rotation: Doubles) -> None:
         x, y, z = coarse.turned[0, 0, j], coarse.turned[0, 1, j], coarse.turned[0, 2, j]
         for i in range(3):
             coarse.turned[0, i, j] = rotation[0, i, 0] * x + rotation[0, i, 1] * y + rotation[0, i, 2] * z
-
-
-def keep(coarse: CoarseMotion, slot: int) -> None:
-    """Store this image as that of the key frame in ``slot``."""
-    coarse.keys = min(coarse.keys + 1, KEYS)
-    now, kept, pixels = coarse.now, coarse.kept, coarse.width * coarse.height
-    first = slot * pixels
-    for k in range(pixels):
-        kept[first + k] = now[k]
 
 
 def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int, keys: KeyFrames) -> None:
@@ -164,8 +120,7 @@ def turn_back(coarse: CoarseMotion, pinhole: Pinhole, rotation: Doubles, k: int,
 
 def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
     """Search in the last image."""
-    for k in range(coarse.words.shape[0]):
-        coarse.words_then[k] = coarse.words_last[k]
+    block_matching.look_back(coarse.blocks)
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
     coarse.then_s = around.dt_s
     coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else ANY_WAY_M
@@ -178,7 +133,7 @@ def look_farther_back(
     coarse: CoarseMotion, slot: int, keys: KeyFrames, baselines: Baselines, around: Situation
 ) -> None:
     """Search in the image of the key frame in ``slot``."""
-    lay_out(coarse, coarse.kept, slot * coarse.width * coarse.height, coarse.words_then)
+    block_matching.look_farther_back(coarse.blocks, slot)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
     coarse.then_s = baselines.elapsed_s[slot]
     coarse.ahead_m = baselines.depth_m[slot] if math.isfinite(around.speed_mps) else ANY_WAY_M
@@ -190,7 +145,7 @@ def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
     """Slot of the oldest key frame of an age that shows slow motion, -1: there is none."""
     oldest, most = -1, MIN_SLOW_S
     for k in range(KEYS):
-        if k < coarse.keys and most <= baselines.elapsed_s[k] <= SLOW_S:
+        if k < coarse.blocks.keys and most <= baselines.elapsed_s[k] <= SLOW_S:
             oldest, most = k, baselines.elapsed_s[k]
     return oldest
 
@@ -198,32 +153,9 @@ def older_slot(coarse: CoarseMotion, baselines: Baselines) -> int:
 # Pieces
 
 
-def roughen(coarse: CoarseMotion) -> None:
-    """Measure the texture of each piece: the sum of absolute differences of neighbouring pixels.
-
-    It is negative where a part of the piece is hidden.
-    """
-    across = coarse.columns + 1
-    for b in range(across * (coarse.rows + 1)):
-        total = 0
-        for row in range(STEP):
-            here = (STEP * (b // across) + row) * coarse.width + STEP * (b % across)
-            below = here + coarse.width if here + coarse.width + STEP <= coarse.width * coarse.height else here
-            for k in range(STEP - 1):
-                total += abs(coarse.now[here + k] - coarse.now[here + k + 1])
-            for k in range(STEP):
-                total += abs(coarse.now[here + k] - coarse.now[below + k])
-                total -= NO_WORLD * coarse.hidden[here + k]
-        coarse.block[b] = total
-    for k in range(coarse.columns * coarse.rows):
-        b = k // coarse.columns * across + k % coarse.columns
-        coarse.rough[k] = coarse.block[b] + coarse.block[b + 1]
-        coarse.rough[k] += coarse.block[b + across] + coarse.block[b + across + 1]
-
-
 def calm(coarse: CoarseMotion, k: int) -> int:
     """Largest matching error of a piece with itself: noise, and the sub-pixel offset."""
-    return rounding.whole(CALM_GREY * PIXELS + BESIDE_PX * coarse.rough[k])
+    return rounding.whole(CALM_GREY * block_matching.PIXELS + BESIDE_PX * coarse.blocks.rough[k])
 
 
 def nearest_px(x: float) -> int:
@@ -232,13 +164,8 @@ def nearest_px(x: float) -> int:
 
 
 def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
-    """Sum of absolute differences between the piece and that at (x, y) then; above ``most`` outside the image."""
-    if x < 0 or x > coarse.width - WINDOW or y < 0 or y > coarse.height - WINDOW:
-        return most + 1
-    total, here, there = 0, coarse.here, WINDOW * (x * coarse.height + y)
-    for k in range(PIXELS):
-        total += abs(coarse.pieces[here + k] - coarse.then[there + k])
-    return total
+    """Matching error of the piece with that at (x, y) then; above ``most`` outside the image."""
+    return block_matching.difference(coarse.blocks, coarse.here, x, y, most)
 
 
 def stands_as_lately(coarse: CoarseMotion, k: int, end_x: float, end_y: float) -> bool:
@@ -290,7 +217,7 @@ def try_moving(coarse: CoarseMotion, across: int, down: int, end_x: float, end_y
 
 def seek_moving(coarse: CoarseMotion, end_x: float, end_y: float, off_flow: float) -> None:
     """Find the best match of a moving piece: over every other px all around, then over those next to it."""
-    reach = rounding.whole(0.5 * REACH_SHARE * coarse.width)
+    reach = rounding.whole(0.5 * REACH_SHARE * coarse.blocks.width)
     reach_down = rounding.whole(DOWN_SHARE * reach)
     coarse.searches += 1
     coarse.least_moving = WORST
@@ -307,7 +234,7 @@ def seek_moving(coarse: CoarseMotion, end_x: float, end_y: float, off_flow: floa
 def is_distinct(coarse: CoarseMotion) -> bool:
     """Whether the match of a moving piece is unique nearby: a straight edge matches anywhere along itself."""
     x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
-    most = rounding.whole(RING_LIKENESS * coarse.least_moving + RING_GREY * PIXELS)
+    most = rounding.whole(RING_LIKENESS * coarse.least_moving + RING_GREY * block_matching.PIXELS)
     for down in range(-1, 2):
         for across in range(-1, 2):
             beside = across != 0 or down != 0
@@ -343,7 +270,10 @@ def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
     """Set the links of a moving piece: one more than those of the piece that it comes from, if that moved alike."""
     from_x = coarse.came_x[k] - coarse.vx[k] * dt_s / coarse.side
     from_y = coarse.came_y[k] - coarse.vy[k] * dt_s / coarse.side
-    column, row = rounding.whole(max(from_x, 0.0) / STEP), rounding.whole(max(from_y, 0.0) / STEP)
+    column, row = (
+        rounding.whole(max(from_x, 0.0) / block_matching.STEP),
+        rounding.whole(max(from_y, 0.0) / block_matching.STEP),
+    )
     coarse.links[k] = 1
     for r in range(max(row - 1, 0), min(row + 3, coarse.rows)):
         for c in range(max(column - 1, 0), min(column + 3, coarse.columns)):
@@ -356,8 +286,8 @@ def chain(coarse: CoarseMotion, k: int, dt_s: float) -> None:
 
 def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
     """Set ``here`` and ``base`` of a piece; return whether at infinity it was fully inside the image."""
-    left, top = STEP * (k % coarse.columns), STEP * (k // coarse.columns)
-    coarse.here = WINDOW * (left * coarse.height + top)
+    left, top = block_matching.STEP * (k % coarse.columns), block_matching.STEP * (k // coarse.columns)
+    coarse.here = block_matching.WINDOW * (left * coarse.blocks.height + top)
     if not image_plane.project(plane, coarse.x[k], coarse.y[k]):
         return False
     u, v = plane.u, plane.v
@@ -365,7 +295,10 @@ def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
     if not image_plane.project(plane, coarse.back.x, coarse.back.y):
         return False
     coarse.base_x, coarse.base_y = left + (plane.u - u) / coarse.side, top + (plane.v - v) / coarse.side
-    return 0 <= coarse.base_x <= coarse.width - WINDOW and 0 <= coarse.base_y <= coarse.height - WINDOW
+    return (
+        0 <= coarse.base_x <= coarse.blocks.width - block_matching.WINDOW
+        and 0 <= coarse.base_y <= coarse.blocks.height - block_matching.WINDOW
+    )
 
 
 def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
@@ -381,7 +314,8 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
         return False
     coarse.seen += 1
     turned = lengths.of(
-        coarse.base_x - STEP * (k % coarse.columns), coarse.base_y - STEP * (k // coarse.columns)
+        coarse.base_x - block_matching.STEP * (k % coarse.columns),
+        coarse.base_y - block_matching.STEP * (k // coarse.columns),
     )  # known only as well as the lens
     off_flow = coarse.off_flow + TURN_SIGMAS * around.turn_share * turned
     seek_standing(coarse, k, end_x, end_y, off_flow)
@@ -395,12 +329,85 @@ def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     return moves and is_distinct(coarse)
 
 
+def farthest_share(coarse: CoarseMotion, k: int, around: Situation) -> float:
+    """Share of the way to the focus by which a piece has moved, at most, if it shows the ground, or what is far off."""
+    soon = coarse.then_s / (coarse.then_s + around.horizon_s)
+    if not around.camera_height_m > 0:
+        return soon
+    lowest_y = coarse.y[k] + 0.5 * block_matching.WINDOW * coarse.side + around.pinhole.focal * around.horizon_sigma_rad
+    ground = (1 + GROUND_MARGIN) * coarse.ahead_m * situation.ground_inverse(around, lowest_y)
+    return max(soon, ground / (1 + ground))
+
+
+def may_be_near(coarse: CoarseMotion, way_x: float, way_y: float, way: float, steps: int, far_px: float) -> bool:
+    """Whether a piece matches better nearer than ``far_px`` than farther off: at every other px along its flow line."""
+    x, y = nearest_px(coarse.base_x), nearest_px(coarse.base_y)
+    far = near = WORST
+    for step in range(0, steps + 2, 2):
+        along_x, along_y = x + nearest_px(way_x * step / way), y + nearest_px(way_y * step / way)
+        total = difference(coarse, along_x, along_y, WORST)
+        if step <= far_px:
+            far = min(far, total)
+        else:
+            near = min(near, total)
+    return near < far
+
+
+def seek_near(coarse: CoarseMotion, k: int, off_flow: float, farthest: float) -> float:
+    """Find the best match of a piece nearer than ``farthest``; returns its share of the way to the focus.
+
+    0: none that fits, or what is farther off fits nearly as well.
+    """
+    way_x, way_y = (coarse.focus_x - coarse.x[k]) / coarse.side, (coarse.focus_y - coarse.y[k]) / coarse.side
+    level = math.fabs(way_x) > math.fabs(way_y)
+    way = max(math.fabs(way_x), math.fabs(way_y))
+    steps = rounding.whole(way * coarse.ahead_m / (NEAREST_M + coarse.ahead_m)) + 1
+    far_px = farthest * way + off_flow
+    if far_px + 1 >= steps or not may_be_near(coarse, way_x, way_y, way, steps, far_px):
+        return 0.0
+    x, y = nearest_px(coarse.base_x), nearest_px(coarse.base_y)
+    beside, nearest = rounding.whole(off_flow + 0.5), 0
+    coarse.least_still = coarse.least_moving = WORST
+    for step in range(-1, steps + 2):
+        along_x, along_y = nearest_px(way_x * step / way), nearest_px(way_y * step / way)
+        for off in range(-beside, beside + 1):
+            across, down = along_x + (0 if level else off), along_y + (off if level else 0)
+            total = difference(coarse, x + across, y + down, WORST)
+            if step <= far_px:
+                coarse.least_still = min(coarse.least_still, total)
+            elif total < coarse.least_moving:
+                coarse.least_moving, coarse.across, coarse.down, nearest = total, across, down, step
+    fits = coarse.least_moving <= calm(coarse, k) and coarse.least_moving < LIKENESS * coarse.least_still
+    return nearest / way if fits else 0.0
+
+
+def is_in_way(coarse: CoarseMotion, k: int, range_m: float, around: Situation) -> bool:
+    """Whether a piece at a range is in the vehicle's path, and no higher than the vehicle."""
+    right_m = (coarse.x[k] - around.focus_x) / around.pinhole.fx * range_m
+    up_m = around.camera_height_m + (around.horizon_y - coarse.y[k]) / around.pinhole.fy * range_m
+    return up_m < around.height_m and math.fabs(path.least_miss(right_m, range_m, around)) < around.half_width_m
+
+
+def seek_all_near(coarse: CoarseMotion, plane: ImagePlane, around: Situation) -> None:
+    """Find textured pieces that are met soon, if they stand, against the searched image."""
+    if not around.speed_mps > 0 or not coarse.ahead_m > 0 or coarse.off_flow >= MAX_OFF_FLOW:
+        return
+    for k in range(coarse.columns * coarse.rows):
+        known = coarse.links[k] > 0 or coarse.blocks.rough[k] < PLAIN_GREY * block_matching.PIXELS
+        if known or not put(coarse, k, plane):
+            continue
+        share = seek_near(coarse, k, coarse.off_flow, farthest_share(coarse, k, around))
+        if share > 0 and is_in_way(coarse, k, coarse.ahead_m * (1 - share) / share, around):
+            coarse.contact_s[k] = coarse.then_s * (1 - share) / share
+            set_motion(coarse, k)
+
+
 def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation) -> None:
     """Find moving pieces against the searched image, among textured ones not yet found to move."""
     pieces = coarse.columns * coarse.rows
     for back in range(pieces):
         k = pieces - 1 - back
-        known = coarse.links[k] > 0 or coarse.rough[k] < PLAIN_GREY * PIXELS
+        known = coarse.links[k] > 0 or coarse.blocks.rough[k] < PLAIN_GREY * block_matching.PIXELS
         if known or not put(coarse, k, plane):
             continue
         if age == LAST:
@@ -412,19 +419,21 @@ def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation
 
 
 def measure(coarse: CoarseMotion, keys: KeyFrames, baselines: Baselines, plane: ImagePlane, around: Situation) -> None:
-    """Find the pieces that move independently: fast against the last image, slower against an older one."""
+    """Find the pieces that move independently: fast against the last image, slower against an older one; near ones."""
     for k in range(coarse.columns * coarse.rows):
         coarse.links_before[k], coarse.vx_before[k], coarse.vy_before[k] = coarse.links[k], coarse.vx[k], coarse.vy[k]
         coarse.links[k] = 0
         coarse.stance[k] = UNKNOWN
+        coarse.contact_s[k] = 0.0
         coarse.came_x[k] = -1.0
     coarse.seen = coarse.searches = 0
-    if coarse.pictures < 2 or not coarse.columns or not coarse.rows:
+    if coarse.blocks.count < 2 or not coarse.columns or not coarse.rows:
         return
-    roughen(coarse)
+    block_matching.roughen(coarse.blocks)
     look_back(coarse, keys, around)
     see_all(coarse, LAST, plane, around)
     slot = older_slot(coarse, baselines)
     if slot >= 0:
         look_farther_back(coarse, slot, keys, baselines, around)
         see_all(coarse, OLDER, plane, around)
+        seek_all_near(coarse, plane, around)

@@ -9,6 +9,7 @@ import numpy.typing as npt
 from lcf_edge.config import Config
 from lcf_edge.filter import (
     alpha,
+    block_matching,
     coarse_motion,
     derotation,
     driving,
@@ -146,7 +147,7 @@ class LineCircleFilter:
         self.ground = GroundSpeed()
         self._homography = Homography()
         self._coarse = CoarseMotion(lens, SmallImage(lens.width, lens.height).side)
-        self._coarse_groups = CoarseGroups(self._coarse.columns * self._coarse.rows)
+        self._coarse_groups = CoarseGroups(self._coarse.blocks.columns * self._coarse.blocks.rows)
         self._off_line = OffLine()
         self.shutter = RollingShutter(self._pinhole, lens.height, self._settings)
         self._speed_mps = math.nan  # of the last frame
@@ -169,6 +170,7 @@ class LineCircleFilter:
 
     def table_bytes(self) -> dict[str, int]:
         """Bytes of each preallocated table; the work space of a step, also kept, takes less than the edges."""
+        blocks = self._coarse.blocks
         return {
             "edges (E_n, E_r, α)": self.edges.nbytes,
             "circles_normal (C_n)": self.normal.nbytes,
@@ -179,7 +181,7 @@ class LineCircleFilter:
             "corners": self.corners.nbytes,
             "corner index": self._index.nbytes,
             "patches": 4 * self.patches.grey.nbytes,  # the template and its three slopes
-            "coarse motion": (KEYS + 26) * self._coarse.width * self._coarse.height,  # its images, three repacked
+            "coarse motion": (KEYS + 26) * blocks.width * blocks.height,  # its images, three repacked
         }
 
     @property
@@ -227,7 +229,7 @@ class LineCircleFilter:
         motion = self._rested(motion)
         self._take(corners)
         if hidden is not None:
-            coarse_motion.hide(self._coarse, memory_of(hidden.reshape(-1)))
+            block_matching.hide(self._coarse.blocks, memory_of(hidden.reshape(-1)))
         if small is not None:
             coarse_motion.take(self._coarse, memory_of(small.reshape(-1)))
         self._derotate(motion)
@@ -427,7 +429,7 @@ class LineCircleFilter:
         key = bool(alpha.key_is_due(edges, keys, around.dt_s, settings))
         if key:
             alpha.mark_key(edges, keys)
-            coarse_motion.keep(self._coarse, (keys.number - 1) % KEYS)
+            block_matching.keep(self._coarse.blocks, (keys.number - 1) % KEYS)
         lines.measure(baselines, keys, self._homography, self._pinhole, around)
         self._fit_flow()
         coarse_motion.measure(self._coarse, keys, baselines, self._plane, around)

@@ -25,7 +25,6 @@ cdef double DRIFT_PX
 cdef double AGREE_SIGMAS
 cdef double AGREE_SHARE
 cdef double AGREE_AT_MOST
-cdef double MIN_RANGE_M
 cdef double SIDE_SIDES
 cdef double STACK_SIDES
 cdef int INCOMING
@@ -48,6 +47,5 @@ cdef void claim(PatchGroups groups, Py_ssize_t p, Patches patches, int circle) n
 @cython.locals(nearest=int, least=double)
 cdef int circle_of(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint continues(PatchGroups groups, CircleColumns circles, Py_ssize_t c) noexcept nogil
-cdef void set_cause(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 @cython.locals(seen=bint, is_shown=bint, is_known=bint, c=int)
 cdef void update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

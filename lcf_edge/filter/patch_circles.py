@@ -33,7 +33,6 @@ DRIFT_PX = 0.7  # added to both
 AGREE_SIGMAS = 2.0  # by which inverse ranges of one thing may differ,
 AGREE_SHARE = 0.1  # plus this share,
 AGREE_AT_MOST = 0.25  # but by no more than this share
-MIN_RANGE_M = 0.01
 SIDE_SIDES = 3.0  # half-sides within which patches side by side may belong to one thing,
 STACK_SIDES = 4.0  # and one above the other
 INCOMING = int(Cause.INCOMING)
@@ -201,21 +200,6 @@ def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
     return apart < AGREE_SIGMAS / math.sqrt(groups.weight) + AGREE_SHARE * groups.inverse
 
 
-def set_cause(
-    groups: PatchGroups, g: int, circles: CircleColumns, c: int, around: Situation, settings: Settings
-) -> None:
-    """Set cause, motion, time to contact, range and lateral miss of a circle, from the range of its patches."""
-    range_m = 1 / groups.inverse
-    right_m = (groups.members.x[g] - around.focus_x) / around.pinhole.fx * range_m
-    rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
-    rate = shared.contact_rate(circles, c, rate, around.dt_s, settings)
-    circles.cause[c] = INCOMING
-    circles.ttc[c], circles.range[c] = 1 / rate, range_m
-    circles.lateral[c] = path.least_miss(right_m, range_m, around)
-    dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
-    circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * lengths.of(dx, dy)
-
-
 def update(
     groups: PatchGroups,
     patches: Patches,
@@ -257,4 +241,4 @@ def update(
         claim(groups, p, patches, -1 if is_shown else c)
         if c >= 0 and not is_shown:
             updated[c] = 1
-            set_cause(groups, p, circles, c, around, settings)
+            shared.stand(circles, c, groups.members.x[p], 1 / groups.inverse, around, settings)

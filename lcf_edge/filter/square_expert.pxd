@@ -180,7 +180,7 @@ cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edg
 @cython.locals(share=double)
 cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(share=double)
-cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
 cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil

@@ -1053,10 +1053,15 @@ def take_members(
     circles: CircleColumns,
     verdicts: Verdicts,
     edges: EdgeColumns,
+    coarse: CoarseMotion,
+    coarse_groups: CoarseGroups,
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """Measure each object's motion from its edges, and drop those that move differently from most."""
+    """Measure each object's motion from its edges, and drop those that move differently from most.
+
+    The pieces of the body ahead count as well.
+    """
     count_members(objects, squares, circles, verdicts, edges, baselines, around)
     for j in range(verdicts.count):
         i = verdicts.row[j]
@@ -1067,6 +1072,10 @@ def take_members(
             group_motion.add_edge(squares.wholes, o, verdicts, j, edges, baselines, around)
         else:
             edges.square[i] = -1
+    for p in range(coarse.columns * coarse.rows):
+        c = coarse_groups.circle[p]
+        if c >= 0 and coarse.contact_s[p] > 0 and circles.square[c] >= 0:
+            group_motion.add_piece(squares.wholes, circles.square[c], coarse, p, around)
     for c in range(circles.capacity):
         o = circles.square[c]
         if o >= 0 and circles.active[c] and squares.wholes.count[o] < MIN_EDGES:
@@ -1117,7 +1126,7 @@ def update(
     keep_members(objects, squares, circles, around, settings)
     evicted = gather(objects, squares, circles, edges, around, settings, ids)
     unite(objects, squares, circles, edges, around, settings)
-    take_members(objects, squares, circles, verdicts, edges, baselines, around)
+    take_members(objects, squares, circles, verdicts, edges, coarse, coarse_groups, baselines, around)
     take_others(objects, squares, verdicts, edges, baselines, around)
     for o in range(objects.capacity):
         if not objects.active[o]:

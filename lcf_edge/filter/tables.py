@@ -121,10 +121,10 @@ EDGE_COLUMNS = (
 )
 """E_n, E_r and the chains of α, in one table, because an edge changes sides and one matching must serve both."""
 
-CONTACT_WRITERS = ("circles", "rebel_circles", "patch_circles", "coarse_circles", "object_circles")
+CONTACT_WRITERS = ("circles", "rebel_circles", "coarse_circles", "object_circles")
 PLACE_WRITERS = (*CONTACT_WRITERS, "turmoil")
 CENTRE_WRITERS = ("derotation", "circles", "normal_circles", "rebel_circles", "object_circles")
-SPEED_WRITERS = ("normal_circles", "rebel_circles", "patch_circles", "coarse_circles", "object_circles", "turmoil")
+SPEED_WRITERS = ("circles", "normal_circles", "rebel_circles", "coarse_circles", "object_circles", "turmoil")
 CIRCLE_COLUMNS = (
     Column("active", "row in use", "", ("normal_circles", "rebel_circles", "circles", "object_circles"), np.bool_),
     Column("id", "identity, never 0", "1", ("circles",), np.uint32),
@@ -134,7 +134,7 @@ CIRCLE_COLUMNS = (
     Column("beta", "β of its motion in the image", "rad", ("derotation", *SPEED_WRITERS)),
     Column("speed", "V along β", "px/s", SPEED_WRITERS),
     Column("expansion", "V/r of C_n: inverse time to contact, if stationary", "1/s", ("normal_circles",)),
-    Column("trust", "Tr", "1", ("circles", *SPEED_WRITERS, "feedback")),
+    Column("trust", "Tr", "1", (*SPEED_WRITERS, "patch_circles", "body_ahead", "feedback")),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles", "object_circles"), np.int32),
     Column("width", "extent of its edges", "px", ("circles", "rebel_circles", "object_circles")),
