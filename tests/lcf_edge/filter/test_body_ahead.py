@@ -66,14 +66,15 @@ def driven(body: Body, config: Config = CONFIG) -> Iterator[tuple[int, LineCircl
         yield seq, tables
 
 
-def contacts(body: Body) -> list[tuple[float, float]]:
+def contacts(body: Body, config: Config = CONFIG) -> list[tuple[float, float]]:
     """Time to contact by the circle that is met soonest, and the true one, of each image with such a circle."""
-    found = []
-    for seq, tables in driven(body):
+    found, closing_mps = [], body.speed_mps - body.own_mps[1]
+    for seq, tables in driven(body, config):
         rebel = tables.rebel
         coming = rebel.active & (rebel.trust >= 3) & (rebel.cause == Cause.INCOMING)
         if coming.any():
-            found.append((float(rebel.ttc[coming].min()), body.range_m(seq) / (body.speed_mps - body.own_mps[1])))
+            true_s = body.range_m(seq) / closing_mps if closing_mps > 0 else math.inf
+            found.append((float(rebel.ttc[coming].min()), true_s))
     return found
 
 
@@ -111,7 +112,8 @@ def test_between_two_posts_the_way_is_free() -> None:
 
 
 def test_under_a_bridge_the_way_is_free() -> None:
-    assert not contacts(Body(low_m=0.75, high_m=2.0, from_m=6.0))
+    low = Config(camera=Camera(height_m=0.5), vehicle=Vehicle(half_width_m=0.4, height_m=0.6))
+    assert not contacts(Body(low_m=0.15, high_m=2.0), low)
 
 
 def test_what_is_far_off_is_not_met_soon() -> None:
