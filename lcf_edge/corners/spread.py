@@ -41,9 +41,9 @@ def keep_distinct(pixel: Grid, strength: Column, samples: Grid, words: Grid, bea
     """Move the corners without a stronger one that lies close and looks alike to the front, in the same order.
 
     Of equals the first stays. Close: no more than ``reach`` px away, both across and down. ``pixel``: int32 (n, 2),
-    part by part of an image, row by row; parts do not rival each other. ``samples``: uint8 (n, 16), the appearances,
-    ``words``: uint64 (n, 2), the same memory, which moves faster.
-    ``beaten``: uint8 (n,), written. Return how many are kept.
+    part by part of an image, row by row; parts do not rival each other. ``samples``: uint8 (n, 16), the appearances;
+    ``words``: uint64 (n, 2), the same memory, which moves faster. ``beaten``: uint8 (n,), written. Return how many are
+    kept.
     """
     corners = pixel.shape[0]
     for i in range(corners):

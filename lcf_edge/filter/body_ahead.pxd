@@ -1,6 +1,6 @@
 cimport cython
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, lengths
+from lcf_edge.filter cimport lengths
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns

@@ -4,7 +4,7 @@ Its pieces (``coarse_motion``) are all met at the same time, and flow apart.
 """
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, lengths
+from lcf_edge.filter import lengths
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
@@ -157,8 +157,7 @@ def update(
             return
         shared.give_birth(circles, c, members, 0, settings, ids)
     elif not updated[c]:
-        shared.blend(circles, c, members, 0, settings)
-        circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+        shared.confirm(circles, c, members, 0, settings)
     if not updated[c]:
         updated[c] = 1
         shared.stand(circles, c, members.x[0], around.speed_mps / body.rate, around, settings)

@@ -28,6 +28,7 @@ cdef unsigned int new_id(Ids ids) noexcept nogil
 cdef void clear(Members members, Py_ssize_t g) noexcept nogil
 cdef double radius_of(Members members, Py_ssize_t g, double max_px) noexcept nogil
 cdef void blend(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
+cdef void confirm(CircleColumns circles, Py_ssize_t c, Members members, Py_ssize_t g, Settings settings) noexcept nogil
 @cython.locals(left_s=double, trust=double)
 cdef double contact_rate(CircleColumns circles, Py_ssize_t c, double rate, double dt_s, Settings settings) noexcept nogil
 @cython.locals(right_m=double, rate=double, dx=double, dy=double)

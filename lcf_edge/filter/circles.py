@@ -68,6 +68,12 @@ def blend(circles: CircleColumns, c: int, members: Members, g: int, settings: Se
     describe(circles, c, members, g)
 
 
+def confirm(circles: CircleColumns, c: int, members: Members, g: int, settings: Settings) -> None:
+    """Update a circle from members that show it again: Tr +1."""
+    blend(circles, c, members, g, settings)
+    circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+
+
 def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, settings: Settings) -> float:
     """1/TTC from prediction and measurement, by the equation of L, 1/s.
 

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport body_ahead, coarse_motion, edge_equations, lengths, situation
+from lcf_edge.filter cimport body_ahead, coarse_motion, lengths, situation
 from lcf_edge.filter.body_ahead cimport BodyAhead
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.coarse_motion cimport CoarseMotion

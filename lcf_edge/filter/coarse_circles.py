@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import body_ahead, coarse_motion, edge_equations, lengths, situation
+from lcf_edge.filter import body_ahead, coarse_motion, lengths, situation
 from lcf_edge.filter import circles as shared
 from lcf_edge.filter.body_ahead import BodyAhead
 from lcf_edge.filter.circles import Ids, Members
@@ -143,8 +143,7 @@ def update_moving(
         elif updated[c] or circles.cause[c] != CROSSING:
             continue  # other sources know more about it
         else:
-            shared.blend(circles, c, groups.members, g, settings)
-            circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+            shared.confirm(circles, c, groups.members, g, settings)
         updated[c] = 1
         set_cause(groups, coarse, g, circles, c, around)
 

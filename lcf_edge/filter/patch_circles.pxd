@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, lengths, path, situation
+from lcf_edge.filter cimport lengths, path, situation
 from lcf_edge.filter.circles cimport Ids, Members
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns
 from lcf_edge.filter.patches cimport Patches

@@ -7,7 +7,7 @@ updated is left to them.
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_equations, lengths, path, situation
+from lcf_edge.filter import lengths, path, situation
 from lcf_edge.filter.circles import Ids, Members
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns
 from lcf_edge.filter.memory import Bytes, octets
@@ -236,8 +236,7 @@ def update(
             if c >= 0:
                 shared.give_birth(circles, c, groups.members, p, settings, ids)
         elif not is_shown:
-            shared.blend(circles, c, groups.members, p, settings)
-            circles.trust[c] = edge_equations.change_trust(circles.trust[c], 1.0, settings.tr_max)
+            shared.confirm(circles, c, groups.members, p, settings)
         claim(groups, p, patches, -1 if is_shown else c)
         if c >= 0 and not is_shown:
             updated[c] = 1

@@ -134,7 +134,12 @@ CIRCLE_COLUMNS = (
     Column("beta", "β of its motion in the image", "rad", ("derotation", *SPEED_WRITERS)),
     Column("speed", "V along β", "px/s", SPEED_WRITERS),
     Column("expansion", "V/r of C_n: inverse time to contact, if stationary", "1/s", ("normal_circles",)),
-    Column("trust", "Tr", "1", (*SPEED_WRITERS, "patch_circles", "body_ahead", "feedback")),
+    Column(
+        "trust",
+        "Tr",
+        "1",
+        ("circles", "normal_circles", "rebel_circles", "object_circles", "turmoil", "feedback"),
+    ),
     Column("corr", "coherence of the directions of its edges, (0, 1]", "1", ("circles", "normal_circles")),
     Column("support", "edges behind it", "1", ("circles", "object_circles"), np.int32),
     Column("width", "extent of its edges", "px", ("circles", "rebel_circles", "object_circles")),
