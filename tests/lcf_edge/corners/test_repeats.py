@@ -39,6 +39,27 @@ def test_what_a_coder_adds_to_a_copy_makes_it_no_new_image() -> None:
     assert answers(images)[2:] == [False, True] * 5
 
 
+@pytest.mark.parametrize("noise", [1.0, 3.0])
+def test_copies_with_noise_of_their_own_are_repeats_once_some_have_come(noise: float) -> None:
+    images = [view(6 * (number // 2), noise, number) for number in range(40)]
+    assert answers(images)[10:] == [False, True] * 15
+
+
+def test_an_image_that_now_and_then_is_like_the_last_one_is_no_copy() -> None:
+    """A vehicle that moves by fits and starts."""
+    at = [number - number // 60 for number in range(300)]
+    assert not any(answers([view(6 * place % 1400, 1.0, number) for number, place in enumerate(at)]))
+
+
+def test_a_source_of_copies_with_noise_shows_a_scene_that_stands() -> None:
+    driving = [view(6 * (number // 2), 1.0, number) for number in range(40)]
+    standing = [view(6 * 20, 1.0, number) for number in range(40, 80)]
+    told = answers([*driving, *standing])
+    frozen = round(MAX_REPEAT_S * 1e9 / FRAME_NS)
+    assert any(told[41:])
+    assert not any(told[41 + frozen :])
+
+
 @pytest.mark.parametrize("noise", [0.0, 1.0])
 def test_a_scene_that_stands_still_is_new_in_every_image(noise: float) -> None:
     assert not any(answers([view(0, noise, seed) for seed in range(40)]))
