@@ -73,7 +73,7 @@ cdef double off_segment(double x, double y, double end_x, double end_y) noexcept
 cdef void try_moving(CoarseMotion coarse, int across, int down, double end_x, double end_y, double off_flow) noexcept nogil
 @cython.locals(reach=int, reach_down=int, across=int, down=int, middle_x=int, middle_y=int)
 cdef void seek_moving(CoarseMotion coarse, double end_x, double end_y, double off_flow) noexcept nogil
-@cython.locals(x=int, y=int, most=int, across=int, down=int, beside=bint)
+@cython.locals(x=int, y=int, most=int, across=int, down=int, on_ring=bint)
 cdef bint is_distinct(CoarseMotion coarse) noexcept nogil
 @cython.locals(highest=int)
 cdef double finer(int before, int middle, int after) noexcept nogil

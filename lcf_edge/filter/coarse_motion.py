@@ -235,10 +235,10 @@ def is_distinct(coarse: CoarseMotion) -> bool:
     """Whether the match of a moving piece is unique nearby: a straight edge matches anywhere along itself."""
     x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
     most = rounding.whole(RING_LIKENESS * coarse.least_moving + RING_GREY * block_matching.PIXELS)
-    for down in range(-1, 2):
-        for across in range(-1, 2):
-            beside = across != 0 or down != 0
-            if beside and difference(coarse, x + RING * across, y + RING * down, most) <= most:
+    for down in range(-RING, RING + 1):
+        for across in range(-RING, RING + 1):
+            on_ring = max(abs(across), abs(down)) == RING
+            if on_ring and difference(coarse, x + across, y + down, most) <= most:
                 return False
     return True
 
