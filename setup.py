@@ -61,12 +61,12 @@ LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of 
 # What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower;
 # and what takes hardly any, smaller still.
 SMALL, SMALLEST = "-Os", "-Oz"  # the latter is known to GCC from 12
-LITTLE = {"_memoryviews", "alpha", "coarse_motion", "patches", "range_belief", "rebel_detection", "spread"}
+LITTLE = {"_memoryviews", "alpha", "coarse_motion", "patches", "rebel_detection", "spread"}
 LEAST = {"axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "columns", "derotation", "driving"}
 LEAST |= {"edge_rows", "error_matrix", "feedback", "flow_fit", "ground_speed", "group_motion", "heading"}
 LEAST |= {"image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
-LEAST |= {"object_circles", "patch_circles", "path", "rebel_circles", "rest", "sample_ring", "scene_records"}
-LEAST |= {"settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}
+LEAST |= {"object_circles", "patch_circles", "path", "range_belief", "rebel_circles", "rest", "sample_ring"}
+LEAST |= {"scene_records", "settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.
 _DECLARED = b"".join(path.read_bytes() for path in sorted(PACKAGE.rglob("*.pxd")))

@@ -5,6 +5,7 @@ cdef int KEYS
 cdef int WINDOW
 cdef int PIXELS
 cdef int STEP
+cdef int LIGHTER
 cdef int NO_WORLD
 
 cdef class Blocks:
@@ -29,3 +30,5 @@ cdef void look_farther_back(Blocks blocks, int slot) noexcept nogil
 cdef void roughen(Blocks blocks) noexcept nogil
 @cython.locals(total=int, there=cython.Py_ssize_t, k=cython.Py_ssize_t)
 cdef int difference(Blocks blocks, Py_ssize_t here, int x, int y, int most) noexcept nogil
+@cython.locals(total=int, now=int, before=int, light=int, there=cython.Py_ssize_t, k=cython.Py_ssize_t)
+cdef int shape_difference(Blocks blocks, Py_ssize_t here, int x, int y, int most) noexcept nogil

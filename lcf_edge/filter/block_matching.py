@@ -10,8 +10,9 @@ from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.memory import Bytes, Words, integers, memory_of, octets
 
 WINDOW = 8  # side of a piece, px of the downscaled image ("small px")
-PIXELS = 64
+PIXELS = 64  # of a piece, 2**6
 STEP = 4  # small px from piece to piece
+LIGHTER = 7  # the light on a piece may change by one part in so many
 NO_WORLD = 100_000  # grey levels, more than the texture of a piece
 
 
@@ -118,4 +119,19 @@ def difference(blocks: Blocks, here: int, x: int, y: int, most: int) -> int:
     total, there = 0, WINDOW * (x * blocks.height + y)
     for k in range(PIXELS):
         total += abs(blocks.pieces[here + k] - blocks.then[there + k])
+    return total
+
+
+def shape_difference(blocks: Blocks, here: int, x: int, y: int, most: int) -> int:
+    """The same in the light of then: less what lamps, exposure or vignetting made of the mean since."""
+    if x < 0 or x > blocks.width - WINDOW or y < 0 or y > blocks.height - WINDOW:
+        return most + 1
+    total, now, before, there = 0, 0, 0, WINDOW * (x * blocks.height + y)
+    for k in range(PIXELS):
+        now += blocks.pieces[here + k]
+        before += blocks.then[there + k]
+    light = before // (LIGHTER * PIXELS)
+    light = min(max((now - before + PIXELS // 2) >> 6, -light), light)
+    for k in range(PIXELS):
+        total += abs(blocks.pieces[here + k] - blocks.then[there + k] - light)
     return total

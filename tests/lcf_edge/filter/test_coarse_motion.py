@@ -1,8 +1,10 @@
 """What crosses fast, and has no corner that is found again, is found in the downscaled image."""
 
 import math
+import os
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -10,11 +12,15 @@ import numpy.typing as npt
 import pytest
 
 from benchmarks.playing import config_of, play_drive
-from lcf_edge.config import Camera, Config, Vehicle
+from drivers.samples import Frame, ImuSample, SpeedSample
+from lcf_edge.config import Camera, Config, Vehicle, load
+from lcf_edge.evaluate.corpus import find
 from lcf_edge.filter import LineCircleFilter, Motion
 from lcf_edge.filter.inputs import NO_CORNERS
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Cause, Kind
+from lcf_edge.pipeline import Pipeline
+from lcf_edge.recording.read import open_recording
 from lcf_edge.rendered.drives import Box, Drive, Paint, Profile, SensorNoise
 from lcf_edge.rendered.drives import Lens as RenderedLens
 from lcf_edge.rendered.placing import through
@@ -27,6 +33,7 @@ LENS = Lens(640, 480, 1500.0, 1500.0, 319.5, 239.5)  # so narrow that a turn shi
 SMALL = SmallImage(LENS.width, LENS.height)
 CONFIG = Config(camera=Camera(height_m=0.5), vehicle=Vehicle(half_width_m=0.4, height_m=1.2))
 DT_S = 0.1
+OFFICE = Path(os.environ.get("LCF_EDGE_DATA", Path(__file__).parents[4] / "shared" / "data")) / "donkey-office"
 
 
 def far_background(seed: int = 0) -> Grey:
@@ -196,6 +203,32 @@ def test_where_the_rotation_is_uncertain_nothing_is_reported() -> None:
         unsure = replace(motion, rotation_sigma_rad=0.02)
         tables.step(NO_CORNERS, unsure, image, SMALL.of(image))
         assert not tables.rebel.active.any()
+
+
+@pytest.mark.skipif(not OFFICE.is_dir(), reason=f"no {OFFICE}: set LCF_EDGE_DATA")
+def test_where_a_lens_darkens_the_corners_of_the_image_nothing_moves() -> None:
+    """A rover indoors, nobody in sight; brightness falls to four ninths left and right."""
+    (recording,) = find([OFFICE])
+    config = load(None, recording.settings)
+
+    def darkened() -> Iterator[Frame | ImuSample | SpeedSample]:
+        for item in open_recording(OFFICE, config):
+            if not isinstance(item, Frame):
+                yield item
+                continue
+            v, u = np.indices(item.image.shape) - 0.5 * np.array(item.image.shape)[:, None, None]
+            light = (1 + 2 * (u * u + v * v) / item.image.shape[1] ** 2) ** -2.0
+            yield replace(item, image=np.asarray(light * item.image, np.uint8))
+
+    pipeline = Pipeline(config, Lens.from_config(config.camera, config.camera.width, config.camera.height))
+    found = 0
+    for item in darkened():
+        if not isinstance(item, Frame):
+            pipeline.add(item)
+            continue
+        circles = pipeline.process(item).circles
+        found += np.count_nonzero((circles["kind"] == Kind.REBEL) & (circles["trust"] >= 3))
+    assert found < 10
 
 
 def test_an_image_too_small_for_a_piece_is_no_fault() -> None:
