@@ -64,10 +64,9 @@ cdef int older_slot(CoarseMotion coarse, Baselines baselines) noexcept nogil
 cdef int calm(CoarseMotion coarse, int k) noexcept nogil
 cdef int nearest_px(double x) noexcept nogil
 cdef int difference(CoarseMotion coarse, int x, int y, int most) noexcept nogil
-cdef int shape_difference(CoarseMotion coarse, int x, int y, int most) noexcept nogil
 @cython.locals(x=int, y=int, most=int)
 cdef bint stands_as_lately(CoarseMotion coarse, int k, double end_x, double end_y) noexcept nogil
-@cython.locals(x=int, y=int, beside=int, level=bint, steps=int, step=int, off=int, along_x=int, along_y=int, at_x=int, at_y=int)
+@cython.locals(x=int, y=int, beside=int, level=bint, steps=int, step=int, off=int, along_x=int, along_y=int, at_x=int, at_y=int, total=int)
 cdef void seek_standing(CoarseMotion coarse, int k, double end_x, double end_y, double off_flow) noexcept nogil
 cdef double off_segment(double x, double y, double end_x, double end_y) noexcept nogil
 @cython.locals(x=int, y=int, total=int)

@@ -168,11 +168,6 @@ def difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
     return block_matching.difference(coarse.blocks, coarse.here, x, y, most)
 
 
-def shape_difference(coarse: CoarseMotion, x: int, y: int, most: int) -> int:
-    """The same in the light of then."""
-    return block_matching.shape_difference(coarse.blocks, coarse.here, x, y, most)
-
-
 def stands_as_lately(coarse: CoarseMotion, k: int, end_x: float, end_y: float) -> bool:
     """Whether a piece matches, within 1 px, where it was if stationary at the depth last seen there."""
     x = nearest_px(coarse.base_x + coarse.share * end_x)
@@ -199,7 +194,8 @@ def seek_standing(coarse: CoarseMotion, k: int, end_x: float, end_y: float, off_
         along_x, along_y = x + nearest_px(end_x * share), y + nearest_px(end_y * share)
         for off in range(-beside, beside + 1):
             at_x, at_y = along_x + (0 if level else off), along_y + (off if level else 0)
-            coarse.least_still = min(coarse.least_still, shape_difference(coarse, at_x, at_y, coarse.least_still))
+            total = block_matching.shape_difference(coarse.blocks, coarse.here, at_x, at_y, coarse.least_still)
+            coarse.least_still = min(coarse.least_still, total)
         if coarse.least_still <= calm(coarse, k):
             coarse.share = share
             return
