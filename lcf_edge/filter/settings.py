@@ -13,7 +13,7 @@ PSI_MARGIN_PX = 12.0  # kept between ψ and anything that breaks the flow
 # Lower bounds: however few px a radian has, corners lie some px apart.
 MIN_LINK_PX = 12.0
 MIN_CIRCLE_PX = 14.0
-MIN_NEIGHBOUR_PX = 6.4
+MIN_NEIGHBOUR_PX = 11.0  # and are a px off: over less, a shift that they share may be an approach
 MIN_MEMBER_MARGIN_PX = 3.0
 MIN_MIN_COAST_PX = 15.0
 MIN_PSI_MARGIN_PX = 5.0
