@@ -95,7 +95,7 @@ FAILURES: dict[str, dict[str, Callable[[Rows], Rows] | None]] = {
 }
 
 
-def _lines(path: Path) -> tuple[list[str], list[str]]:
+def lines_of(path: Path) -> tuple[list[str], list[str]]:
     """Comments and rows of a CSV file."""
     lines = [line for line in path.read_text("utf-8").splitlines() if line.strip()]
     return [line for line in lines if line[0] == "#"], [line for line in lines if line[0] != "#"]
@@ -103,7 +103,7 @@ def _lines(path: Path) -> tuple[list[str], list[str]]:
 
 def write(recording: Path, into: Path) -> Iterator[str]:
     """Write all copies of an ASL recording into a folder; yield the name of each. Raises ``OSError``."""
-    head, rows = _lines(recording / "mav0/cam0/data.csv")
+    head, rows = lines_of(recording / "mav0/cam0/data.csv")
     selections = {name: rows[chosen] for name, chosen in SELECTIONS.items()}
     selections["dropped"] = [row for number, row in enumerate(rows) if number % DROPPED]
     selections |= dict.fromkeys(ALTERATIONS, rows)
@@ -131,7 +131,7 @@ def write_failing(recording: Path, into: Path) -> Iterator[str]:
                 shutil.rmtree(copy / sensor)
                 continue
             path = copy / sensor / "data.csv"
-            head, rows = _lines(path)
+            head, rows = lines_of(path)
             try:
                 changed = change([row.split(",") for row in rows])
             except (ValueError, IndexError) as error:

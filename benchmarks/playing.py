@@ -9,7 +9,7 @@ from drivers.samples import Frame, ImuSample, SpeedSample
 from lcf_edge.config import Camera, Config, Filter, Imu, Memory, Vehicle
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Scene
-from lcf_edge.recording.read import open_recording
+from lcf_edge.recording.read import Recording, open_recording
 from lcf_edge.rendered import scenes
 from lcf_edge.rendered.drives import Drive
 from lcf_edge.rendered.truth import Truth
@@ -77,13 +77,17 @@ def play_recording(path: Path, config: Config, names: Sequence[str]) -> Iterator
                 waiting.append(item)
             continue
         if not methods:
-            height, width = item.image.shape
-            own = None if config.camera.intrinsics else recording.lens
-            lens = own.scaled(width, height) if own else Lens.from_config(config.camera, width, height)
+            lens = lens_of(recording, config, *item.image.shape)
             methods = {name: make(name, config, lens) for name in names}
             for sample in waiting:
                 _add(methods, sample)
         yield Moment(item, {name: method.process(item) for name, method in methods.items()}, None)
+
+
+def lens_of(recording: Recording, config: Config, height: int, width: int) -> Lens:
+    """The lens of images of a size, px: the configuration's, if that has intrinsics, else the recording's own."""
+    own = None if config.camera.intrinsics else recording.lens
+    return own.scaled(width, height) if own else Lens.from_config(config.camera, width, height)
 
 
 def _add(methods: Mapping[str, Method], sample: Sample) -> None:
