@@ -51,28 +51,31 @@ FINE = 4  # a board is drawn on this many times the pixels
 
 @dataclass(frozen=True, slots=True)
 class Way:
-    """Where a vehicle is at each image: ``x`` right and ``z`` forward of its start, m, ``heading``, right positive, and
-    ``pitch`` of the camera, rad; ``speed``, m/s; ``yaw_rate``, rad/s."""
+    """Where a vehicle is at each image, right and forward of its start.
 
-    time: Floats
-    x: Floats
-    z: Floats
-    heading: Floats
-    pitch: Floats
-    speed: Floats
-    yaw_rate: Floats
+    ``heading_rad``: to the right. ``pitch_rad``: of the camera, up, less its mean over ``PITCH_S``. ``yaw_rate_radps``:
+    to the right.
+    """
+
+    time_s: Floats
+    x_m: Floats
+    z_m: Floats
+    heading_rad: Floats
+    pitch_rad: Floats
+    speed_mps: Floats
+    yaw_rate_radps: Floats
 
 
 @dataclass(frozen=True, slots=True)
 class Board:
-    """A board at each image: ``x``, ``z``, m, and its velocity ``vx``, ``vz``, m/s, as those of a way."""
+    """Where a board is at each image, and its velocity over ground, in the axes of the way."""
 
     width_m: float
     height_m: float
-    x: Floats
-    z: Floats
-    vx: Floats
-    vz: Floats
+    x_m: Floats
+    z_m: Floats
+    vx_mps: Floats
+    vz_mps: Floats
 
 
 def _smooth(values: Floats, count: int) -> Floats:
@@ -131,28 +134,28 @@ def board_for(way: Way, met: int, motion: str, config: Config, side: float) -> B
     """The board that is met at image ``met``; ``side``: 1 or -1, to which it crosses."""
     half_m, k = config.vehicle.half_width_m, met
     width_m, height_m = min(WIDE * half_m, WIDEST_M), min(TALL * half_m, TALLEST_M)
-    x, z, still = np.full_like(way.x, way.x[k]), np.full_like(way.z, way.z[k]), np.zeros_like(way.x)
+    x, z, still = np.full_like(way.x_m, way.x_m[k]), np.full_like(way.z_m, way.z_m[k]), np.zeros_like(way.x_m)
     if motion == "leads":
-        driven = np.cumsum(way.speed * np.diff(way.time, prepend=way.time[0]))
+        driven = np.cumsum(way.speed_mps * np.diff(way.time_s, prepend=way.time_s[0]))
         along = driven[k] - LEADS * (driven[k] - driven)
-        x, z = np.interp(along, driven, way.x), np.interp(along, driven, way.z)
-        return Board(width_m, height_m, x, z, np.gradient(x, way.time), np.gradient(z, way.time))
-    speed = CROSSES * way.speed[k] * side if motion == "crosses" else 0.0
-    vx, vz = speed * np.cos(way.heading[k]), -speed * np.sin(way.heading[k])
-    before = way.time - way.time[k]
+        x, z = np.interp(along, driven, way.x_m), np.interp(along, driven, way.z_m)
+        return Board(width_m, height_m, x, z, np.gradient(x, way.time_s), np.gradient(z, way.time_s))
+    speed = CROSSES * way.speed_mps[k] * side if motion == "crosses" else 0.0
+    vx, vz = speed * np.cos(way.heading_rad[k]), -speed * np.sin(way.heading_rad[k])
+    before = way.time_s - way.time_s[k]
     return Board(width_m, height_m, x + vx * before, z + vz * before, still + vx, still + vz)
 
 
 def corners_px(way: Way, board: Board, n: int, config: Config, lens: Lens) -> Floats | None:
     """Corners of the board in an image, clockwise from the upper left, px (4, 2); None: it is not in view."""
-    dx, dz, heading = board.x[n] - way.x[n], board.z[n] - way.z[n], way.heading[n]
+    dx, dz, heading = board.x_m[n] - way.x_m[n], board.z_m[n] - way.z_m[n], way.heading_rad[n]
     right, ahead = dx * np.cos(heading) - dz * np.sin(heading), dx * np.sin(heading) + dz * np.cos(heading)
     if ahead < NEAREST_M:
         return None
     half, foot = board.width_m / 2, config.camera.height_m
     x = right + np.array([-half, half, half, -half])
     y, z = foot - board.height_m * np.array([1.0, 1.0, 0.0, 0.0]), np.full(4, ahead)
-    yaw, pitch = config.camera.yaw_rad, config.camera.pitch_rad + way.pitch[n]
+    yaw, pitch = config.camera.yaw_rad, config.camera.pitch_rad + way.pitch_rad[n]
     x, z = x * np.cos(yaw) - z * np.sin(yaw), z * np.cos(yaw) + x * np.sin(yaw)
     y, z = y * np.cos(pitch) + z * np.sin(pitch), z * np.cos(pitch) - y * np.sin(pitch)
     if z.min() < NEAREST_M:
@@ -182,15 +185,15 @@ def drawn(image: Grey, corners: Floats, grey: Floats) -> Grey:
         for each in (grey.astype(np.float32), np.ones(grey.shape, np.float32))
     )
     shown = image * (1 - share) + image.mean() * share + CONTRAST * board
-    return np.clip(np.round(shown), 0, 255).astype(np.uint8)
+    return np.asarray(np.clip(np.round(shown), 0, 255), np.uint8)
 
 
 def is_met(way: Way, board: Board, n: int, config: Config) -> bool:
     """Whether the board will be met within the horizon if it keeps its velocity, and the vehicle speed and turn."""
-    heading, speed = way.heading[n], way.speed[n]
-    dx, dz, vx, vz = board.x[n] - way.x[n], board.z[n] - way.z[n], board.vx[n], board.vz[n]
+    heading, speed = way.heading_rad[n], way.speed_mps[n]
+    dx, dz, vx, vz = board.x_m[n] - way.x_m[n], board.z_m[n] - way.z_m[n], board.vx_mps[n], board.vz_mps[n]
     for after_s in np.arange(0, config.vehicle.horizon_s, STEP_S):
-        turned = way.yaw_rate[n] * after_s
+        turned = way.yaw_rate_radps[n] * after_s
         along = heading + turned / 2
         x = dx + vx * after_s - speed * after_s * np.sin(along)
         z = dz + vz * after_s - speed * after_s * np.cos(along)

@@ -73,8 +73,8 @@ def test_a_thing_that_stands_is_where_the_vehicle_will_be(copies: Path) -> None:
     n = len(frames) // 2
     corners = inserted.corners_px(way, board, n, mounted, lens)
     assert corners is not None
-    ahead_m = np.hypot(board.x[n] - way.x[n], board.z[n] - way.z[n])
-    horizon_y = lens.cy + lens.fy * np.tan(mounted.camera.pitch_rad + way.pitch[n])
+    ahead_m = np.hypot(board.x_m[n] - way.x_m[n], board.z_m[n] - way.z_m[n])
+    horizon_y = lens.cy + lens.fy * np.tan(mounted.camera.pitch_rad + way.pitch_rad[n])
     assert corners[2:, 1] == pytest.approx(horizon_y + lens.fy * 0.5 / ahead_m, abs=1.0)
     assert inserted.is_met(way, board, n, mounted)
 
