@@ -17,6 +17,7 @@ cdef double MIN_RADIUS_PX
 cdef double STRAY_GATE_SHARE
 cdef double JOIN_GATE_SHARE
 cdef double ROTATION_SIGMAS
+cdef double FIRST_EXPANSION_HZ
 cdef double FIRST_SPEED_SHARE
 cdef int FIXED_PX
 cdef double MAX_FIXED_STEP_S

@@ -17,6 +17,7 @@ MIN_ORIGIN_PX = 2.0  # an edge nearer to its origin has no direction from it
 MIN_RADIUS_PX = 1e-3  # nor one nearer to the focus
 STRAY_GATE_SHARE = 0.5  # BL of a new suspect, as a share of BL at birth
 ROTATION_SIGMAS = 2.0  # by which an edge may leave its flow line, besides δ
+FIRST_EXPANSION_HZ = 1.0  # V/r of a new landmark outside all circles, at most: few things are nearer than a second
 FIRST_SPEED_SHARE = 0.5  # 1 sigma of V of a new landmark, as a share of it: its depth is not known
 FIXED_PX = 1  # jitter of a corner that does not move
 MAX_FIXED_STEP_S = 0.1  # time that one frame counts at most: images minutes apart are no evidence of an own part
@@ -281,12 +282,15 @@ def add(
 def first_expansion(
     x: float, y: float, normal: CircleColumns, groups: GroupColumns, around: Situation, settings: Settings
 ) -> float:
-    """V/r of a new landmark: of its λ group's circle, else of the ground, else at the configured depth."""
+    """V/r of a new landmark: of its λ group's circle, else of the ground, else at the configured depth.
+
+    That is a rover's: at 12 m/s it would be met in a third of a second, and few corners be found again.
+    """
     circle = line_expert.circle_at(groups, x, y)
     if circle >= 0:
         return normal.expansion[circle]
     speed = around.speed_mps if math.isfinite(around.speed_mps) else 0.0
-    expansion = speed / settings.scene_depth_m
+    expansion = min(max(speed / settings.scene_depth_m, -FIRST_EXPANSION_HZ), FIRST_EXPANSION_HZ)
     if around.camera_height_m > 0:
         below = max(y - around.horizon_y, 0.0)
         ground = speed / (around.camera_height_m * around.pinhole.focal) * below

@@ -8,7 +8,7 @@ from lcf_edge.filter import edge_expert
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
-from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable
+from lcf_edge.filter.tables import CircleTable, CornerTable, EdgeTable, GroupTable
 from lcf_edge.messages import Cause
 
 PINHOLE = Pinhole(500.0, 500.0, 319.5, 239.5)
@@ -92,3 +92,23 @@ def test_where_blur_loses_most_it_costs_as_much_less(found: int, cost: float) ->
 
 def test_a_few_edges_show_no_blur() -> None:
     assert lost(14, 0) == 1.0
+
+
+# New landmarks
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "flow_pxps"), [(2.0, 50.0), (-2.0, -50.0), (20.0, 100.0)], ids=["slow", "in reverse", "fast"]
+)
+def test_a_new_landmark_is_looked_for_at_the_scenes_depth_but_not_nearer_than_a_second(
+    speed_mps: float, flow_pxps: float
+) -> None:
+    """100 px from the focus; at 20 m/s and 4 m it would be looked for five times as far on, and lost."""
+    edges, normal, corners = EdgeTable(4, 2, 2), CircleTable(2), CornerTable(1)
+    around = Situation(Config(), PINHOLE)
+    around.speed_mps, around.dt_s, around.camera_height_m = speed_mps, DT_S, 0.0
+    corners.x[0], corners.y[0] = around.focus_x + 100.0, around.focus_y
+    corners.columns.count = 1
+    edge_expert.add(edges.columns, normal.columns, corners.columns, GroupTable(1).columns, around, 1, 0, SETTINGS)
+    assert edges.count == 1
+    assert edges.speed[0] == pytest.approx(flow_pxps)
