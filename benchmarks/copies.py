@@ -101,6 +101,19 @@ def lines_of(path: Path) -> tuple[list[str], list[str]]:
     return [line for line in lines if line[0] == "#"], [line for line in lines if line[0] != "#"]
 
 
+def copy_all_but_images(recording: Path, copy: Path) -> None:
+    """Copy an ASL recording, with an empty folder of images."""
+    shutil.copytree(recording, copy, ignore=lambda folder, _: ["data"] if Path(folder).name == "cam0" else [])
+    (copy / "mav0/cam0/data").mkdir()
+
+
+def write_image(path: Path, image: Grey) -> None:
+    """Write an image under any name, without the losses of a second compression."""
+    written = path.with_suffix(".png")
+    cv2.imwrite(str(written), image)
+    written.rename(path)
+
+
 def write(recording: Path, into: Path) -> Iterator[str]:
     """Write all copies of an ASL recording into a folder; yield the name of each. Raises ``OSError``."""
     head, rows = lines_of(recording / "mav0/cam0/data.csv")
@@ -109,7 +122,7 @@ def write(recording: Path, into: Path) -> Iterator[str]:
     selections |= dict.fromkeys(ALTERATIONS, rows)
     for name, chosen in selections.items():
         copy = into / f"{recording.name}@{name}"
-        shutil.copytree(recording, copy, ignore=lambda folder, _: ["data"] if Path(folder).name == "cam0" else [])
+        copy_all_but_images(recording, copy)
         (copy / "mav0/cam0/data.csv").write_text("\n".join([*head, *chosen]) + "\n", "utf-8")
         _copy_images(recording, copy, chosen, ALTERATIONS.get(name))
         _keep_truth(copy / "truth.jsonl", {int(row.split(",")[0]) for row in chosen})
@@ -142,7 +155,6 @@ def write_failing(recording: Path, into: Path) -> Iterator[str]:
 
 def _copy_images(recording: Path, copy: Path, rows: Sequence[str], alteration: Alteration | None) -> None:
     random = np.random.default_rng(0)
-    (copy / "mav0/cam0/data").mkdir()
     for row in rows:
         name = Path("mav0/cam0/data", row.split(",")[1].strip())
         if alteration is None:
@@ -151,9 +163,7 @@ def _copy_images(recording: Path, copy: Path, rows: Sequence[str], alteration: A
         image = cv2.imread(str(recording / name), cv2.IMREAD_UNCHANGED)
         if image is None:
             raise RecordingError(f"{recording / name}: no image")
-        written = (copy / name).with_suffix(".png")  # without the losses of a second compression
-        cv2.imwrite(str(written), alteration(np.asarray(image, np.uint8), random))
-        written.rename(copy / name)
+        write_image(copy / name, alteration(np.asarray(image, np.uint8), random))
 
 
 def _keep_truth(path: Path, stamps_ns: set[int]) -> None:

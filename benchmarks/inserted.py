@@ -9,7 +9,6 @@ where they are wrong, it moves a little.
 
 import argparse
 import json
-import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -22,7 +21,7 @@ import numpy as np
 import numpy.typing as npt
 from msgspec.structs import replace
 
-from benchmarks.copies import lines_of
+from benchmarks.copies import copy_all_but_images, lines_of, write_image
 from benchmarks.methods import FilterMethod
 from benchmarks.playing import lens_of
 from drivers.samples import Frame, ImuSample
@@ -132,24 +131,29 @@ def shown_pitch(images: Sequence[Grey], lens: Lens) -> Floats:
 
 def board_for(way: Way, met: int, motion: str, config: Config, side: float) -> Board:
     """The board that is met at image ``met``; ``side``: 1 or -1, to which it crosses."""
-    half_m, k = config.vehicle.half_width_m, met
+    half_m = config.vehicle.half_width_m
     width_m, height_m = min(WIDE * half_m, WIDEST_M), min(TALL * half_m, TALLEST_M)
-    x, z, still = np.full_like(way.x_m, way.x_m[k]), np.full_like(way.z_m, way.z_m[k]), np.zeros_like(way.x_m)
+    x, z, still = np.full_like(way.x_m, way.x_m[met]), np.full_like(way.z_m, way.z_m[met]), np.zeros_like(way.x_m)
     if motion == "leads":
         driven = np.cumsum(way.speed_mps * np.diff(way.time_s, prepend=way.time_s[0]))
-        along = driven[k] - LEADS * (driven[k] - driven)
+        along = driven[met] - LEADS * (driven[met] - driven)
         x, z = np.interp(along, driven, way.x_m), np.interp(along, driven, way.z_m)
         return Board(width_m, height_m, x, z, np.gradient(x, way.time_s), np.gradient(z, way.time_s))
-    speed = CROSSES * way.speed_mps[k] * side if motion == "crosses" else 0.0
-    vx, vz = speed * np.cos(way.heading_rad[k]), -speed * np.sin(way.heading_rad[k])
-    before = way.time_s - way.time_s[k]
+    speed = CROSSES * way.speed_mps[met] * side if motion == "crosses" else 0.0
+    vx, vz = speed * np.cos(way.heading_rad[met]), -speed * np.sin(way.heading_rad[met])
+    before = way.time_s - way.time_s[met]
     return Board(width_m, height_m, x + vx * before, z + vz * before, still + vx, still + vz)
+
+
+def seen_from(x_m: float, z_m: float, heading_rad: float) -> tuple[float, float]:
+    """To the right of and ahead of a vehicle with that heading, m."""
+    sin, cos = np.sin(heading_rad), np.cos(heading_rad)
+    return x_m * cos - z_m * sin, x_m * sin + z_m * cos
 
 
 def corners_px(way: Way, board: Board, n: int, config: Config, lens: Lens) -> Floats | None:
     """Corners of the board in an image, clockwise from the upper left, px (4, 2); None: it is not in view."""
-    dx, dz, heading = board.x_m[n] - way.x_m[n], board.z_m[n] - way.z_m[n], way.heading_rad[n]
-    right, ahead = dx * np.cos(heading) - dz * np.sin(heading), dx * np.sin(heading) + dz * np.cos(heading)
+    right, ahead = seen_from(board.x_m[n] - way.x_m[n], board.z_m[n] - way.z_m[n], way.heading_rad[n])
     if ahead < NEAREST_M:
         return None
     half, foot = board.width_m / 2, config.camera.height_m
@@ -197,9 +201,9 @@ def is_met(way: Way, board: Board, n: int, config: Config) -> bool:
         along = heading + turned / 2
         x = dx + vx * after_s - speed * after_s * np.sin(along)
         z = dz + vz * after_s - speed * after_s * np.cos(along)
-        sin, cos = np.sin(heading + turned), np.cos(heading + turned)
-        if x * sin + z * cos <= 0:
-            return bool(abs(x * cos - z * sin) < config.vehicle.half_width_m + board.width_m / 4)
+        right, ahead = seen_from(x, z, heading + turned)
+        if ahead <= 0:
+            return bool(abs(right) < config.vehicle.half_width_m + board.width_m / 4)
     return False
 
 
@@ -225,15 +229,11 @@ def write(path: Path, settings: Sequence[str], into: Path) -> Iterator[str]:
             board = board_for(way, int(share * (len(rows) - 1)), motion, config, 1.0 - 2.0 * (number % 2))
             grey = texture(np.random.default_rng(number))
             copy = into / f"{path.name}@{motion}-{number}"
-            shutil.copytree(path, copy, ignore=lambda folder, _: ["data"] if Path(folder).name == "cam0" else [])
-            (copy / "mav0/cam0/data").mkdir()
+            copy_all_but_images(path, copy)
             truth = []
             for n, name in enumerate(names):
                 corners = corners_px(way, board, n, config, lens)
-                shown = whole[n] if corners is None else drawn(whole[n], corners, grey)
-                written = (copy / name).with_suffix(".png")
-                cv2.imwrite(str(written), shown)
-                written.rename(copy / name)
+                write_image(copy / name, whole[n] if corners is None else drawn(whole[n], corners, grey))
                 objects = _truth(way, board, n, corners, motion, config)
                 truth.append(json.dumps({"stamp_ns": int(rows[n].split(",")[0]), "objects": objects}) + "\n")
             (copy / "truth.jsonl").write_text("".join(truth), "utf-8")
