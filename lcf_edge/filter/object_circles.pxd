@@ -20,6 +20,7 @@ cdef int LEADS
 cdef int SEEN
 cdef double INFINITY
 
+cdef bint is_due(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef bint is_sure(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(o=Py_ssize_t)
@@ -35,6 +36,6 @@ cdef void show(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ss
 cdef bint has_left(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 @cython.locals(ended=int, o=int)
 cdef void end_outside(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(o=Py_ssize_t, c=int, is_due=bint)
+@cython.locals(o=Py_ssize_t, c=int)
 cpdef void update(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil
 cpdef void join_rebels(EdgeColumns edges, Py_ssize_t start, CircleColumns circles, ObjectColumns objects, Situation around, Settings settings) noexcept nogil

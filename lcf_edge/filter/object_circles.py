@@ -19,6 +19,13 @@ SEEN = int(ObjectState.SEEN)
 INFINITY = float("inf")
 
 
+def is_due(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+    """Whether a published object will probably be met, and is seen, or so near that its corners are lost."""
+    if is_sure(objects, o, settings):
+        return objects.probability[o] > square_expert.EVEN
+    return objects.active[o] != 0 and square_expert.is_met_soon(objects, o, settings)
+
+
 def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
     """Whether an object is published, and seen in this frame."""
     return objects.active[o] != 0 and objects.trust[o] >= settings.tr_s and objects.state[o] == SEEN
@@ -123,14 +130,11 @@ def update(
     settings: Settings,
     ids: Ids,
 ) -> None:
-    """C_r from S: an object that is seen, and more likely met than not, keeps a circle even if its edges hardly break
-    the flow.
-    """
+    """C_r from S: an object that is due keeps a circle even if its edges hardly break the flow, or are lost."""
     correct(objects, circles, settings)
     end_outside(objects, circles, edges, plane, around)
     for o in range(objects.capacity):
-        is_due = is_sure(objects, o, settings) and objects.probability[o] > square_expert.EVEN
-        if not is_due or is_shown(objects, o, circles, settings):
+        if not is_due(objects, o, settings) or is_shown(objects, o, circles, settings):
             continue
         c = own_circle(circles, o)
         if c < 0:

@@ -64,6 +64,7 @@ cdef int MIN_THROUGH
 cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
+cdef double SOON_S
 cdef double REMNANT_SHARE
 cdef double RECENT_S
 cdef double LEAVES_S
@@ -166,6 +167,8 @@ cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept
 @cython.locals(hidden=bint, patience_s=double)
 cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
 cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
+cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 cdef void take_place(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil

@@ -77,6 +77,7 @@ OUTSIDE_S = 1.0  # out of view,
 COMING_S = 3.0  # and out of view, but moving towards the path;
 NEAR_S = 1.0  # nearer than ``NEAR_M``, at least,
 NEAR_M = 1.5
+SOON_S = 2.0  # or farther, but large, well trusted and probably met within this time: until then;
 REMNANT_SHARE = 0.33  # fewer edges of such a near object, as a share of its recent number, do not measure its motion;
 RECENT_S = 3.0  # time constant with which that number decays;
 LEAVES_S = 0.5  # unless it leaves the image within this time
@@ -867,6 +868,17 @@ def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
     return min(max(objects.range[o] / max(math.fabs(around.speed_mps), SLOW_MPS), NEAR_S), LINGERS_S)
 
 
+def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+    """Whether a well trusted object farther than ``NEAR_M`` will probably be met within ``SOON_S``.
+
+    Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides.
+    """
+    is_trusted = objects.trust[o] >= 0.5 * (settings.tr_s + settings.tr_max)
+    is_large = max(objects.width[o], objects.height[o]) > settings.min_coast_px
+    is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S
+    return is_trusted and is_large and is_soon and objects.state[o] != HIDDEN and objects.probability[o] > EVEN
+
+
 def go_on(
     objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
 ) -> None:
@@ -891,6 +903,8 @@ def go_on(
         patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
     elif math.fabs(around.speed_mps) < SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
+    elif is_met_soon(objects, o, settings):
+        patience_s = LINGERS_S
     elif objects.range[o] < NEAR_M:
         patience_s = near_s(objects, o, around)
     if objects.unseen_s[o] > patience_s:

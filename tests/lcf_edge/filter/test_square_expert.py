@@ -436,6 +436,29 @@ def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     assert last_s - lost_s == pytest.approx(about_s, abs=0.11)
 
 
+@pytest.mark.parametrize(("right_mps", "is_met"), [(0.0, True), (2.5, False)], ids=["in the way", "leaving it"])
+def test_what_is_lost_shortly_before_a_fast_vehicle_meets_it_is_there_until_then(
+    drive: Drive, box: Landmarks, clutter: Landmarks, right_mps: float, is_met: bool
+) -> None:
+    """It grows too fast for its corners to be tracked: from 7 m on, at 6 m/s, none is found."""
+    ahead = drive(box((0.1, -0.4, 13.0), (1.2, 1.2, 0.0), landmarks=60), np.array([right_mps, 0, 0]))
+    way = replace(drive(clutter(150)) + ahead, frames=38, speed_mps=6.0)
+    mine, lost = looks_of(way, slice(150, None)), 20
+    tables, reported, shown = LineCircleFilter(Config(), way.lens), [], []
+    for seq, (corners, motion) in enumerate(way):
+        tables.step(corners if seq < lost else without(corners, mine), motion)
+        reported.append(len(published(tables.objects)))
+        shown.append(bool((tables.rebel.active & (tables.rebel.trust >= TR_S)).any()))
+    assert reported[lost - 1] == 1
+    assert shown[lost - 1]
+    if is_met:
+        assert set(reported[lost:]) == {1}
+        assert all(shown[lost:])
+    else:
+        assert set(reported[lost + round(0.6 * FPS) :]) == {0}
+        assert not any(shown[lost + round(0.6 * FPS) :])
+
+
 def test_without_a_speed_who_is_lost_nearby_is_remembered_for_a_second(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
