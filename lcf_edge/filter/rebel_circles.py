@@ -152,7 +152,7 @@ def coasts(circles: CircleColumns, c: int, around: Situation, settings: Settings
         and math.fabs(circles.ttc[c]) < COAST_SHARE * around.horizon_s
         and math.fabs(circles.ttc[c] * around.yaw_rate_radps) < MAX_TURN_RAD
         and max(circles.width[c], circles.height[c]) > settings.min_coast_px
-        and circles.trust[c] >= 0.5 * (settings.tr_s + settings.tr_max)
+        and circles.trust[c] >= settings.tr_coast
     )
 
 

@@ -25,6 +25,6 @@ cdef class RestTest:
     cdef double still_s
 
 cdef int latest_key(KeyFrames keys) noexcept nogil
-cpdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil
+cdef void look(RestTest test, EdgeColumns edges, Py_ssize_t i, int slot, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(stood=bint, known=bint, seen=bint, shows_ground=bint)
 cpdef void measure(RestTest test, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around) noexcept nogil

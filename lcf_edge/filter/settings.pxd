@@ -1,6 +1,6 @@
 cdef class Settings:
     cdef readonly double tr_cr, tr_s, tr_max, tr_new, delta_px, bl0_px, leap_px, bs_px
-    cdef double bl_min_px
+    cdef double tr_coast, bl_min_px
     cdef readonly double scene_depth_m
     cdef double appearance_max, appearance_share, key_interval_s, key_motion_px
     cdef readonly double eps_beta_rad

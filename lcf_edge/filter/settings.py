@@ -20,7 +20,8 @@ MIN_PSI_MARGIN_PX = 5.0
 
 
 class Settings:
-    """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s).
+    """Constants of the filter. ``tr_new``: Tr of everything new, ½(Tr_cr + Tr_s). ``tr_coast``: Tr from which what
+    grows too fast for its corners to be tracked goes on without them, ½(Tr_s + Tr_max).
 
     Sizes and angles of the world are px of ``pinhole``: the configuration gives them at a focal length of
     ``REFERENCE_FOCAL_PX``, so that they hold for every image size and lens. Gates and noise of corners are px of the
@@ -31,6 +32,7 @@ class Settings:
         scale = pinhole.focal / REFERENCE_FOCAL_PX
         self.tr_cr, self.tr_s, self.tr_max = settings.tr_cr, settings.tr_s, settings.tr_max
         self.tr_new = 0.5 * (settings.tr_cr + settings.tr_s)
+        self.tr_coast = 0.5 * (settings.tr_s + settings.tr_max)
         self.delta_px = settings.delta_px
         self.bl0_px, self.bl_min_px, self.leap_px = settings.bl0_px, settings.bl_min_px, settings.leap_px
         self.bs_px, self.scene_depth_m = max(settings.bs_px * scale, MIN_CIRCLE_PX), settings.scene_depth_m

@@ -873,10 +873,10 @@ def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
 
     Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides.
     """
-    is_trusted = objects.trust[o] >= 0.5 * (settings.tr_s + settings.tr_max)
     is_large = max(objects.width[o], objects.height[o]) > settings.min_coast_px
     is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S
-    return is_trusted and is_large and is_soon and objects.state[o] != HIDDEN and objects.probability[o] > EVEN
+    is_trusted = objects.trust[o] >= settings.tr_coast and objects.state[o] != HIDDEN
+    return is_trusted and is_large and is_soon and objects.probability[o] > EVEN
 
 
 def go_on(

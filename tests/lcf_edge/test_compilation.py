@@ -54,7 +54,7 @@ def test_every_module_with_declarations_is_in_the_extension_and_comes_from_it() 
 @needs_extension
 @pytest.mark.skipif(platform.machine() != "x86_64", reason="the size is that for x86-64")
 def test_the_extension_is_so_small_that_the_one_for_64_bit_arm_stays_below_what_a_release_allows() -> None:
-    larger_kb = 60.0  # its pages have 64 kB; measured, 28 to 40
+    larger_kb = 70.0  # its pages have 64 kB
     assert Path(str(extension().path)).stat().st_size / 1e3 + larger_kb < MAX_EXTENSION_KB
 
 
