@@ -66,7 +66,7 @@ def judge_all(
             verdicts.oldest[j] = key_frames.oldest_key(edges, i, keys)
             rebel_detection.link(verdicts, j, edges, i, verdicts.oldest[j] % KEYS, baselines)
             rebel_detection.judge(verdicts, j, edges, baselines, around)
-    rebel_detection.find_incoming(verdicts, edges, baselines, around, settings)
+    rebel_detection.judge_together(verdicts, edges, baselines, around, settings)
 
 
 def breaks_flow(verdicts: Verdicts, j: int) -> bool:
@@ -147,7 +147,7 @@ def decide(
             births += 1
             continue
         edges.suspect_keys[i] = 0
-        if verdicts.mover[j]:  # not one landmark: discard its history
+        if verdicts.mover[j] and not verdicts.together[j]:  # not one landmark: discard its history
             edges.born_key[i] = keys.number
     return births
 

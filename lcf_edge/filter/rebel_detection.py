@@ -13,12 +13,17 @@ from lcf_edge.filter import edge_equations, error_matrix, flow, lengths, path
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.error_matrix import MotionError
-from lcf_edge.filter.memory import doubles, integers, octets
+from lcf_edge.filter.memory import Doubles, doubles, integers, octets
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 
 NEAREST_M = 0.25  # depth below which nothing stationary is expected
 MOVER_SIGMAS = 5.0  # by which a mover leaves the flow of the static scene
+GROUP_SIGMAS = 4.0  # and a group of them,
+GROUP_SIZE = 4  # edges at least,
+TOGETHER_SIGMAS = 1.5  # of both, by which they may differ,
+ODD_SIGMAS = 1.5  # and by which each leaves the flow at least,
+SAME_WAY = 0.9  # cosine of the angle between their flow lines, at least
 PARALLAX_DRIFT = 0.25  # drift, as a share of the outward motion, of a corner between two things at different depths
 LINK_RATIO = 1.8  # factor by which the rates of two links of a chain may differ
 GROUND_DIPS = 0.8  # share of the camera's height by which the ground may lie deeper, before it is a leader
@@ -48,8 +53,8 @@ class Verdicts:
     ``r``: px from the focus. ``drift``: px off the flow line. ``short``: px by which the edge falls short of the flow.
     ``over``: px by which it exceeds it. ``outward``: px along the flow line. ``expansion``: μ per second, 1/s.
     ``sigma``: of the rotation since, px along the flow line; ``astray``: of O, likewise; ``noise``: of its own two
-    places, px.
-    ``mover``, ``incoming``: the verdict.
+    places, px. ``along``, ``across``: of all this, along the flow line and across it, px.
+    ``mover``, ``incoming``: the verdict. ``together``: only its neighbours show that it is a mover.
 
     ``near``: rows that may stand near the path, with their positions (``near_x``, ``near_y``, px), inverse ranges
     (``inverse``, 1/m) with 1 sigma (``inverse_sigma``), ``lever_x`` and ``lever_y``, px m, their motion for 1/Z = 1/m,
@@ -62,8 +67,8 @@ class Verdicts:
         self.row, self.slot, self.oldest, self.near = [integers(capacity) for _ in range(4)]
         self.x, self.y, self.r, self.drift = [doubles(capacity) for _ in range(4)]
         self.short, self.over, self.outward, self.expansion = [doubles(capacity) for _ in range(4)]
-        self.mover, self.incoming = [octets(capacity) for _ in range(2)]
-        self.sigma, self.astray, self.noise = [doubles(capacity) for _ in range(3)]
+        self.mover, self.together, self.incoming = [octets(capacity) for _ in range(3)]
+        self.sigma, self.astray, self.noise, self.along, self.across = [doubles(capacity) for _ in range(5)]
         self.inverse, self.inverse_sigma = [doubles(capacity) for _ in range(2)]
         self.near_x, self.near_y, self.lever_x, self.lever_y = [doubles(capacity) for _ in range(4)]
         self.weight, self.common, self.level = [doubles(capacity) for _ in range(3)]
@@ -106,11 +111,12 @@ def judge(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, 
     verdicts.sigma[j] = math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
     verdicts.noise[j] = error_matrix.add_places(verdicts.error, edges, i, around)
     verdicts.astray[j] = math.sqrt(error_matrix.add_focus(verdicts.error, outward / r, cos, sin, around))
-    along = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
-    across = MOVER_SIGMAS * math.sqrt(error_matrix.variance(verdicts.error, -sin, cos))
-    drifts = math.fabs(drift) > across + PARALLAX_DRIFT * math.fabs(outward)
-    verdicts.mover[j] = 1 if drifts or max(verdicts.short[j], verdicts.over[j]) > along else 0
-    verdicts.incoming[j] = 0
+    verdicts.along[j] = math.sqrt(error_matrix.variance(verdicts.error, cos, sin))
+    verdicts.across[j] = math.sqrt(error_matrix.variance(verdicts.error, -sin, cos))
+    drifts = math.fabs(drift) > MOVER_SIGMAS * verdicts.across[j] + PARALLAX_DRIFT * math.fabs(outward)
+    strays = max(verdicts.short[j], verdicts.over[j]) > MOVER_SIGMAS * verdicts.along[j]
+    verdicts.mover[j] = 1 if drifts or strays else 0
+    verdicts.together[j] = verdicts.incoming[j] = 0
 
 
 def ground_outward(y: float, lever: float, around: Situation) -> float:
@@ -261,6 +267,69 @@ def find_incoming(
     for a in range(verdicts.near_count):
         ask_neighbours(verdicts, a, settings)
         verdicts.incoming[verdicts.near[a]] = 1 if will_be_met(verdicts, a, edges, around) else 0
+
+
+def moves_together(
+    verdicts: Verdicts,
+    j: int,
+    off: Doubles,
+    sigma: Doubles,
+    parallax: float,
+    edges: EdgeColumns,
+    around: Situation,
+    settings: Settings,
+) -> bool:
+    """Whether an edge and the neighbours that are off alike are so by too much, on average.
+
+    ``off``: px off the flow of the static scene, with ``sigma``. ``parallax``: share of the outward motion that is not
+    off. The noise of their places averages out; the rest of ``sigma`` does not, nor does noise that is unusual.
+    """
+    x, y = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
+    from_x, from_y = x - around.focus_x, y - around.focus_y
+    least_cos = SAME_WAY * lengths.of(from_x, from_y)
+    number = total = mean = outward = 0.0
+    for k in range(verdicts.count):
+        i = verdicts.row[k]
+        if lengths.of(edges.x[i] - x, edges.y[i] - y) >= settings.neighbour_px:
+            continue
+        other_x, other_y = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
+        if from_x * other_x + from_y * other_y < least_cos * lengths.of(other_x, other_y):
+            continue
+        if math.fabs(off[k] - off[j]) > TOGETHER_SIGMAS * (verdicts.noise[k] + verdicts.noise[j]):
+            continue
+        weight = 1 / (verdicts.noise[k] * verdicts.noise[k])
+        number += 1
+        total += weight
+        mean += weight * off[k]
+        outward += weight * math.fabs(verdicts.outward[k])
+    unusual = max(around.noise_px - COMMON_NOISE_PX, 0.0)
+    common2 = max(sigma[j] * sigma[j] - verdicts.noise[j] * verdicts.noise[j], 0.0) + unusual * unusual
+    least = GROUP_SIGMAS * math.sqrt(1 / total + common2) + parallax * outward / total
+    return number >= GROUP_SIZE and math.fabs(mean) / total > least
+
+
+def find_moving_together(verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings) -> None:
+    """Mark edges as movers that are off too little to tell alone, but together with their neighbours."""
+    for j in range(verdicts.count):
+        if verdicts.mover[j] or verdicts.incoming[j]:
+            continue
+        drift = math.fabs(verdicts.drift[j]) - PARALLAX_DRIFT * math.fabs(verdicts.outward[j])
+        drifts = drift > ODD_SIGMAS * verdicts.across[j] and moves_together(
+            verdicts, j, verdicts.drift, verdicts.across, PARALLAX_DRIFT, edges, around, settings
+        )
+        falls_short = verdicts.short[j] > ODD_SIGMAS * verdicts.along[j] and moves_together(
+            verdicts, j, verdicts.short, verdicts.along, 0.0, edges, around, settings
+        )
+        if drifts or falls_short:
+            verdicts.mover[j] = verdicts.together[j] = 1
+
+
+def judge_together(
+    verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation, settings: Settings
+) -> None:
+    """Judge edges with their neighbours: which stand in the way, and which of the others move."""
+    find_incoming(verdicts, edges, baselines, around, settings)
+    find_moving_together(verdicts, edges, around, settings)
 
 
 def agree(whole: Verdicts, j: int, recent: Verdicts, k: int, baselines: Baselines) -> bool:

@@ -531,15 +531,17 @@ def belong_together(
     around: Situation,
     settings: Settings,
 ) -> bool:
-    """Whether every measured circle of one object could be a part of the other, and vice versa."""
+    """Whether every measured circle of one object could be a part of the other, and vice versa; one at least."""
+    measured = 0
     for c in range(circles.capacity):
         if squares.parts.count[c] < MIN_EDGES:
             continue
+        measured += 1 if circles.square[c] == a or circles.square[c] == b else 0
         if circles.square[c] == a and not belongs(objects, b, circles, c, squares.parts, around, settings):
             return False
         if circles.square[c] == b and not belongs(objects, a, circles, c, squares.parts, around, settings):
             return False
-    return True
+    return measured > 0
 
 
 def unite(

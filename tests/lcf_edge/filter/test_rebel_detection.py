@@ -89,7 +89,7 @@ class Watched:
         edges, baselines = self.seen(known=known)
         np.asarray(baselines.sigma_px)[:] += sigma_px
         verdicts = self.judged(edges, baselines, 0)
-        rebel_detection.find_incoming(verdicts, edges.columns, baselines, self.around, SETTINGS)
+        rebel_detection.judge_together(verdicts, edges.columns, baselines, self.around, SETTINGS)
         return Judged(verdicts)
 
     def agreed(self) -> list[bool]:
@@ -322,6 +322,42 @@ def test_a_small_box_is_told_from_the_ground_by_its_upright_shape(watch: Watch) 
     assert verdict.incoming[above].all()
 
 
+def off_a_little(watch: Watch, edges: int) -> Watched:
+    """Something 20 m ahead that has moved a little to the side; each edge shows it by a few sigmas."""
+    board = [(0.1 * (k % 4) - 0.15, -1.5 - 0.2 * (k // 4), 20.0) for k in range(edges)]
+    watched = watch(board, (0.2, 0.0, 0.0), corner_var=0.3)
+    verdicts = watched.judged(*watched.seen(), 0)
+    sigmas = np.abs(verdicts.drift) / np.asarray(verdicts.across)
+    assert ((sigmas > 1.5) & (sigmas < 4.0)).all()
+    return watched
+
+
+@pytest.mark.parametrize(("edges", "moves"), [(1, False), (8, True)])
+def test_what_moves_too_little_for_one_edge_to_show_it_is_shown_by_several(
+    watch: Watch, edges: int, moves: bool
+) -> None:
+    assert (off_a_little(watch, edges).verdict().mover == moves).all()
+
+
+def test_few_edges_that_happen_to_be_off_alike_are_no_movers(watch: Watch) -> None:
+    assert not off_a_little(watch, 3).verdict().mover.any()
+
+
+def test_neighbours_that_are_off_to_both_sides_do_not_move_together(watch: Watch) -> None:
+    watched = off_a_little(watch, 6)
+    edges, baselines = watched.seen()
+    then_x = np.asarray(watched.judged(edges, baselines, 0).x)
+    edges.x[:6:2] -= 2 * (edges.x[:6:2] - then_x[::2])
+    verdicts = watched.judged(edges, baselines, 0)
+    rebel_detection.judge_together(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    assert not np.asarray(verdicts.mover).any()
+
+
+def test_what_the_rotation_may_have_shifted_alike_does_not_move_together(watch: Watch) -> None:
+    """However many edges: its uncertainty does not average out."""
+    assert not off_a_little(watch, 8).verdict(sigma_px=1.0).mover.any()
+
+
 @given(st.floats(1.2, 6.0), st.floats(-0.4, 0.4), st.floats(0.85, 1.15))
 def test_the_ground_is_not_taken_for_something_upright_even_if_misjudged(
     watch: Watch, z: float, x: float, deeper: float
@@ -340,7 +376,7 @@ def test_what_a_wrong_rotation_shifts_alike_does_not_seem_near(watch: Watch) -> 
     np.asarray(baselines.sigma_px)[:] = 2.0
     edges.y[:] -= 4.0
     verdicts = watched.judged(edges, baselines, 0)
-    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    rebel_detection.judge_together(verdicts, edges.columns, baselines, watched.around, SETTINGS)
     assert not np.asarray(verdicts.incoming).any()
 
 
@@ -361,7 +397,7 @@ def test_edges_of_the_ground_that_happen_to_agree_do_not_make_it_upright(watch: 
     then_y = np.asarray(watched.judged(edges, baselines, 0).y)
     edges.y[:number] = then_y + tile_px * np.round((edges.y[:number] - then_y) / tile_px)
     verdicts = watched.judged(edges, baselines, 0)
-    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    rebel_detection.judge_together(verdicts, edges.columns, baselines, watched.around, SETTINGS)
     assert not np.asarray(verdicts.incoming).any()
 
 
@@ -379,11 +415,11 @@ def test_edges_that_scatter_more_than_their_noise_are_believed_less(watch: Watch
     watched = watch([(x, y, 6.0) for x in (-0.1, 0.0, 0.1) for y in (-0.35, -0.25)], corner_var=0.4)
     edges, baselines = watched.seen()
     verdicts = watched.judged(edges, baselines, 0)
-    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    rebel_detection.judge_together(verdicts, edges.columns, baselines, watched.around, SETTINGS)
     assert np.asarray(verdicts.incoming).all()
     edges.x[: edges.count] += [3.0, -3.0, -3.0, 3.0, 3.0, -3.0]
     verdicts = watched.judged(edges, baselines, 0)
-    rebel_detection.find_incoming(verdicts, edges.columns, baselines, watched.around, SETTINGS)
+    rebel_detection.judge_together(verdicts, edges.columns, baselines, watched.around, SETTINGS)
     assert not np.asarray(verdicts.mover).any()
     assert not np.asarray(verdicts.incoming).any()
 

@@ -112,13 +112,27 @@ def test_what_goes_ahead_leads(drive: Drive, box: Landmarks, clutter: Landmarks)
     assert tables.objects.probability[row] < 0.2
 
 
-def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+def two_who_cross(drive: Drive, box: Landmarks, clutter: Landmarks) -> Any:
+    """From both sides."""
     left = drive(box((-2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([1.0, 0, 0]))
     right = drive(box((2.2, -0.55, 6.0), (0.4, 1.7, 0.2), landmarks=50), np.array([-1.0, 0, 0]))
-    *_, tables = steps(replace(drive(clutter(150)) + left + right, frames=22))
+    return replace(drive(clutter(150)) + left + right, frames=22)
+
+
+def test_two_who_cross_from_both_sides_are_two(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    *_, tables = steps(two_who_cross(drive, box, clutter))
     rows = published(tables.objects)
     assert len(rows) == 2
     assert sorted(np.sign(tables.objects.right[rows])) == [-1, 1]
+
+
+def test_two_of_which_an_image_shows_nothing_stay_two(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    way = two_who_cross(drive, box, clutter)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    tables.step(without(corners, looks_of(way, slice(None))), motion)
+    assert len(published(tables.objects)) == 2
 
 
 @pytest.mark.parametrize(("gap_px", "pxps", "one"), [(10, 0, True), (10, 60, True), (60, 0, False), (60, 60, True)])
