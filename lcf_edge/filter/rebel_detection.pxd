@@ -54,10 +54,10 @@ cpdef void judge(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines b
 cdef double ground_outward(double y, double lever, Situation around) noexcept nogil
 cdef double sigma_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef double common_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
+cdef double unusual_px(Situation around) noexcept nogil
 cdef double lever_of(Verdicts verdicts, Py_ssize_t j, Baselines baselines) noexcept nogil
 @cython.locals(number=double, total=double, mean=double, outward=double)
 cdef bint moves_together(Verdicts verdicts, Py_ssize_t j, double[::1] off, double[::1] sigma, double parallax, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
-@cython.locals(drifts=bint, falls_short=bint)
 cdef void find_moving_together(Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef void near_path(Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef bint are_alike(Verdicts verdicts, Py_ssize_t a, Py_ssize_t b) noexcept nogil

@@ -138,6 +138,11 @@ def common_px(verdicts: Verdicts, j: int) -> float:
     return lengths.of(verdicts.sigma[j], verdicts.astray[j])
 
 
+def unusual_px(around: Situation) -> float:
+    """Noise beyond what is usual, which neighbours share, px."""
+    return max(around.noise_px - COMMON_NOISE_PX, 0.0)
+
+
 def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
     """r·ΔZ, px m, so that outward/lever is 1/Z; negative in reverse."""
     return verdicts.r[j] * baselines.depth_m[verdicts.slot[j]]
@@ -171,7 +176,7 @@ def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, arou
         verdicts.lever_x[a] = baselines.depth_m[slot] * (verdicts.x[j] - baselines.focus_x[slot])
         verdicts.lever_y[a] = baselines.depth_m[slot] * (verdicts.y[j] - baselines.focus_y[slot])
         verdicts.weight[a] = 1 / (verdicts.noise[j] * verdicts.noise[j])
-        verdicts.common[a] = common_px(verdicts, j) + max(around.noise_px - COMMON_NOISE_PX, 0.0)
+        verdicts.common[a] = common_px(verdicts, j) + unusual_px(around)
         verdicts.level[a] = 0.0
         if around.camera_height_m > 0:
             below = max(verdicts.near_y[a] - lowest_y, 0.0)
@@ -286,11 +291,13 @@ def moves_together(
     """
     x, y = edges.x[verdicts.row[j]], edges.y[verdicts.row[j]]
     from_x, from_y = x - around.focus_x, y - around.focus_y
+    reach2 = settings.neighbour_px * settings.neighbour_px
     least_cos = SAME_WAY * lengths.of(from_x, from_y)
     number = total = mean = outward = 0.0
     for k in range(verdicts.count):
         i = verdicts.row[k]
-        if lengths.of(edges.x[i] - x, edges.y[i] - y) >= settings.neighbour_px:
+        dx, dy = edges.x[i] - x, edges.y[i] - y
+        if dx * dx + dy * dy >= reach2:
             continue
         other_x, other_y = edges.x[i] - around.focus_x, edges.y[i] - around.focus_y
         if from_x * other_x + from_y * other_y < least_cos * lengths.of(other_x, other_y):
@@ -302,7 +309,7 @@ def moves_together(
         total += weight
         mean += weight * off[k]
         outward += weight * math.fabs(verdicts.outward[k])
-    unusual = max(around.noise_px - COMMON_NOISE_PX, 0.0)
+    unusual = unusual_px(around)
     common2 = max(sigma[j] * sigma[j] - verdicts.noise[j] * verdicts.noise[j], 0.0) + unusual * unusual
     least = GROUP_SIGMAS * math.sqrt(1 / total + common2) + parallax * outward / total
     return number >= GROUP_SIZE and math.fabs(mean) / total > least
@@ -314,13 +321,13 @@ def find_moving_together(verdicts: Verdicts, edges: EdgeColumns, around: Situati
         if verdicts.mover[j] or verdicts.incoming[j]:
             continue
         drift = math.fabs(verdicts.drift[j]) - PARALLAX_DRIFT * math.fabs(verdicts.outward[j])
-        drifts = drift > ODD_SIGMAS * verdicts.across[j] and moves_together(
-            verdicts, j, verdicts.drift, verdicts.across, PARALLAX_DRIFT, edges, around, settings
-        )
-        falls_short = verdicts.short[j] > ODD_SIGMAS * verdicts.along[j] and moves_together(
-            verdicts, j, verdicts.short, verdicts.along, 0.0, edges, around, settings
-        )
-        if drifts or falls_short:
+        if (
+            drift > ODD_SIGMAS * verdicts.across[j]
+            and moves_together(verdicts, j, verdicts.drift, verdicts.across, PARALLAX_DRIFT, edges, around, settings)
+        ) or (
+            verdicts.short[j] > ODD_SIGMAS * verdicts.along[j]
+            and moves_together(verdicts, j, verdicts.short, verdicts.along, 0.0, edges, around, settings)
+        ):
             verdicts.mover[j] = verdicts.together[j] = 1
 
 

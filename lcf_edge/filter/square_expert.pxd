@@ -139,7 +139,7 @@ cdef void found_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns ci
 cdef int gather(ObjectColumns objects, Squares squares, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings, Ids ids) noexcept nogil
 cdef void leave(CircleColumns circles, Py_ssize_t o, int to) noexcept nogil
 cdef void hand_over(EdgeColumns edges, Py_ssize_t o, int to) noexcept nogil
-@cython.locals(measured=int)
+@cython.locals(measured=bint, o=int)
 cdef bint belong_together(ObjectColumns objects, Py_ssize_t a, Py_ssize_t b, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef void unite(ObjectColumns objects, Squares squares, CircleColumns circles, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef void update_rate(ObjectColumns objects, Py_ssize_t o, double h_m, double h_q, double value, double variance, double speed_mps) noexcept nogil

@@ -532,16 +532,15 @@ def belong_together(
     settings: Settings,
 ) -> bool:
     """Whether every measured circle of one object could be a part of the other, and vice versa; one at least."""
-    measured = 0
+    measured = False
     for c in range(circles.capacity):
-        if squares.parts.count[c] < MIN_EDGES:
+        o = circles.square[c]
+        if squares.parts.count[c] < MIN_EDGES or o not in (a, b):
             continue
-        measured += 1 if circles.square[c] == a or circles.square[c] == b else 0
-        if circles.square[c] == a and not belongs(objects, b, circles, c, squares.parts, around, settings):
+        if not belongs(objects, b if o == a else a, circles, c, squares.parts, around, settings):
             return False
-        if circles.square[c] == b and not belongs(objects, a, circles, c, squares.parts, around, settings):
-            return False
-    return measured > 0
+        measured = True
+    return measured
 
 
 def unite(

@@ -339,6 +339,19 @@ def test_what_moves_too_little_for_one_edge_to_show_it_is_shown_by_several(
     assert (off_a_little(watch, edges).verdict().mover == moves).all()
 
 
+@pytest.mark.parametrize(("edges", "moves"), [(1, False), (8, True)])
+def test_what_leads_too_far_ahead_for_one_edge_to_show_it_is_shown_by_several(
+    watch: Watch, edges: int, moves: bool
+) -> None:
+    """It keeps station low above the ground, which would flow outward."""
+    board = [(0.5 + 0.04 * (k % 4), 0.22 - 0.03 * (k // 4), 4.0) for k in range(edges)]
+    watched = watch(board, (0.0, 0.0, 2.0), corner_var=2.4)
+    verdicts = watched.judged(*watched.seen(), 0)
+    sigmas = np.asarray(verdicts.short) / np.hypot(verdicts.sigma, verdicts.noise)
+    assert ((sigmas > 1.5) & (sigmas < 4.0)).all()
+    assert (watched.verdict().mover == moves).all()
+
+
 def test_few_edges_that_happen_to_be_off_alike_are_no_movers(watch: Watch) -> None:
     assert not off_a_little(watch, 3).verdict().mover.any()
 
