@@ -21,6 +21,7 @@ cdef int SEEN
 cdef double INFINITY
 
 cdef bint is_due(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+cdef bint is_doubtful(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_sure(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 cdef int cause_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(o=Py_ssize_t)

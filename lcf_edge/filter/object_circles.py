@@ -21,9 +21,14 @@ INFINITY = float("inf")
 
 def is_due(objects: ObjectColumns, o: int, settings: Settings) -> bool:
     """Whether a published object will probably be met, and is seen, or so near that its corners are lost."""
-    if is_sure(objects, o, settings):
+    if is_sure(objects, o, settings) and not is_doubtful(objects, o):
         return objects.probability[o] > square_expert.EVEN
     return objects.active[o] != 0 and square_expert.is_met_soon(objects, o, settings)
+
+
+def is_doubtful(objects: ObjectColumns, o: int) -> bool:
+    """Whether only a few edges show that an object is met soon: by then it is large in the image, and has many."""
+    return objects.ttc[o] < square_expert.SOON_S and objects.support[o] < square_expert.SURE_EDGES
 
 
 def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:

@@ -131,6 +131,24 @@ def test_what_is_not_met_more_likely_than_not_gets_none(situation: Situation) ->
     assert known.trusted() == []
 
 
+@pytest.mark.parametrize(("support", "ttc_s", "shown"), [(6, 1.9, False), (7, 1.9, True), (6, 2.0, True)])
+def test_what_only_a_few_edges_say_is_met_soon_gets_none(
+    situation: Situation, support: int, ttc_s: float, shown: bool
+) -> None:
+    known = Known(situation())
+    known.objects.support[0], known.objects.ttc[0] = support, ttc_s
+    known.update()
+    assert bool(known.trusted()) == shown
+
+
+def test_what_is_large_and_well_trusted_is_met_soon_though_few_of_its_edges_are_left(situation: Situation) -> None:
+    known = Known(situation())
+    known.objects.support[0], known.objects.ttc[0] = 2, 1.0
+    known.objects.trust[0], known.objects.height[0] = 5.0, 200.0
+    known.update()
+    assert len(known.trusted()) == 1
+
+
 def test_an_object_that_is_not_published_gets_none(situation: Situation) -> None:
     known = Known(situation())
     known.objects.trust[0] = TR_S - 0.5
