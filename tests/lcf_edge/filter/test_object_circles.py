@@ -53,6 +53,10 @@ class Known:
         objects.ttc[0], objects.range[0], objects.lateral[0] = 2.0, 3.0, 0.1
         objects.looming[0], objects.middle[0], objects.reference[0] = 0.5, 3.0, around.speed_mps
 
+    def set(self, **values: float) -> None:
+        for name, value in values.items():
+            getattr(self.objects, name)[0] = value
+
     def add_circle(self, c: int, x: float, trust: float, square: int = -1) -> None:
         circles = self.circles
         circles.active[c], circles.trust[c], circles.square[c], circles.id[c] = True, trust, square, 70 + c
@@ -141,12 +145,38 @@ def test_what_only_a_few_edges_say_is_met_soon_gets_none(
     assert bool(known.trusted()) == shown
 
 
-def test_what_is_large_and_well_trusted_is_met_soon_though_few_of_its_edges_are_left(situation: Situation) -> None:
-    known = Known(situation())
-    known.objects.support[0], known.objects.ttc[0] = 2, 1.0
-    known.objects.trust[0], known.objects.height[0] = 5.0, 200.0
+LARGE = {"height": 200.0, "trust": 5.0, "ttc": 1.9, "range": 1.5}  # and well trusted, and soon met
+
+
+@pytest.mark.parametrize("state", [ObjectState.SEEN, ObjectState.COASTING])
+def test_what_is_large_and_was_well_trusted_keeps_its_circle_to_the_end_though_its_edges_are_lost(
+    situation: Situation, state: ObjectState
+) -> None:
+    known = Known(situation(), state=state)
+    known.set(**LARGE, support=2)
     known.update()
     assert len(known.trusted()) == 1
+
+
+@pytest.mark.parametrize(
+    "but",
+    [
+        {"state": ObjectState.HIDDEN},
+        {"height": 30.0, "width": 30.0},
+        {"trust": 3.9},
+        {"ttc": 2.0, "state": ObjectState.COASTING},
+        {"range": 1.4},
+        {"probability": 0.5},
+    ],
+    ids=lambda but: next(iter(but)),
+)
+def test_but_not_what_is_hidden_small_less_trusted_met_later_very_near_or_unlikely_to_be_met(
+    situation: Situation, but: dict[str, float]
+) -> None:
+    known = Known(situation())
+    known.set(**(LARGE | {"support": 2} | but))
+    known.update()
+    assert known.trusted() == []
 
 
 def test_an_object_that_is_not_published_gets_none(situation: Situation) -> None:
