@@ -140,7 +140,7 @@ def test_what_only_a_few_edges_say_is_met_soon_gets_none(
     situation: Situation, support: int, ttc_s: float, shown: bool
 ) -> None:
     known = Known(situation())
-    known.objects.support[0], known.objects.ttc[0] = support, ttc_s
+    known.set(support=support, ttc=ttc_s)
     known.update()
     assert bool(known.trusted()) == shown
 
