@@ -5,6 +5,7 @@ cdef double INFINITY
 cdef double MIN_CURVATURE
 cdef double MIN_SPEED_MPS
 cdef double SMALL_TURN_RAD
+cdef double TURN_LASTS_S
 
 cdef double arc_radius_m(double yaw_rate_radps, Situation around) noexcept nogil
 cdef double miss_by(double radius, double right_m, double ahead_m, Situation around) noexcept nogil

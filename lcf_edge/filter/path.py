@@ -10,7 +10,8 @@ from lcf_edge.filter.situation import Situation
 INFINITY = float("inf")
 MIN_CURVATURE = 1e-3  # 1/m; below, the path is straight
 MIN_SPEED_MPS = 0.05  # below, the yaw rate does not define a path
-SMALL_TURN_RAD = 0.4  # turns up to this may be noise, or soon be over
+SMALL_TURN_RAD = 0.4  # turns up to this may be noise, or soon be over;
+TURN_LASTS_S = 3.0  # no turn can be relied upon for longer
 
 
 def arc_radius_m(yaw_rate_radps: float, around: Situation) -> float:
@@ -46,7 +47,8 @@ def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
     straight line.
     """
     arc_m = miss(right_m, ahead_m, around)
-    turn_rad = math.fabs(around.yaw_rate_radps) * ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
+    until_s = ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
+    turn_rad = math.fabs(around.yaw_rate_radps) * min(until_s, TURN_LASTS_S)
     if not turn_rad < SMALL_TURN_RAD:
         return arc_m
     if right_m * arc_m < 0:

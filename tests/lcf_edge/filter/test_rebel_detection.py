@@ -286,6 +286,17 @@ def test_a_small_turn_may_as_well_not_come(
     assert least_miss(right_m, 3.0, around) == pytest.approx(arc_m if least_m is None else least_m)
 
 
+@pytest.mark.parametrize(("yaw_rate_radps", "least_m"), [(0.12, 0.0), (0.15, None)])
+def test_a_slight_turn_may_be_over_long_before_what_is_far_ahead(
+    situation: Around, yaw_rate_radps: float, least_m: float | None
+) -> None:
+    """At 1 m/s, 6 m ahead: the arc turns by 0.7 and 0.9 rad until there, in the next 3 s by 0.36 and 0.45 rad."""
+    around = situation(speed_mps=1.0, yaw_rate_radps=yaw_rate_radps)
+    arc_m = miss(-0.5, 6.0, around)
+    assert arc_m > 1.0
+    assert least_miss(-0.5, 6.0, around) == pytest.approx(arc_m if least_m is None else least_m)
+
+
 def test_neighbours_show_together_what_one_edge_near_the_focus_cannot(watch: Watch) -> None:
     """10 px from the focus an edge moves by a pixel or so; a dozen of them leave no doubt."""
     few = [(0.06, -0.08, 6.5)]
