@@ -22,6 +22,7 @@ cdef int MIN_TURNED
 cdef int COLUMNS
 cdef int ROWS
 cdef double CELL_EDGES
+cdef double SCALE_CELL_EDGES
 cdef double NOISE_MEMORY_S
 cdef double MAX_EXCESS
 cdef double NOISE_PX
@@ -44,6 +45,7 @@ cdef double SCALE_SHARE
 cdef double SCALE_SIGMAS
 cdef int BINS
 cdef double BIN_PX
+cdef double LEAST_BIN
 cdef int UNKNOWNS
 cdef int FOCUS_X
 cdef int FOCUS_Y
@@ -55,7 +57,8 @@ cdef class FlowFit:
     cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, share, turned, rest
     cdef double[::1] on_x, on_y
     cdef readonly int[::1] slot, cells
-    cdef int[::1] cell, bins
+    cdef int[::1] cell
+    cdef double[::1] bins
     cdef NormalEquations equations
 
 cdef bint shows_flow(EdgeColumns edges, Py_ssize_t i, KeyFrames keys, Situation around, Settings settings) noexcept nogil

@@ -38,6 +38,7 @@ MIN_TURNED = 12  # and edges that need it
 COLUMNS = 8  # cells of the image, whose edges count for no more than ``CELL_EDGES`` each
 ROWS = 6
 CELL_EDGES = 6.0
+SCALE_CELL_EDGES = 16.0  # and for the noise than this: a near body full of corners moves by itself
 NOISE_MEMORY_S = 1.0  # time constant of learning the noise of corners,
 MAX_EXCESS = 4.0  # and of its variance the most that one image says
 NOISE_PX = 0.6  # 1 sigma of the drift of a stationary edge
@@ -59,7 +60,8 @@ SLOT_SIGMA_RAD = 0.002  # plus this
 SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do not reach it;
 SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
 BINS = 256  # of the histogram of residuals,
-BIN_PX = 0.05  # and their width
+BIN_PX = 0.05  # and their width;
+LEAST_BIN = 1e-9  # an empty one
 UNKNOWNS = 5
 FOCUS_X = 3
 FOCUS_Y = 4
@@ -88,7 +90,7 @@ class FlowFit:
         self.turn_share = TURN_SHARE
         self.slot, self.cell = [integers(MAX_EDGES) for _ in range(2)]
         self.cells = integers(COLUMNS * ROWS)
-        self.bins = integers(BINS)
+        self.bins = doubles(BINS)
         self.equations = NormalEquations()
 
 
@@ -164,22 +166,24 @@ def shows_turn(fit: FlowFit, k: int) -> bool:
 def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -> float:
     """Quantile of |``rest``|, px, from a histogram; at most ``BINS``·``BIN_PX``.
 
-    Over all edges or those that show a turn, each residual reduced by what ``turn_share`` explains of it.
+    Over all edges or those that show a turn, each residual reduced by what ``turn_share`` explains of it. The edges of
+    one cell count for no more than ``SCALE_CELL_EDGES``.
     """
     for b in range(BINS):
-        fit.bins[b] = 0
-    counted = 0
+        fit.bins[b] = 0.0
+    counted = 0.0
     for k in range(fit.count):
         if not only_turned or shows_turn(fit, k):
             more = turn_share * fit.turned[k] / NOISE_PX
             rest = math.fabs(fit.rest[k]) / math.sqrt(1 + more * more)
-            fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += 1
-            counted += 1
+            one = min(1.0, SCALE_CELL_EDGES / fit.cells[fit.cell[k]])
+            fit.bins[rounding.whole(min(rest / BIN_PX, BINS - 1.0))] += one
+            counted += one
     rank = share * counted
     below = 0.0
     for b in range(BINS):
         if below + fit.bins[b] >= rank:
-            return BIN_PX * (b + (rank - below) / max(fit.bins[b], 1))
+            return BIN_PX * (b + (rank - below) / max(fit.bins[b], LEAST_BIN))
         below += fit.bins[b]
     return BIN_PX * BINS
 

@@ -452,7 +452,7 @@ def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
 
 @pytest.mark.parametrize(
     ("side_m", "right_mps", "stays"),
-    [(1.2, 0.0, True), (1.2, 2.5, False), (0.3, 0.0, False)],
+    [(1.2, 0.0, True), (1.2, 1.8, False), (0.3, 0.0, False)],
     ids=["in the way", "leaving it", "small"],
 )
 def test_what_is_lost_shortly_before_a_fast_vehicle_meets_it_is_there_until_then(
