@@ -45,7 +45,6 @@ cdef double SCALE_SHARE
 cdef double SCALE_SIGMAS
 cdef int BINS
 cdef double BIN_PX
-cdef double LEAST_BIN
 cdef int UNKNOWNS
 cdef int FOCUS_X
 cdef int FOCUS_Y

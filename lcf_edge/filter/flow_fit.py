@@ -60,8 +60,7 @@ SLOT_SIGMA_RAD = 0.002  # plus this
 SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do not reach it;
 SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
 BINS = 256  # of the histogram of residuals,
-BIN_PX = 0.05  # and their width;
-LEAST_BIN = 1e-9  # an empty one
+BIN_PX = 0.05  # and their width
 UNKNOWNS = 5
 FOCUS_X = 3
 FOCUS_Y = 4
@@ -182,8 +181,8 @@ def quantile(fit: FlowFit, share: float, only_turned: bool, turn_share: float) -
     rank = share * counted
     below = 0.0
     for b in range(BINS):
-        if below + fit.bins[b] >= rank:
-            return BIN_PX * (b + (rank - below) / max(fit.bins[b], LEAST_BIN))
+        if fit.bins[b] > 0 and below + fit.bins[b] >= rank:
+            return BIN_PX * (b + (rank - below) / fit.bins[b])
         below += fit.bins[b]
     return BIN_PX * BINS
 

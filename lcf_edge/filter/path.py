@@ -43,8 +43,8 @@ def lasting_miss(right_m: float, ahead_m: float, around: Situation) -> float:
 
 
 def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
-    """Lateral miss of a point, m, right positive; where the turn until there is small, the least between arc and
-    straight line.
+    """Lateral miss of a point, m, right positive; where the turn until there, or in ``TURN_LASTS_S``, is small, the
+    least between arc and straight line.
     """
     arc_m = miss(right_m, ahead_m, around)
     until_s = ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
