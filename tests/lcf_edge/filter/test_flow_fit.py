@@ -34,7 +34,7 @@ Floats = npt.NDArray[np.float64]
 @dataclass(frozen=True)
 class Seen:
     """Landmarks seen from a camera that turns at ``rate_radps`` without anybody knowing, and heads ``focus_px`` beside
-    where it should. ``movers``: share that goes its own way.
+    where it should. ``movers``: share that goes its own way; ``body``: instead, the share on one near body that does.
     """
 
     rate_radps: tuple[float, float, float] = (0.0, 0.0, 0.0)
@@ -71,9 +71,8 @@ class Seen:
         keys.number = KEY_FRAMES
         depth_m = random.uniform(3, 12, n)
         now = random.uniform([20, 20], [620, 460], (n, 2))
-        moves = random.random(n) < self.movers
+        moves = random.random(n) < (self.body or self.movers)
         if self.body:
-            moves = random.random(n) < self.body
             now[moves] = random.uniform([400, 200], [560, 360], (np.count_nonzero(moves), 2))
         rays = np.column_stack([(now - (PINHOLE.cx, PINHOLE.cy)) / PINHOLE.fx, np.ones(n)])
         own_pxps = np.where(moves[:, None], random.uniform(20, 80, (n, 2)) * random.choice([-1, 1], (n, 2)), 0)
