@@ -447,6 +447,13 @@ def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
             groups.expansion[g] = groups.weighed_rate[g] / max(groups.weight[g], MIN_EXTENT2_PX)
 
 
+def spreads_less(groups: RebelGroups, g: int, rate: float) -> bool:
+    """Whether the parts of a group move apart by less than an expansion demands. ``rate``: V_e/r, 1/s."""
+    sigma = SPREAD_NOISE_PX / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
+    spreads = groups.spreading[g] / max(groups.spread[g], MIN_EXTENT2_PX)
+    return spreads + SPREAD_SIGMAS * sigma < SPREAD_SHARE * rate
+
+
 def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
     """Whether a group that seems stationary and near does not spread accordingly.
 
@@ -455,9 +462,7 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
     """
     if 2 * groups.standing[g] < members.size[g]:
         return False
-    sigma = SPREAD_NOISE_PX / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
-    spreads = groups.spreading[g] / max(groups.spread[g], MIN_EXTENT2_PX)
-    return spreads + SPREAD_SIGMAS * sigma < SPREAD_SHARE * groups.expansion[g]
+    return spreads_less(groups, g, groups.expansion[g])
 
 
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
@@ -664,12 +669,13 @@ def found(groups: RebelGroups, edges: EdgeColumns, circles: CircleColumns, setti
 def own_expansion(groups: RebelGroups, g: int) -> float:
     """V_e/r of something that moves on the ground, 1/s; 0 where it does not exceed its noise.
 
-    Fitted to the vertical motion about the horizon, which sideways motion does not affect.
+    Fitted to the vertical motion about the horizon, which sideways motion does not affect. Where the horizon is wrong,
+    that moves things that stay as far away as they are, but not their parts apart.
     """
     extent2 = max(groups.below2[g], MIN_EXTENT2_PX)
     rate = groups.below_vy[g] / extent2
     sigma = VELOCITY_NOISE_PX / groups.mean_s[g] / math.sqrt(extent2 * groups.members.size[g])
-    return rate if rate > RATE_SIGMAS * sigma else 0.0
+    return rate if rate > RATE_SIGMAS * sigma and not spreads_less(groups, g, rate) else 0.0
 
 
 def expansion_of(groups: RebelGroups, g: int, stands: bool, range_m: float, around: Situation) -> float:
@@ -698,9 +704,8 @@ def contact(groups: RebelGroups, g: int, circles: CircleColumns, around: Situati
     right_m = (circles.x[c] - around.focus_x) / around.pinhole.fx * range_m
     circles.range[c] = range_m if stands else on_ground_m
     circles.lateral[c] = path.miss(right_m, range_m, around) if stands else aside_mps * finite(circles.ttc[c])
-    if not math.isfinite(around.speed_mps):
-        circles.lateral[c] = NAN
-        circles.range[c] = NAN if stands else on_ground_m
+    if stands and not math.isfinite(around.speed_mps):
+        circles.range[c] = circles.lateral[c] = NAN
     if circles.range[c] > MAX_RANGE_M:
         circles.range[c] = NAN
     if math.fabs(circles.lateral[c]) > MAX_RANGE_M:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from lcf_edge.config import Config, Filter, Vehicle
+from lcf_edge.config import Camera, Config, Filter, Vehicle
 from lcf_edge.filter import LineCircleFilter, rebel_circles, rebel_detection
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
@@ -588,7 +588,21 @@ def test_what_lies_straight_ahead_of_a_turn_is_no_rebel(drive: Drive, box: Landm
     assert not rows
 
 
-def test_with_the_speed_unknown_nothing_is_said_in_metres(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+def test_with_the_speed_unknown_what_comes_on_the_ground_still_has_a_miss(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    comes = drive(box((-1.6, 0.4, 9.0), (0.3, 0.6, 0.0), landmarks=40), np.array([0.5, 0, -1.5]))
+    way = drive(clutter(150)) + comes
+    tables = LineCircleFilter(Config(camera=Camera(height_m=1.0)), way.lens)
+    for corners, motion in way:
+        tables.step(corners, replace(motion, speed_mps=math.nan))
+    (row,) = np.flatnonzero(tables.rebel.active & (tables.rebel.trust >= TR_S)).tolist()
+    assert tables.rebel.lateral[row] == pytest.approx(-1.6 + 0.5 * 9.0 / 3.5, abs=0.1)
+
+
+def test_with_speed_and_height_unknown_nothing_is_said_in_metres(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
     way = drive(clutter(150)) + drive(box((-2, -0.6, 5), (0.5, 1.2, 0.3)), np.array([1.2, 0, 0]))
     tables = LineCircleFilter(Config(), way.lens)
     for corners, motion in way:
@@ -627,11 +641,24 @@ def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(
     """Motion to the side does not touch it."""
     below = np.linspace(-80, 80, 9)
     for rate in (0.5, 0.0):
-        around, vy, vx = situation(horizon_y=240.0), rate * below, np.full(9, aside_pxps)
-        seen = Seen(EdgeTable(50, 50, 10), 400 + 0.5 * vx, 240 + below + 0.5 * vy, vx, vy, around, seen_s=0.5)
-        groups = seen.taken()
-        np.asarray(groups.label)[:9] = 0
-        rebel_circles.number_groups(groups, 1)
-        columns = seen.edges.columns
-        rebel_circles.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
-        assert rebel_circles.own_expansion(groups, 0) == pytest.approx(rate)
+        assert own_expansion(situation(horizon_y=240.0), below, rate * below, aside_pxps) == pytest.approx(rate)
+
+
+def test_what_moves_away_from_a_wrong_horizon_without_growing_does_not_come(situation: Situation) -> None:
+    """A car that drives off: the lens, or the camera's pitch, puts the horizon 80 px below it."""
+    below = np.linspace(-90, -70, 9)
+    assert own_expansion(situation(horizon_y=240.0), below, 0.5 * below) == pytest.approx(0.5)
+    assert own_expansion(situation(horizon_y=240.0), below, np.full(9, 0.5 * -80)) == 0
+
+
+def own_expansion(around: Any, below: Floats, vy: Floats, vx: float = 0.0) -> float:
+    """V_e/r of a column of rebels ``below`` px under the horizon that moved so, px/s, for half a second."""
+    aside = np.full(len(below), vx)
+    x, y = 400 + 0.5 * aside, around.horizon_y + below + 0.5 * vy
+    seen = Seen(EdgeTable(50, 50, 10), x, y, aside, vy, around, seen_s=0.5)
+    groups = seen.taken()
+    np.asarray(groups.label)[: len(below)] = 0
+    rebel_circles.number_groups(groups, 1)
+    columns = seen.edges.columns
+    rebel_circles.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
+    return rebel_circles.own_expansion(groups, 0)
