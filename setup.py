@@ -45,6 +45,8 @@ MACROS = [
     ("Py_LIMITED_API", "0x030B0000"),  # Python 3.11 and later
     ("CYTHON_LIMITED_API", "1"),
     ("CYTHON_CLINE_IN_TRACEBACK", "0"),
+    ("CYTHON_COMPRESS_STRINGS", "1"),  # names and signatures, by zlib: 30 kB less than by Cython's own compression
+    ("CYTHON_PEP489_MULTI_PHASE_INIT", "0"),  # a module is made once, as is the extension: 28 kB less
     ("NDEBUG", "1"),  # Python's own flags have it, unless CFLAGS replaces them: without, 20 kB of assertions
 ]
 FLAGS = ["-O2", "-fvect-cost-model=dynamic"]  # as fast as -O3, and a twelfth smaller
@@ -55,6 +57,7 @@ FLAGS += ["-fstrict-overflow"]  # Python's own flags say that sums wrap around, 
 FLAGS += ["-fno-math-errno", "-fno-trapping-math"]  # nobody asks for either: square roots without a call
 FLAGS += ["-flto=auto", "-fno-fat-lto-objects"]  # what modules have alike is in it once: a fifteenth smaller, as fast
 FLAGS += ["-g0", "-fno-asynchronous-unwind-tables", "-fno-unwind-tables"]  # a tenth smaller
+FLAGS += ["-Wno-unused-function"]  # Cython's own decompressor
 LINKED = ["-s", "-flto=auto", "-Wl,-z,noseparate-code"]
 LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of some parts without vectors
 
