@@ -68,7 +68,8 @@ LITTLE = {"_memoryviews", "alpha", "coarse_motion", "patches", "rebel_detection"
 LEAST = {"axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "columns", "derotation", "driving"}
 LEAST |= {"edge_rows", "error_matrix", "feedback", "flow_fit", "ground_speed", "group_motion", "heading"}
 LEAST |= {"image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
-LEAST |= {"object_circles", "patch_circles", "path", "range_belief", "rebel_circles", "rest", "sample_ring"}
+LEAST |= {"object_belief", "object_circles", "object_prediction", "patch_circles", "path", "range_belief"}
+LEAST |= {"rebel_circles", "rest", "sample_ring"}
 LEAST |= {"scene_records", "settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.

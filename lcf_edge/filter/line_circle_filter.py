@@ -24,6 +24,7 @@ from lcf_edge.filter import (
     matching,
     normal_circles,
     object_circles,
+    object_prediction,
     patches,
     rebel_circles,
     rest,
@@ -299,7 +300,7 @@ class LineCircleFilter:
         rebel_circles.predict(self.rebel.columns, self._around)
         rebel_circles.end_outside(self.rebel.columns, self._plane, self._around, self._settings)
         patches.predict(self.patches, self._around)
-        square_expert.predict(self.objects.columns, self._plane, self._around, self._settings)
+        object_prediction.predict(self.objects.columns, self._plane, self._around, self._settings)
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
     def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
@@ -327,7 +328,7 @@ class LineCircleFilter:
         derotation.derotate_circles(self.normal.columns, self._homography, roll)
         derotation.derotate_circles(self.rebel.columns, self._homography, roll)
         patches.derotate(self.patches, self._homography)
-        square_expert.derotate(self.objects.columns, self._homography)
+        object_prediction.derotate(self.objects.columns, self._homography)
         derotation.derotate_psi(self.psi.columns, self._homography)
 
     def _predict(self) -> None:

@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_expert, image_plane, lengths, rebel_circles, square_expert, turmoil
+from lcf_edge.filter cimport edge_expert, image_plane, lengths, object_belief, object_prediction, rebel_circles, turmoil
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.image_plane cimport ImagePlane

@@ -3,7 +3,7 @@
 import math
 
 from lcf_edge.filter import circles as shared
-from lcf_edge.filter import edge_expert, image_plane, lengths, rebel_circles, square_expert, turmoil
+from lcf_edge.filter import edge_expert, image_plane, lengths, object_belief, object_prediction, rebel_circles, turmoil
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.image_plane import ImagePlane
@@ -22,13 +22,13 @@ INFINITY = float("inf")
 def is_due(objects: ObjectColumns, o: int, settings: Settings) -> bool:
     """Whether a published object will probably be met, and is seen, or so near that its corners are lost."""
     if is_sure(objects, o, settings) and not is_doubtful(objects, o):
-        return objects.probability[o] > square_expert.EVEN
-    return objects.active[o] != 0 and square_expert.is_met_soon(objects, o, settings)
+        return objects.probability[o] > object_belief.EVEN
+    return objects.active[o] != 0 and object_prediction.is_met_soon(objects, o, settings)
 
 
 def is_doubtful(objects: ObjectColumns, o: int) -> bool:
     """Whether only a few edges show that an object is met soon: by then it is large in the image, and has many."""
-    return objects.ttc[o] < square_expert.SOON_S and objects.support[o] < square_expert.SURE_EDGES
+    return objects.ttc[o] < object_prediction.SOON_S and objects.support[o] < object_prediction.SURE_EDGES
 
 
 def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
@@ -38,7 +38,7 @@ def is_sure(objects: ObjectColumns, o: int, settings: Settings) -> bool:
 
 def cause_of(objects: ObjectColumns, o: int) -> int:
     """Cause of the circles of an object that moves."""
-    if objects.probability[o] > square_expert.EVEN:
+    if objects.probability[o] > object_belief.EVEN:
         return COMES
     return LEADS if objects.class_id[o] == LEADING or objects.class_id[o] == CUTTING_IN else CROSSES
 
@@ -88,9 +88,9 @@ def own_circle(circles: CircleColumns, o: int) -> int:
 def show(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, around: Situation, settings: Settings) -> None:
     """Set a circle from its object, with trust Tr_s."""
     x, y = objects.x[o], objects.y[o]
-    looming = square_expert.looming_at(objects, o, around.speed_mps)
-    vx = square_expert.velocity_x(objects, o, x, looming, around)
-    vy = square_expert.velocity_y(y, looming, around)
+    looming = object_prediction.looming_at(objects, o, around.speed_mps)
+    vx = object_prediction.velocity_x(objects, o, x, looming, around)
+    vy = object_prediction.velocity_y(y, looming, around)
     circles.x[c], circles.y[c], circles.beta[c], circles.speed[c] = x, y, math.atan2(vy, vx), lengths.of(vx, vy)
     circles.width[c], circles.height[c] = objects.width[o], objects.height[o]
     reach = 0.5 * max(objects.width[o], objects.height[o])
@@ -169,9 +169,9 @@ def join_rebels(
             continue
         o = circles.square[c]
         if o >= 0 and is_sure(objects, o, settings) and math.isfinite(objects.qq[o]):
-            looming = square_expert.looming_at(objects, o, around.speed_mps)
-            vx = square_expert.velocity_x(objects, o, edges.x[i], looming, around)
-            vy = square_expert.velocity_y(edges.y[i], looming, around)
+            looming = object_prediction.looming_at(objects, o, around.speed_mps)
+            vx = object_prediction.velocity_x(objects, o, edges.x[i], looming, around)
+            vy = object_prediction.velocity_y(edges.y[i], looming, around)
         else:
             vx = rebel_circles.velocity_x(circles, c, edges.x[i], around.horizon_s)
             vy = rebel_circles.velocity_y(circles, c, edges.y[i], around.horizon_s)

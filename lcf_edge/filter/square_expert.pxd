@@ -1,13 +1,12 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, flow, group_motion, image_plane, lengths, path, range_belief, situation, speed_change, turmoil
+from lcf_edge.filter cimport edge_equations, group_motion, lengths, object_belief, object_prediction, range_belief, situation, speed_change, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.coarse_circles cimport CoarseGroups
 from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport CircleColumns, EdgeColumns, ObjectColumns
-from lcf_edge.filter.flow cimport Homography
 from lcf_edge.filter.group_motion cimport MotionSums
 from lcf_edge.filter.image_plane cimport ImagePlane
 from lcf_edge.filter.patches cimport Patches
@@ -32,64 +31,16 @@ cdef double JOIN_SHARE
 cdef double SIDE_REACH
 cdef double STACK_REACH
 cdef int ALL
-cdef double WANDER_MPS
-cdef double UNSEEN_MPS
 cdef double NOISE_GAIN
-cdef double BODY_SHARE
-cdef double BODY_HZ
-cdef double SWING_SHARE
-cdef double SWING_HZ
-cdef double MAX_LAG
 cdef double NEWS_SIGMAS
-cdef double PERSISTS_S
-cdef double MAX_ODDS
 cdef double GROWS_S
 cdef double SHRINKS_S
-cdef double FOOT_S
-cdef double FOOT_BELOW_S
-cdef double EDGE_PX
 cdef double TURMOIL_HZ
 cdef double FRAMES_UNREPORTED
 cdef double UNSURE
-cdef int SURE_EDGES
-cdef double COAST_S
-cdef double HIDDEN_S
-cdef double OUTSIDE_S
-cdef double COMING_S
-cdef double NEAR_S
-cdef double LINGERS_S
-cdef double SAME_PLACE_M
-cdef double THROUGH_S
-cdef int MIN_THROUGH
-cdef double THROUGH_SHARE
-cdef double RESTING_S
-cdef double NEAR_M
-cdef double SOON_S
-cdef double REMNANT_SHARE
 cdef double RECENT_S
-cdef double LEAVES_S
-cdef double LOSES_HZ
-cdef double FOOT_PX
-cdef double BORDER_PX
-cdef double CUT_SHARE
-cdef double CUT_HIDES
-cdef double PASSED_M
-cdef double MOVES_SIGMAS
-cdef double SLOW_MPS
-cdef double INTO_PATH
-cdef double STILL_HZ
-cdef double RATE_SIGMAS
-cdef double EVEN
-cdef double MAX_RANGE_M
 cdef int UNKNOWN
-cdef int STANDING
-cdef int CROSSING
-cdef int ONCOMING
-cdef int LEADING
-cdef int CUTTING_IN
 cdef int SEEN
-cdef int HIDDEN
-cdef int COASTING
 cdef double INFINITY
 cdef double NAN
 
@@ -102,23 +53,6 @@ cdef class Squares:
     cdef Evidence evidence
     cdef Belief belief
 
-cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
-cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil
-cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double looming, Situation around) noexcept nogil
-cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
-@cython.locals(inverse=double)
-cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil
-cdef bint is_in_image(ObjectColumns objects, Py_ssize_t o, double x, ImagePlane plane) noexcept nogil
-@cython.locals(left=double, right=double)
-cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
-cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
-cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
-cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
-@cython.locals(is_lost=bint)
-cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
-@cython.locals(through=int)
-cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
 cpdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
 @cython.locals(weight=double)
 cdef bint is_moving(MotionSums parts, Py_ssize_t c, Settings settings) noexcept nogil
@@ -149,28 +83,6 @@ cdef void show(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation
 cdef void fit(ObjectColumns objects, Py_ssize_t o, double left, double right, double top, double bottom, Situation around) noexcept nogil
 @cython.locals(time_s=double)
 cdef double follow(double side, double shown, double outwards, Situation around) noexcept nogil
-@cython.locals(whole=double, shown=double, per_m=double, bottom=double, kept=double)
-cdef void collect_evidence(Evidence evidence, ObjectColumns objects, Py_ssize_t o, ImagePlane plane, Situation around) noexcept nogil
-cdef void believe(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence, Situation around) noexcept nogil
-cdef void set_contact(ObjectColumns objects, Py_ssize_t o, double rate, double sigma, Situation around) noexcept nogil
-@cython.locals(into_path=bint, goes_on=bint, goes_aside=bint)
-cdef int class_of(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence) noexcept nogil
-cdef bint rests(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
-@cython.locals(beside=double, time_s=double, time_sigma_s=double, drift_mps=double)
-cdef void coast(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
-@cython.locals(beside=double)
-cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
-@cython.locals(across=bint)
-cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-@cython.locals(apart_m=double, across=bint)
-cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
-cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept nogil
-@cython.locals(hidden=bint, patience_s=double)
-cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
-cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
-@cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
-cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
-cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 cdef void take_place(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 cdef bint go_on_in_turmoil(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 cdef bint obeys(ObjectColumns objects, Py_ssize_t o, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, double share, Situation around) noexcept nogil
@@ -185,7 +97,6 @@ cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edg
 cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(share=double)
 cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
-cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(remnant=bint, count=int)

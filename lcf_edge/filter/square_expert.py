@@ -9,11 +9,10 @@ import math
 from lcf_edge.filter import circles as shared
 from lcf_edge.filter import (
     edge_equations,
-    flow,
     group_motion,
-    image_plane,
     lengths,
-    path,
+    object_belief,
+    object_prediction,
     range_belief,
     situation,
     speed_change,
@@ -24,7 +23,6 @@ from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.coarse_circles import CoarseGroups
 from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
-from lcf_edge.filter.flow import Homography
 from lcf_edge.filter.group_motion import MotionSums
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.memory import integers, octets
@@ -51,58 +49,15 @@ JOIN_SHARE = 0.1  # less for one that is no rebel
 SIDE_REACH = 0.1  # margin in which edges that break the flow may join, as a share of the box of its edges,
 STACK_REACH = 0.3  # and above and below; the ground before it moves much as it does, so others join only inside
 ALL = -1  # all edges of an object measure its motion
-WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second,
-UNSEEN_MPS = 0.3  # less where it is not seen
-BODY_SHARE = 0.1  # model error of m, 1 sigma, as a share: some edges lie farther off than the rest,
-BODY_HZ = 0.015  # and in quadrature with it;
-SWING_SHARE = 0.1  # the same of q
-SWING_HZ = 0.006
 NOISE_GAIN = 1.7  # corners wander more than their noise suggests: they are not fixed points of the object
-MAX_LAG = 0.5  # bounds the correction of a rate from the middle of its window to now
 NEWS_SIGMAS = 4.0  # beyond this an innovation is an outlier and is down-weighted
-PERSISTS_S = 0.055  # time constant with which the log odds of standing decay,
-MAX_ODDS = 4.0  # which are clamped to this
 GROWS_S = 0.07  # time constant with which a side of a box moves outwards,
-SHRINKS_S = 0.3  # and inwards,
-FOOT_S = 1.2  # and with which the foot rises to a higher lowest edge,
-FOOT_BELOW_S = 3.0  # if it was below the image
-EDGE_PX = 1.0  # inset of a corner from the outline
+SHRINKS_S = 0.3  # and inwards
 TURMOIL_HZ = 1.0  # 1 sigma of m and q where no motion can be tracked
 FRAMES_UNREPORTED = 2.0  # of a new object
-UNSURE = 0.25  # trust gained per frame, instead of 1, with fewer edges than
-SURE_EDGES = 7
-COAST_S = 0.3  # an unseen object keeps its trust for this long,
-HIDDEN_S = 1.0  # occluded by another one,
-OUTSIDE_S = 1.0  # out of view,
-COMING_S = 3.0  # and out of view, but moving towards the path;
-NEAR_S = 1.0  # nearer than ``NEAR_M``, at least,
-NEAR_M = 1.5
-SOON_S = 2.0  # or farther, but large, well trusted and probably met within this time: until then;
-REMNANT_SHARE = 0.33  # fewer edges of such a near object, as a share of its recent number, do not measure its motion;
-RECENT_S = 3.0  # time constant with which that number decays;
-LEAVES_S = 0.5  # unless it leaves the image within this time
-RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
-LINGERS_S = 6.0  # and near, not seen through;
-SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
-THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
-MIN_THROUGH = 3  # at least so many,
-THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
-LOSES_HZ = 20.0  # trust lost per second after that
-FOOT_PX = 2.0  # 1 sigma of the row of the lowest edge
-BORDER_PX = 4.0
-CUT_SHARE = 0.15  # of its height: if the lowest edge is this near to the image's border, the foot may be below it,
-CUT_HIDES = 0.75  # with this probability
-PASSED_M = 0.1  # an unseen object nearer than this is passed
-MOVES_SIGMAS = 1.5  # a velocity above this is significant
-SLOW_MPS = 0.15
-INTO_PATH = 0.2  # least sideways motion of an object that cuts in, as a share of its forward motion
-STILL_HZ = 0.05  # before a vehicle at rest, an object with a smaller looming and sideways rate is at rest too
-RATE_SIGMAS = 1.0  # a time to contact is reported for a looming above this
-EVEN = 0.5
-MAX_RANGE_M = 1000.0  # larger ranges are not reported
-UNKNOWN, STANDING, CROSSING = int(ObjectClass.UNKNOWN), int(ObjectClass.STANDING), int(ObjectClass.CROSSING)
-ONCOMING, LEADING, CUTTING_IN = int(ObjectClass.ONCOMING), int(ObjectClass.LEADING), int(ObjectClass.CUTTING_IN)
-SEEN, HIDDEN, COASTING = int(ObjectState.SEEN), int(ObjectState.HIDDEN), int(ObjectState.COASTING)
+UNSURE = 0.25  # trust gained per frame, instead of 1, with fewer edges than ``object_prediction.SURE_EDGES``
+RECENT_S = 3.0  # time constant with which the number of an object's recent edges decays
+UNKNOWN, SEEN = int(ObjectClass.UNKNOWN), int(ObjectState.SEEN)
 INFINITY = float("inf")
 NAN = float("nan")
 
@@ -120,124 +75,6 @@ class Squares:
         self.members, self.resting = integers(objects), integers(objects)
         self.obedient = octets(edges)
         self.evidence, self.belief = Evidence(), Belief()
-
-
-# Prediction
-
-
-def derotate(objects: ObjectColumns, h: Homography) -> None:
-    """Apply H = K·R·K⁻¹ to the centres of objects."""
-    for o in range(objects.capacity):
-        if objects.active[o]:
-            flow.warp(h, objects.x[o], objects.y[o])
-            objects.x[o], objects.y[o] = h.x, h.y
-
-
-def looming_at(objects: ObjectColumns, o: int, speed_mps: float) -> float:
-    """Returns m, 1/s, converted to another speed of the vehicle than the one at which it was measured."""
-    gained_mps = speed_mps - objects.reference[o]
-    if objects.middle[o] > 0 and math.isfinite(gained_mps):
-        return objects.looming[o] + gained_mps / objects.middle[o]
-    return objects.looming[o]
-
-
-def velocity_x(objects: ObjectColumns, o: int, x: float, looming: float, around: Situation) -> float:
-    """Returns the image velocity of a part of an object at ``x``, px/s: sideways motion, and looming about O."""
-    return objects.sideways[o] * around.pinhole.fx + looming * (x - around.focus_x)
-
-
-def velocity_y(y: float, looming: float, around: Situation) -> float:
-    """Returns the image velocity of a part at ``y``, px/s: motion on the ground expands about the horizon."""
-    return looming * (y - around.horizon_y)
-
-
-def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
-    """Predict S': propagate each object by its motion, with growing uncertainty, and delete those out of reach."""
-    for o in range(objects.capacity):
-        if not objects.active[o]:
-            continue
-        if math.isfinite(around.speed_mps) != math.isfinite(objects.reference[o]):
-            forget_motion(objects, o)
-        dt_s, looming = around.dt_s, looming_at(objects, o, around.speed_mps)
-        if lingers(objects, o, around):
-            dt_s = 0.0
-        objects.x[o] += velocity_x(objects, o, objects.x[o], looming, around) * dt_s
-        objects.y[o] += velocity_y(objects.y[o], looming, around) * dt_s
-        growth = 1 + min(max(looming * dt_s, -MAX_LAG), MAX_LAG)
-        objects.width[o] *= growth
-        objects.height[o] *= growth
-        objects.foot[o] *= growth
-        objects.looming[o] *= growth
-        objects.sideways[o] *= growth
-        speed_change.predict(objects, o, growth, around.dt_s)
-        inverse = 0.0
-        if objects.middle[o] > 0:
-            objects.middle[o] /= growth
-            objects.range[o] /= growth
-            inverse = 1 / objects.middle[o]
-        wander = (
-            (WANDER_MPS if objects.unseen_s[o] == 0 else UNSEEN_MPS)
-            * max(inverse, math.fabs(looming))
-            * math.sqrt(around.dt_s)
-        )
-        objects.mm[o] += wander * wander
-        objects.qq[o] += wander * wander
-        objects.age_s[o] += around.dt_s
-        if is_passed(objects, o) or (
-            not is_in_sight(objects, o, plane) and not is_beside(objects, o, around, settings)
-        ):
-            objects.active[o] = 0
-
-
-def is_in_image(objects: ObjectColumns, o: int, x: float, plane: ImagePlane) -> bool:
-    """Whether a point ``x`` of the middle row of an object's box is in the image, above and below left aside."""
-    return image_plane.project(plane, x, min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1))
-
-
-def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
-    """Whether a part of the middle row of an object's box is in the image."""
-    left, right = objects.x[o] - 0.5 * objects.width[o], objects.x[o] + 0.5 * objects.width[o]
-    if is_in_image(objects, o, objects.x[o], plane) or is_in_image(objects, o, left, plane):
-        return True
-    return is_in_image(objects, o, right, plane) or (left < 0 and right > plane.width)
-
-
-def is_passed(objects: ObjectColumns, o: int) -> bool:
-    """Whether an unseen object would by now be nearer than is possible."""
-    return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
-
-
-def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Settings) -> bool:
-    """Whether an object that left the image may still be met."""
-    patience_s = outside_s(objects, o, around)
-    return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < patience_s and objects.middle[o] > 0
-
-
-def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
-    """Returns for how long an object is kept that left the image, s: longer if it moves towards the path."""
-    return COMING_S if comes(objects, o, around) else OUTSIDE_S
-
-
-def comes(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether an object moves towards the path from the side."""
-    return (objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]) > SLOW_MPS
-
-
-def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether an object was lost near a stationary vehicle, which it does not leave; its motion is then unknown."""
-    is_lost = objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < SLOW_MPS and objects.range[o] < NEAR_M
-    return is_lost and (not objects.left[o] or comes(objects, o, around))
-
-
-def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
-    """Whether stationary edges are seen in the middle of the box of a lost object."""
-    through = 0
-    for i in range(edges.count):
-        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S:
-            across, down = math.fabs(edges.x[i] - objects.x[o]), math.fabs(edges.y[i] - objects.y[o])
-            if across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]:
-                through += 1
-    return through >= MIN_THROUGH
 
 
 # Circles of one object
@@ -297,8 +134,11 @@ def moves_alike(
     weight = parts.weight[c]
     x, y = parts.x[c] / weight, parts.y[c] / weight
     vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
-    looming = looming_at(objects, o, parts.forward[c] / weight)
-    dx, dy = vx - velocity_x(objects, o, x, looming, around), vy - velocity_y(y, looming, around)
+    looming = object_prediction.looming_at(objects, o, parts.forward[c] / weight)
+    dx, dy = (
+        vx - object_prediction.velocity_x(objects, o, x, looming, around),
+        vy - object_prediction.velocity_y(y, looming, around),
+    )
     fx, fy = around.pinhole.fx, around.pinhole.fy
     across, down = (x - around.focus_x) / fx, (y - around.horizon_y) / fy
     own = 1 / weight
@@ -416,7 +256,7 @@ def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> 
     objects.class_id[o], objects.state[o], objects.support[o], objects.left[o] = UNKNOWN, SEEN, 0, 0
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
     objects.probability[o] = 0.0
-    forget_motion(objects, o)
+    object_prediction.forget_motion(objects, o)
 
 
 def found(
@@ -461,12 +301,27 @@ def take_place(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, a
     speed_change.forget(objects, o)
 
 
-def forget_motion(objects: ObjectColumns, o: int) -> None:
-    """Reset an object's motion to unknown."""
-    objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
-    objects.mm[o] = objects.qq[o] = INFINITY
-    objects.reference[o] = NAN
-    speed_change.forget(objects, o)
+def go_on_in_turmoil(
+    objects: ObjectColumns, o: int, circles: CircleColumns, around: Situation, settings: Settings
+) -> bool:
+    """Update an object without edges from its circle in turmoil; returns whether it has one.
+
+    It keeps the motion that its edges last showed until contact would occur: beyond that the looming is unbounded, and
+    what is seen there must move differently.
+    """
+    for c in range(circles.capacity):
+        if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
+            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
+            objects.support[o] = circles.support[c]
+            objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
+            if objects.looming[o] * around.dt_s > object_prediction.MAX_LAG:
+                take_place(objects, o, circles, c, around)
+                return True
+            half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
+            left, right = circles.x[c] - half_width, circles.x[c] + half_width
+            fit(objects, o, left, right, circles.y[c] - half_height, circles.y[c] + half_height, around)
+            return True
+    return False
 
 
 def gather(
@@ -622,7 +477,7 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
         vertical_var = (1 / weight + common * common) / (below * below)
         rate = (rate * vertical_var + vertical * variance) / (vertical_var + variance)
         variance = variance * vertical_var / (vertical_var + variance)
-    lag = 1 - min(max(0.5 * elapsed_s * rate, -MAX_LAG), MAX_LAG)
+    lag = 1 - min(max(0.5 * elapsed_s * rate, -object_prediction.MAX_LAG), object_prediction.MAX_LAG)
     speed_mps = wholes.forward[o] / weight if math.isfinite(around.speed_mps) else NAN
     update_rate(objects, o, 1.0, 0.0, rate / lag, repeated * variance / (lag * lag), speed_mps)
     speed_change.observe(objects, o, rate / lag, repeated * variance / (lag * lag), speed_mps)
@@ -634,8 +489,16 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
 
 def show(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation) -> None:
     """Update an object's box from all of its edges."""
-    left, right = wholes.left[o] - EDGE_PX, wholes.right[o] + EDGE_PX
-    fit(objects, o, left, right, wholes.top[o] - EDGE_PX, wholes.bottom[o] + EDGE_PX, around)
+    left, right = wholes.left[o] - object_prediction.EDGE_PX, wholes.right[o] + object_prediction.EDGE_PX
+    fit(
+        objects,
+        o,
+        left,
+        right,
+        wholes.top[o] - object_prediction.EDGE_PX,
+        wholes.bottom[o] + object_prediction.EDGE_PX,
+        around,
+    )
 
 
 def fit(
@@ -657,284 +520,7 @@ def follow(side: float, shown: float, outwards: float, around: Situation) -> flo
     return side + (1 - math.exp(-around.dt_s / time_s)) * (shown - side)
 
 
-# Belief
-
-
-def collect_evidence(evidence: Evidence, objects: ObjectColumns, o: int, plane: ImagePlane, around: Situation) -> None:
-    """Set the evidence of an object, in angles, and update its foot."""
-    fx, fy = around.pinhole.fx, around.pinhole.fy
-    evidence.looming, evidence.sideways = objects.looming[o], objects.sideways[o]
-    whole = lengths.of(BODY_SHARE * evidence.looming, BODY_HZ)
-    evidence.mm, evidence.mq = objects.mm[o] + whole * whole, objects.mq[o]
-    whole = lengths.of(SWING_SHARE * evidence.sideways, SWING_HZ)
-    evidence.qq = objects.qq[o] + whole * whole
-    evidence.across = (objects.x[o] - around.focus_x) / fx
-    evidence.half_width = 0.5 * objects.width[o] / fx
-    evidence.half_extent = max(evidence.half_width, 0.5 * objects.height[o] / fy)
-    evidence.across_sigma = 0.5 * evidence.half_width
-    bottom = objects.y[o] + 0.5 * objects.height[o]
-    if around.camera_height_m > 0:
-        per_m = fy * around.camera_height_m
-        shown = (bottom - around.horizon_y) / per_m
-        if not objects.foot[o] > shown:
-            objects.foot[o] = shown
-        else:
-            low = around.horizon_y + objects.foot[o] * per_m + BORDER_PX
-            time_s = FOOT_S if image_plane.project(plane, around.focus_x, low) else FOOT_BELOW_S
-            objects.foot[o] += (1 - math.exp(-around.dt_s / time_s)) * (shown - objects.foot[o])
-        evidence.foot = objects.foot[o]
-        bottom = around.horizon_y + evidence.foot * per_m
-        evidence.hidden = range_belief.HIDDEN_FOOT
-        if not image_plane.project(plane, around.focus_x, bottom + CUT_SHARE * objects.height[o]):
-            evidence.hidden = CUT_HIDES
-        evidence.foot_sigma = math.sqrt(around.pitch_sigma_rad * around.pitch_sigma_rad + FOOT_PX * FOOT_PX / fy / fy)
-        evidence.foot_sigma /= around.camera_height_m
-    evidence.is_cut = not image_plane.project(plane, around.focus_x, bottom + BORDER_PX)
-    evidence.reference = objects.reference[o]
-    evidence.inverse, evidence.inverse_var = objects.inverse[o], objects.inverse_var[o]
-    evidence.range_before, evidence.range_doubt = objects.middle[o], objects.middle_sigma[o]
-    kept = math.exp(-around.dt_s / PERSISTS_S)
-    evidence.log_odds = min(max(kept * objects.log_odds[o], -MAX_ODDS), MAX_ODDS)
-
-
-def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, around: Situation) -> None:
-    """Set the object's range, motion, risk and class from the belief."""
-    objects.log_odds[o] = belief.log_odds
-    objects.middle[o], objects.middle_sigma[o] = belief.middle, belief.middle_sigma
-    objects.range[o], objects.range_sigma[o] = belief.mean[range_belief.RANGE], belief.sigma[range_belief.RANGE]
-    objects.forward[o], objects.forward_sigma[o] = belief.mean[range_belief.FORWARD], belief.sigma[range_belief.FORWARD]
-    objects.right[o], objects.right_sigma[o] = belief.mean[range_belief.RIGHT], belief.sigma[range_belief.RIGHT]
-    objects.closest[o], objects.closest_sigma[o] = belief.mean[range_belief.CLOSEST], belief.sigma[range_belief.CLOSEST]
-    objects.lateral[o], objects.lateral_sigma[o] = belief.mean[range_belief.LATERAL], belief.sigma[range_belief.LATERAL]
-    objects.probability[o] = belief.met
-    if objects.range[o] > MAX_RANGE_M:
-        objects.range[o] = objects.range_sigma[o] = NAN
-    if math.fabs(objects.lateral[o]) > MAX_RANGE_M:
-        objects.lateral[o] = objects.lateral_sigma[o] = NAN
-    set_contact(objects, o, belief.mean[range_belief.RATE], belief.sigma[range_belief.RATE], around)
-    objects.class_id[o] = class_of(objects, o, belief, evidence)
-
-
-def set_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:
-    """Set the time to contact from its inverse, 1/s; none where the looming is not above its noise."""
-    if rate > RATE_SIGMAS * sigma and rate * range_belief.MAX_HORIZONS * around.horizon_s > 1:
-        objects.ttc[o], objects.ttc_sigma[o] = 1 / rate, sigma / (rate * rate)
-    else:
-        objects.ttc[o], objects.ttc_sigma[o] = INFINITY, NAN
-
-
-def class_of(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence) -> int:
-    """Returns the class of an object by its motion over ground."""
-    if belief.stands > EVEN:
-        return STANDING
-    forward, right = objects.forward[o], objects.right[o]
-    goes_on = math.fabs(forward) > max(MOVES_SIGMAS * objects.forward_sigma[o], SLOW_MPS)
-    goes_aside = math.fabs(right) > max(MOVES_SIGMAS * objects.right_sigma[o], SLOW_MPS)
-    if goes_aside and (not goes_on or math.fabs(right) >= math.fabs(forward)):
-        return CROSSING
-    if not goes_on:
-        return UNKNOWN
-    if forward < 0:
-        return ONCOMING
-    into_path = goes_aside and right * evidence.across < 0 and math.fabs(right) > INTO_PATH * forward
-    return CUTTING_IN if into_path else LEADING
-
-
-def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
-    """Whether neither an object nor the vehicle moves; the image then holds no new information about its range."""
-    if not situation.is_at_rest(around) or objects.log_odds[o] < 0 or not objects.range[o] > 0:
-        return False
-    return math.fabs(objects.looming[o]) < STILL_HZ and math.fabs(objects.sideways[o]) < STILL_HZ
-
-
-def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """Derive an object's numbers from its last position and velocity; unseen, they become more uncertain."""
-    drift_mps = UNSEEN_MPS * math.sqrt(around.dt_s) if objects.unseen_s[o] > 0 else 0.0
-    objects.forward_sigma[o] = lengths.of(objects.forward_sigma[o], drift_mps)
-    objects.right_sigma[o] = lengths.of(objects.right_sigma[o], drift_mps)
-    range_m, closing_mps = objects.range[o], around.speed_mps - objects.forward[o]
-    right_mps = objects.right[o]
-    if objects.unseen_s[o] > 0:
-        objects.range_sigma[o] = lengths.of(objects.range_sigma[o], objects.forward_sigma[o] * around.dt_s)
-    share = lengths.of(objects.range_sigma[o] / range_m, objects.forward_sigma[o] / max(closing_mps, SLOW_MPS))
-    objects.probability[o] = 0.0
-    objects.lateral[o] = objects.lateral_sigma[o] = objects.closest[o] = objects.closest_sigma[o] = NAN
-    set_contact(objects, o, closing_mps / range_m, share * math.fabs(closing_mps) / range_m, around)
-    if not math.isfinite(objects.ttc[o]):
-        return
-    time_s, time_sigma_s = objects.ttc[o], objects.ttc_sigma[o]
-    objects.closest[o], objects.closest_sigma[o] = time_s, time_sigma_s
-    right_m = range_m * evidence.across + right_mps * time_s
-    objects.lateral[o] = path.miss(right_m, range_m + objects.forward[o] * time_s, around)
-    aside = lengths.of(range_m * evidence.across_sigma, evidence.across * objects.range_sigma[o])
-    late = lengths.of(objects.right_sigma[o] * time_s, right_mps * time_sigma_s)
-    objects.lateral_sigma[o] = lengths.of(aside, late)
-    half_m = around.half_width_m + evidence.half_width * range_m
-    variance = objects.lateral_sigma[o] * objects.lateral_sigma[o]
-    beside = range_belief.below(half_m, objects.lateral[o], variance)
-    beside -= range_belief.below(-half_m, objects.lateral[o], variance)
-    soon = range_belief.below(around.horizon_s, time_s, time_sigma_s * time_sigma_s)
-    objects.probability[o] = beside * soon
-
-
-def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """Set an object's numbers without the vehicle's speed: time to contact from looming, range from the foot."""
-    objects.middle[o] = objects.middle_sigma[o] = objects.range[o] = objects.range_sigma[o] = NAN
-    objects.lateral[o] = objects.lateral_sigma[o] = NAN
-    objects.forward[o] = objects.forward_sigma[o] = objects.right[o] = objects.right_sigma[o] = NAN
-    objects.closest[o] = objects.closest_sigma[o] = NAN
-    objects.class_id[o] = UNKNOWN
-    sigma = math.sqrt(evidence.mm)
-    set_contact(objects, o, evidence.looming, sigma, around)
-    beside = EVEN
-    if around.camera_height_m > 0 and evidence.foot > 2 * evidence.foot_sigma and not evidence.is_cut:
-        range_m = 1 / evidence.foot
-        objects.range[o], objects.range_sigma[o] = range_m, range_m * range_m * evidence.foot_sigma
-        objects.right[o], objects.right_sigma[o] = evidence.sideways * range_m, math.sqrt(evidence.qq) * range_m
-        if math.isfinite(objects.ttc[o]):
-            time_s = objects.ttc[o]
-            objects.lateral[o] = range_m * (evidence.across + evidence.sideways * time_s)
-            lateral_var = range_m * range_m * time_s * time_s * evidence.qq
-            objects.lateral_sigma[o] = math.sqrt(lateral_var)
-            half_m = around.half_width_m + evidence.half_width * range_m
-            beside = range_belief.below(half_m, objects.lateral[o], lateral_var)
-            beside -= range_belief.below(-half_m, objects.lateral[o], lateral_var)
-    soon = 1 - range_belief.below(1 / around.horizon_s, evidence.looming, evidence.mm)
-    objects.probability[o] = beside * soon
-
-
-# Lifetime
-
-
-def is_behind(objects: ObjectColumns, o: int) -> bool:
-    """Whether a nearer, seen object overlaps this one in the image."""
-    for other in range(objects.capacity):
-        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
-            continue
-        if not objects.range[other] < objects.range[o]:
-            continue
-        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * (objects.width[other] + objects.width[o])
-        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * (objects.height[other] + objects.height[o]):
-            return True
-    return False
-
-
-def object_in_place_of(objects: ObjectColumns, o: int) -> int:
-    """Returns the object that is seen, by more than a few edges, in the place of an unseen one; -1: none.
-
-    Somebody who stops or turns at once breaks the motion of his object, and another one is founded on him. Two things
-    cannot be in one place, so they are one.
-    """
-    for other in range(objects.capacity):
-        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
-            continue
-        if objects.support[other] < SURE_EDGES:
-            continue
-        apart_m = math.fabs(objects.range[o] - objects.range[other])
-        if not apart_m < min(lengths.of(objects.range_sigma[o], objects.range_sigma[other]), SAME_PLACE_M):
-            continue
-        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * objects.width[other]
-        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * objects.height[other]:
-            return other
-    return -1
-
-
-def take_over(objects: ObjectColumns, o: int, by: int) -> None:
-    """End an unseen object; the seen one in its place has its trust and, if younger, its identity."""
-    objects.trust[by] = max(objects.trust[by], objects.trust[o])
-    if objects.age_s[by] < objects.age_s[o]:
-        objects.id[by], objects.age_s[by] = objects.id[o], objects.age_s[o]
-    objects.active[o] = 0
-
-
-def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, around: Situation) -> bool:
-    """Whether too few of a near object's recent edges are left to measure its motion.
-
-    A very near object loses its corners, and the last ones may lie on a limb, or on something else: its range would
-    seem to grow while it comes closer. Not if it is about to leave the image, which explains the loss, nor before a
-    vehicle at rest, where few edges are expected.
-    """
-    if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.recent_edges[o]:
-        return False
-    if situation.is_at_rest(around):
-        return False
-    way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
-    return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
-
-
-def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
-    """Returns for how long an object lost nearby is kept, s: until the vehicle is there."""
-    if not math.isfinite(around.speed_mps):
-        return NEAR_S
-    return min(max(objects.range[o] / max(math.fabs(around.speed_mps), SLOW_MPS), NEAR_S), LINGERS_S)
-
-
-def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
-    """Whether a well trusted object farther than ``NEAR_M`` will probably be met within ``SOON_S``.
-
-    Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides.
-    """
-    is_large = max(objects.width[o], objects.height[o]) > settings.min_coast_px
-    is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S
-    is_trusted = objects.trust[o] >= settings.tr_coast and objects.state[o] != HIDDEN
-    return is_trusted and is_large and is_soon and objects.probability[o] > EVEN
-
-
-def go_on(
-    objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
-) -> None:
-    """Keep an object without edges in this frame as hidden or coasting; in the end, delete it.
-
-    It is kept for longer where missing edges are expected: stationary before a stationary vehicle, very near, or out
-    of view.
-    """
-    objects.unseen_s[o] += around.dt_s
-    by = object_in_place_of(objects, o)
-    if by >= 0:
-        take_over(objects, o, by)
-        return
-    hidden = is_behind(objects, o)
-    objects.state[o] = HIDDEN if hidden else COASTING
-    patience_s = HIDDEN_S if hidden else COAST_S
-    if objects.unseen_s[o] <= COAST_S and not is_in_image(objects, o, objects.x[o], plane):
-        objects.left[o] = 1
-    if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
-        patience_s = outside_s(objects, o, around)
-    elif lingers(objects, o, around):
-        patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
-    elif math.fabs(around.speed_mps) < SLOW_MPS and objects.log_odds[o] > 0:
-        patience_s = RESTING_S
-    elif is_met_soon(objects, o, settings):
-        patience_s = LINGERS_S
-    elif objects.range[o] < NEAR_M:
-        patience_s = near_s(objects, o, around)
-    if objects.unseen_s[o] > patience_s:
-        objects.trust[o] -= around.dt_s * LOSES_HZ
-    if objects.trust[o] < settings.tr_cr:
-        objects.active[o] = 0
-
-
-def go_on_in_turmoil(
-    objects: ObjectColumns, o: int, circles: CircleColumns, around: Situation, settings: Settings
-) -> bool:
-    """Update an object without edges from its circle in turmoil; returns whether it has one.
-
-    It keeps the motion that its edges last showed until contact would occur: beyond that the looming is unbounded, and
-    what is seen there must move differently.
-    """
-    for c in range(circles.capacity):
-        if turmoil.is_shown_by(circles, c) and circles.square[c] == o and circles.unseen_s[c] == 0:
-            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
-            objects.support[o] = circles.support[c]
-            objects.trust[o] = edge_equations.change_trust(objects.trust[o], 1.0, settings.tr_max)
-            if objects.looming[o] * around.dt_s > MAX_LAG:
-                take_place(objects, o, circles, c, around)
-                return True
-            half_width, half_height = 0.5 * circles.width[c], 0.5 * circles.height[c]
-            left, right = circles.x[c] - half_width, circles.x[c] + half_width
-            fit(objects, o, left, right, circles.y[c] - half_height, circles.y[c] + half_height, around)
-            return True
-    return False
+# Edges of an object
 
 
 def obeys(
@@ -952,9 +538,12 @@ def obeys(
     elapsed_s = baselines.elapsed_s[verdicts.slot[j]]
     speed_mps = baselines.depth_m[verdicts.slot[j]] / elapsed_s
     x, y = 0.5 * (edges.x[i] + verdicts.x[j]), 0.5 * (edges.y[i] + verdicts.y[j])
-    looming = looming_at(objects, o, speed_mps)
-    lag = 1 - min(max(0.5 * elapsed_s * looming, -MAX_LAG), MAX_LAG)
-    vx, vy = velocity_x(objects, o, x, looming, around) * lag, velocity_y(y, looming, around) * lag
+    looming = object_prediction.looming_at(objects, o, speed_mps)
+    lag = 1 - min(max(0.5 * elapsed_s * looming, -object_prediction.MAX_LAG), object_prediction.MAX_LAG)
+    vx, vy = (
+        object_prediction.velocity_x(objects, o, x, looming, around) * lag,
+        object_prediction.velocity_y(y, looming, around) * lag,
+    )
     dx, dy = (edges.x[i] - verdicts.x[j]) / elapsed_s - vx, (edges.y[i] - verdicts.y[j]) / elapsed_s - vy
     most = STRAY_SIGMAS * verdicts.noise[j] / elapsed_s + share * lengths.of(vx, vy)
     return dx * dx + dy * dy < most * most
@@ -1097,25 +686,28 @@ def take_members(
             group_motion.add(squares.wholes, o, squares.parts, c)  # patches and pieces replace missing edges
 
 
+# Update
+
+
 def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situation, settings: Settings) -> float:
     """Returns the change of trust of an object seen by its edges: slow with few, negative if it moves as the ground."""
     if group_motion.is_ground(wholes, o, around):
         return -1.0
-    return 1.0 if wholes.count[o] >= SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
+    return 1.0 if wholes.count[o] >= object_prediction.SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
 
 
 def renew_numbers(
     objects: ObjectColumns, o: int, squares: Squares, unmeasured: bool, plane: ImagePlane, around: Situation
 ) -> None:
     """Update the numbers of an object from its evidence; if its motion was not measured, by coasting."""
-    collect_evidence(squares.evidence, objects, o, plane, around)
+    object_belief.collect_evidence(squares.evidence, objects, o, plane, around)
     if unmeasured and math.isfinite(objects.forward[o]):
-        coast(objects, o, squares.evidence, around)
+        object_belief.coast(objects, o, squares.evidence, around)
     elif math.isfinite(around.speed_mps):
         range_belief.consider(squares.belief, squares.evidence, around)
-        believe(objects, o, squares.belief, squares.evidence, around)
+        object_belief.believe(objects, o, squares.belief, squares.evidence, around)
     else:
-        believe_without_speed(objects, o, squares.evidence, around)
+        object_belief.believe_without_speed(objects, o, squares.evidence, around)
 
 
 def update(
@@ -1150,7 +742,7 @@ def update(
         remnant = False
         if count >= MIN_EDGES:
             objects.recent_edges[o] = max(objects.recent_edges[o] * math.exp(-around.dt_s / RECENT_S), count)
-            remnant = is_remnant(objects, o, count, plane, around)
+            remnant = object_prediction.is_remnant(objects, o, count, plane, around)
             objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
             objects.support[o] = count
             believed = belief_in(objects, o, squares.wholes, around, settings)
@@ -1161,17 +753,22 @@ def update(
             if not remnant:
                 show(objects, o, squares.wholes, around)
                 if objects.age_s[o] == 0:
-                    forget_motion(objects, o)
+                    object_prediction.forget_motion(objects, o)
                 observe(objects, o, squares.wholes, around)
         elif squares.resting[o] >= MIN_EDGES:
             objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
             objects.looming[o] = objects.sideways[o] = 0.0
             objects.reference[o] = around.speed_mps
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
-            go_on(objects, o, edges, plane, around, settings)
+            object_prediction.go_on(objects, o, edges, plane, around, settings)
             if not objects.active[o]:
                 continue
         renew_numbers(
-            objects, o, squares, remnant or objects.unseen_s[o] > 0 or rests(objects, o, around), plane, around
+            objects,
+            o,
+            squares,
+            remnant or objects.unseen_s[o] > 0 or object_belief.rests(objects, o, around),
+            plane,
+            around,
         )
     return evicted

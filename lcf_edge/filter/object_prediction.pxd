@@ -1,0 +1,64 @@
+cimport cython
+from libc cimport math
+from lcf_edge.filter cimport flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter.columns cimport EdgeColumns, ObjectColumns
+from lcf_edge.filter.flow cimport Homography
+from lcf_edge.filter.image_plane cimport ImagePlane
+from lcf_edge.filter.settings cimport Settings
+from lcf_edge.filter.situation cimport Situation
+
+cdef double WANDER_MPS
+cdef double MAX_LAG
+cdef double EDGE_PX
+cdef int SURE_EDGES
+cdef double COAST_S
+cdef double HIDDEN_S
+cdef double OUTSIDE_S
+cdef double COMING_S
+cdef double NEAR_S
+cdef double LINGERS_S
+cdef double SAME_PLACE_M
+cdef double THROUGH_S
+cdef int MIN_THROUGH
+cdef double THROUGH_SHARE
+cdef double RESTING_S
+cdef double NEAR_M
+cdef double SOON_S
+cdef double REMNANT_SHARE
+cdef double LEAVES_S
+cdef double LOSES_HZ
+cdef double PASSED_M
+cdef int HIDDEN
+cdef int COASTING
+cdef double INFINITY
+cdef double NAN
+
+cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
+cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil
+cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double looming, Situation around) noexcept nogil
+cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
+cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(inverse=double)
+cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef bint is_in_image(ObjectColumns objects, Py_ssize_t o, double x, ImagePlane plane) noexcept nogil
+@cython.locals(left=double, right=double)
+cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
+cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
+cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(is_lost=bint)
+cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(through=int)
+cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
+@cython.locals(across=bint)
+cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+@cython.locals(apart_m=double, across=bint)
+cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept nogil
+@cython.locals(hidden=bint, patience_s=double)
+cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
+cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+@cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
+cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil

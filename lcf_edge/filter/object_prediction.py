@@ -1,0 +1,269 @@
+"""How objects go on: where their motion takes them, and for how long they are kept that their edges do not show."""
+
+import math
+
+from lcf_edge.filter import flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter.columns import EdgeColumns, ObjectColumns
+from lcf_edge.filter.flow import Homography
+from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.settings import Settings
+from lcf_edge.filter.situation import Situation
+from lcf_edge.messages import ObjectState
+
+WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second; ``object_belief.UNSEEN_MPS`` where it is not seen
+MAX_LAG = 0.5  # bounds the correction of a rate from the middle of its window to now
+EDGE_PX = 1.0  # inset of a corner from the outline
+SURE_EDGES = 7  # fewer may lie on something else
+COAST_S = 0.3  # an unseen object keeps its trust for this long,
+HIDDEN_S = 1.0  # occluded by another one,
+OUTSIDE_S = 1.0  # out of view,
+COMING_S = 3.0  # and out of view, but moving towards the path;
+NEAR_S = 1.0  # nearer than ``NEAR_M``, at least,
+NEAR_M = 1.5
+SOON_S = 2.0  # or farther, but large, well trusted and probably met within this time: until then;
+REMNANT_SHARE = 0.33  # fewer edges of such a near object, as a share of its recent number, do not measure its motion;
+LEAVES_S = 0.5  # unless it leaves the image within this time
+RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
+LINGERS_S = 6.0  # and near, not seen through;
+SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
+THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
+MIN_THROUGH = 3  # at least so many,
+THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
+LOSES_HZ = 20.0  # trust lost per second after that
+PASSED_M = 0.1  # an unseen object nearer than this is passed
+HIDDEN, COASTING = int(ObjectState.HIDDEN), int(ObjectState.COASTING)
+INFINITY = float("inf")
+NAN = float("nan")
+
+
+def derotate(objects: ObjectColumns, h: Homography) -> None:
+    """Apply H = K·R·K⁻¹ to the centres of objects."""
+    for o in range(objects.capacity):
+        if objects.active[o]:
+            flow.warp(h, objects.x[o], objects.y[o])
+            objects.x[o], objects.y[o] = h.x, h.y
+
+
+def looming_at(objects: ObjectColumns, o: int, speed_mps: float) -> float:
+    """Returns m, 1/s, converted to another speed of the vehicle than the one at which it was measured."""
+    gained_mps = speed_mps - objects.reference[o]
+    if objects.middle[o] > 0 and math.isfinite(gained_mps):
+        return objects.looming[o] + gained_mps / objects.middle[o]
+    return objects.looming[o]
+
+
+def velocity_x(objects: ObjectColumns, o: int, x: float, looming: float, around: Situation) -> float:
+    """Returns the image velocity of a part of an object at ``x``, px/s: sideways motion, and looming about O."""
+    return objects.sideways[o] * around.pinhole.fx + looming * (x - around.focus_x)
+
+
+def velocity_y(y: float, looming: float, around: Situation) -> float:
+    """Returns the image velocity of a part at ``y``, px/s: motion on the ground expands about the horizon."""
+    return looming * (y - around.horizon_y)
+
+
+def forget_motion(objects: ObjectColumns, o: int) -> None:
+    """Reset an object's motion to unknown."""
+    objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
+    objects.mm[o] = objects.qq[o] = INFINITY
+    objects.reference[o] = NAN
+    speed_change.forget(objects, o)
+
+
+def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settings: Settings) -> None:
+    """Predict S': propagate each object by its motion, with growing uncertainty, and delete those out of reach."""
+    for o in range(objects.capacity):
+        if not objects.active[o]:
+            continue
+        if math.isfinite(around.speed_mps) != math.isfinite(objects.reference[o]):
+            forget_motion(objects, o)
+        dt_s, looming = around.dt_s, looming_at(objects, o, around.speed_mps)
+        if lingers(objects, o, around):
+            dt_s = 0.0
+        objects.x[o] += velocity_x(objects, o, objects.x[o], looming, around) * dt_s
+        objects.y[o] += velocity_y(objects.y[o], looming, around) * dt_s
+        growth = 1 + min(max(looming * dt_s, -MAX_LAG), MAX_LAG)
+        objects.width[o] *= growth
+        objects.height[o] *= growth
+        objects.foot[o] *= growth
+        objects.looming[o] *= growth
+        objects.sideways[o] *= growth
+        speed_change.predict(objects, o, growth, around.dt_s)
+        inverse = 0.0
+        if objects.middle[o] > 0:
+            objects.middle[o] /= growth
+            objects.range[o] /= growth
+            inverse = 1 / objects.middle[o]
+        wander_mps = WANDER_MPS if objects.unseen_s[o] == 0 else object_belief.UNSEEN_MPS
+        wander = wander_mps * max(inverse, math.fabs(looming)) * math.sqrt(around.dt_s)
+        objects.mm[o] += wander * wander
+        objects.qq[o] += wander * wander
+        objects.age_s[o] += around.dt_s
+        if is_passed(objects, o) or (
+            not is_in_sight(objects, o, plane) and not is_beside(objects, o, around, settings)
+        ):
+            objects.active[o] = 0
+
+
+# How long they are kept
+
+
+def is_in_image(objects: ObjectColumns, o: int, x: float, plane: ImagePlane) -> bool:
+    """Whether a point ``x`` of the middle row of an object's box is in the image, above and below left aside."""
+    return image_plane.project(plane, x, min(max(objects.y[o], EDGE_PX), plane.height - EDGE_PX - 1))
+
+
+def is_in_sight(objects: ObjectColumns, o: int, plane: ImagePlane) -> bool:
+    """Whether a part of the middle row of an object's box is in the image."""
+    left, right = objects.x[o] - 0.5 * objects.width[o], objects.x[o] + 0.5 * objects.width[o]
+    if is_in_image(objects, o, objects.x[o], plane) or is_in_image(objects, o, left, plane):
+        return True
+    return is_in_image(objects, o, right, plane) or (left < 0 and right > plane.width)
+
+
+def is_passed(objects: ObjectColumns, o: int) -> bool:
+    """Whether an unseen object would by now be nearer than is possible."""
+    return objects.unseen_s[o] > 0 and objects.middle[o] < PASSED_M
+
+
+def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Settings) -> bool:
+    """Whether an object that left the image may still be met."""
+    patience_s = outside_s(objects, o, around)
+    return objects.trust[o] >= settings.tr_s and objects.unseen_s[o] < patience_s and objects.middle[o] > 0
+
+
+def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
+    """Returns for how long an object is kept that left the image, s: longer if it moves towards the path."""
+    return COMING_S if comes(objects, o, around) else OUTSIDE_S
+
+
+def comes(objects: ObjectColumns, o: int, around: Situation) -> bool:
+    """Whether an object moves towards the path from the side."""
+    return (objects.right[o] if objects.x[o] < around.focus_x else -objects.right[o]) > object_belief.SLOW_MPS
+
+
+def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
+    """Whether an object was lost near a stationary vehicle, which it does not leave; its motion is then unknown."""
+    is_lost = (
+        objects.unseen_s[o] > 0 and math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.range[o] < NEAR_M
+    )
+    return is_lost and (not objects.left[o] or comes(objects, o, around))
+
+
+def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
+    """Whether stationary edges are seen in the middle of the box of a lost object."""
+    through = 0
+    for i in range(edges.count):
+        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S:
+            across, down = math.fabs(edges.x[i] - objects.x[o]), math.fabs(edges.y[i] - objects.y[o])
+            if across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]:
+                through += 1
+    return through >= MIN_THROUGH
+
+
+def is_behind(objects: ObjectColumns, o: int) -> bool:
+    """Whether a nearer, seen object overlaps this one in the image."""
+    for other in range(objects.capacity):
+        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
+            continue
+        if not objects.range[other] < objects.range[o]:
+            continue
+        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * (objects.width[other] + objects.width[o])
+        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * (objects.height[other] + objects.height[o]):
+            return True
+    return False
+
+
+def object_in_place_of(objects: ObjectColumns, o: int) -> int:
+    """Returns the object that is seen, by more than a few edges, in the place of an unseen one; -1: none.
+
+    Somebody who stops or turns at once breaks the motion of his object, and another one is founded on him. Two things
+    cannot be in one place, so they are one.
+    """
+    for other in range(objects.capacity):
+        if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
+            continue
+        if objects.support[other] < SURE_EDGES:
+            continue
+        apart_m = math.fabs(objects.range[o] - objects.range[other])
+        if not apart_m < min(lengths.of(objects.range_sigma[o], objects.range_sigma[other]), SAME_PLACE_M):
+            continue
+        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * objects.width[other]
+        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * objects.height[other]:
+            return other
+    return -1
+
+
+def take_over(objects: ObjectColumns, o: int, by: int) -> None:
+    """End an unseen object; the seen one in its place has its trust and, if younger, its identity."""
+    objects.trust[by] = max(objects.trust[by], objects.trust[o])
+    if objects.age_s[by] < objects.age_s[o]:
+        objects.id[by], objects.age_s[by] = objects.id[o], objects.age_s[o]
+    objects.active[o] = 0
+
+
+def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, around: Situation) -> bool:
+    """Whether too few of a near object's recent edges are left to measure its motion.
+
+    A very near object loses its corners, and the last ones may lie on a limb, or on something else: its range would
+    seem to grow while it comes closer. Not if it is about to leave the image, which explains the loss, nor before a
+    vehicle at rest, where few edges are expected.
+    """
+    if not objects.range[o] < NEAR_M or count >= REMNANT_SHARE * objects.recent_edges[o]:
+        return False
+    if situation.is_at_rest(around):
+        return False
+    way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
+    return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
+
+
+def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
+    """Returns for how long an object lost nearby is kept, s: until the vehicle is there."""
+    if not math.isfinite(around.speed_mps):
+        return NEAR_S
+    return min(max(objects.range[o] / max(math.fabs(around.speed_mps), object_belief.SLOW_MPS), NEAR_S), LINGERS_S)
+
+
+def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
+    """Whether a well trusted object farther than ``NEAR_M`` will probably be met within ``SOON_S``.
+
+    Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides.
+    """
+    is_large = max(objects.width[o], objects.height[o]) > settings.min_coast_px
+    is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S
+    is_trusted = objects.trust[o] >= settings.tr_coast and objects.state[o] != HIDDEN
+    return is_trusted and is_large and is_soon and objects.probability[o] > object_belief.EVEN
+
+
+def go_on(
+    objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
+) -> None:
+    """Keep an object without edges in this frame as hidden or coasting; in the end, delete it.
+
+    It is kept for longer where missing edges are expected: stationary before a stationary vehicle, very near, or out
+    of view.
+    """
+    objects.unseen_s[o] += around.dt_s
+    by = object_in_place_of(objects, o)
+    if by >= 0:
+        take_over(objects, o, by)
+        return
+    hidden = is_behind(objects, o)
+    objects.state[o] = HIDDEN if hidden else COASTING
+    patience_s = HIDDEN_S if hidden else COAST_S
+    if objects.unseen_s[o] <= COAST_S and not is_in_image(objects, o, objects.x[o], plane):
+        objects.left[o] = 1
+    if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
+        patience_s = outside_s(objects, o, around)
+    elif lingers(objects, o, around):
+        patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
+    elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:
+        patience_s = RESTING_S
+    elif is_met_soon(objects, o, settings):
+        patience_s = LINGERS_S
+    elif objects.range[o] < NEAR_M:
+        patience_s = near_s(objects, o, around)
+    if objects.unseen_s[o] > patience_s:
+        objects.trust[o] -= around.dt_s * LOSES_HZ
+    if objects.trust[o] < settings.tr_cr:
+        objects.active[o] = 0
