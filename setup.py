@@ -69,7 +69,7 @@ LEAST = {"axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "c
 LEAST |= {"edge_rows", "error_matrix", "feedback", "flow_fit", "ground_speed", "group_motion", "heading"}
 LEAST |= {"image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
 LEAST |= {"object_belief", "object_circles", "object_prediction", "patch_circles", "path", "range_belief"}
-LEAST |= {"rebel_circles", "rest", "sample_ring"}
+LEAST |= {"rebel_circles", "rebel_groups", "rest", "sample_ring"}
 LEAST |= {"scene_records", "settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.

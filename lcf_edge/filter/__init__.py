@@ -32,6 +32,7 @@ of one step, in the order in which ``line_circle_filter`` calls them:
 ``alpha``              applies them: chains become rebel edges, rebels that obey the flow return to E_n
 ``circles``            what normal and rebel circles share
 ``normal_circles``     C_n from E_n
+``rebel_groups``       rebels that move alike, and which groups of them make no circle
 ``rebel_circles``      C_r from E_r, with cause and time to contact
 ``group_motion``       how edges that go together move: mean velocity and rate of expansion
 ``patches``            image patches near the path, tracked for seconds

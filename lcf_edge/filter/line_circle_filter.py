@@ -54,8 +54,8 @@ from lcf_edge.filter.memory import Doubles, integers, memory_of, octets
 from lcf_edge.filter.normal_circles import Flowing
 from lcf_edge.filter.patch_circles import PatchGroups
 from lcf_edge.filter.patches import Patches
-from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.rebel_groups import RebelGroups
 from lcf_edge.filter.rest import RestTest
 from lcf_edge.filter.rolling_shutter import RollingShutter
 from lcf_edge.filter.settings import Settings

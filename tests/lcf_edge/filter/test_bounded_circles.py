@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lcf_edge.config import Config
-from lcf_edge.filter import Corners, LineCircleFilter, Motion, rebel_circles
-from lcf_edge.filter.rebel_circles import RebelGroups
+from lcf_edge.filter import Corners, LineCircleFilter, Motion, rebel_circles, rebel_groups
+from lcf_edge.filter.rebel_groups import RebelGroups
 from lcf_edge.lens import Lens
 from lcf_edge.messages import Cause
 
@@ -41,7 +41,7 @@ def lies_flat(around: Any, top_px: float, foot_px: float, *, short: int = 8, lev
     groups.inwards[0], groups.mean_s[0] = short, 0.4
     if level:  # upright: everywhere the same expansion
         groups.focus_rate[0], groups.focus_r2[0] = 100.0, 1e4
-    return bool(rebel_circles.is_flat(groups, 0, members, around))
+    return bool(rebel_groups.is_flat(groups, 0, members, around))
 
 
 def test_a_thin_strip_on_the_ground_is_flat(situation: Situation) -> None:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import pytest
 
 from lcf_edge.config import Camera, Config, Filter, Vehicle
-from lcf_edge.filter import LineCircleFilter, rebel_circles, rebel_detection
+from lcf_edge.filter import LineCircleFilter, rebel_circles, rebel_detection, rebel_groups
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.circles import Ids
 from lcf_edge.filter.coarse_circles import CoarseGroups
@@ -19,8 +19,8 @@ from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.image_plane import ImagePlane
 from lcf_edge.filter.patch_circles import PatchGroups
 from lcf_edge.filter.patches import Patches
-from lcf_edge.filter.rebel_circles import RebelGroups
 from lcf_edge.filter.rebel_detection import Verdicts
+from lcf_edge.filter.rebel_groups import RebelGroups
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.tables import CircleTable, EdgeTable
 from lcf_edge.filter.turmoil import Turmoil
@@ -73,7 +73,7 @@ class Seen:
         """In groups, which are still to be made."""
         groups = RebelGroups(self.edges.capacity, 4)
         columns = self.edges.columns
-        rebel_circles.take_rebels(groups, self.count, self.breaking, self.verdicts, columns, self.baselines)
+        rebel_groups.take_rebels(groups, self.count, self.breaking, self.verdicts, columns, self.baselines)
         return groups
 
 
@@ -225,8 +225,8 @@ def linked(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> list[in
     """Group of each rebel."""
     seen = Seen(EdgeTable(50, 50, 10), x, y, vx, vy, around)
     groups = seen.taken()
-    rebel_circles.cluster(groups, seen.verdicts, seen.edges.columns, around, SETTINGS)
-    return [rebel_circles.lowest_label(groups, row) for row in range(seen.count)]
+    rebel_groups.cluster(groups, seen.verdicts, seen.edges.columns, around, SETTINGS)
+    return [rebel_groups.lowest_label(groups, row) for row in range(seen.count)]
 
 
 def test_parts_of_an_object_that_grows_are_linked_though_they_fly_apart(situation: Situation) -> None:
@@ -658,7 +658,7 @@ def own_expansion(around: Any, below: Floats, vy: Floats, vx: float = 0.0) -> fl
     seen = Seen(EdgeTable(50, 50, 10), x, y, aside, vy, around, seen_s=0.5)
     groups = seen.taken()
     np.asarray(groups.label)[: len(below)] = 0
-    rebel_circles.number_groups(groups, 1)
+    rebel_groups.number_groups(groups, 1)
     columns = seen.edges.columns
-    rebel_circles.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
-    return rebel_circles.own_expansion(groups, 0)
+    rebel_groups.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
+    return rebel_groups.own_expansion(groups, 0)
