@@ -406,8 +406,8 @@ def find_odd(groups: RebelGroups, members: Members, edges: EdgeColumns, around: 
 def own_expansion(groups: RebelGroups, g: int) -> float:
     """V_e/r of something that moves on the ground, 1/s; 0 where it does not exceed its noise.
 
-    Fitted to the vertical motion about the horizon, which sideways motion does not affect. Where the horizon is wrong,
-    that moves things that stay as far away as they are, but not their parts apart.
+    Fitted to the vertical motion about the horizon, which sideways motion does not affect. About a wrong horizon, what
+    only moves up or down seems to expand as well, but its parts do not move apart.
     """
     extent2 = max(groups.below2[g], MIN_EXTENT2_PX)
     rate = groups.below_vy[g] / extent2
