@@ -24,6 +24,7 @@ cdef int STRAY_ROUNDS
 cdef double STRAY_SIGMAS
 cdef double STRAY_SHARE
 cdef double SPREAD_SIGMAS
+cdef double SWING_SIGMAS
 cdef double SPREAD_SHARE
 cdef double MIN_EXTENT2_PX
 cdef double FASTEST_EXPANSION
@@ -69,7 +70,7 @@ cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeC
 cdef bint is_paint(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
-cdef bint spreads_less(RebelGroups groups, Py_ssize_t g, double rate) noexcept nogil
+cdef bint spreads_less(RebelGroups groups, Py_ssize_t g, double rate, double sigmas) noexcept nogil
 cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint ground_would_flow(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil

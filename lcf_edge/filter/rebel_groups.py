@@ -27,6 +27,7 @@ STRAY_ROUNDS = 2
 STRAY_SIGMAS = 2.0  # of its noise, and of
 STRAY_SHARE = 0.25  # this share of the expansion: width beyond which an edge is an outlier
 SPREAD_SIGMAS = 2.0  # of the measured spreading rate, by which
+SWING_SIGMAS = 4.0  # or, of what moves and has limbs that swing, these,
 SPREAD_SHARE = 0.5  # a group may spread less than this share of its expansion
 MIN_EXTENT2_PX = 1.0  # px², least squared extent in a fit of an expansion
 # Times are shares of the horizon, so that they hold for any speed.
@@ -317,11 +318,11 @@ def fit_expansion(groups: RebelGroups, verdicts: Verdicts) -> None:
             groups.expansion[g] = groups.weighed_rate[g] / max(groups.weight[g], MIN_EXTENT2_PX)
 
 
-def spreads_less(groups: RebelGroups, g: int, rate: float) -> bool:
+def spreads_less(groups: RebelGroups, g: int, rate: float, sigmas: float) -> bool:
     """Whether the parts of a group move apart by less than an expansion demands. ``rate``: V_e/r, 1/s."""
     sigma = SPREAD_NOISE_PX / groups.mean_s[g] / math.sqrt(max(groups.spread[g], MIN_EXTENT2_PX))
     spreads = groups.spreading[g] / max(groups.spread[g], MIN_EXTENT2_PX)
-    return spreads + SPREAD_SIGMAS * sigma < SPREAD_SHARE * rate
+    return spreads + sigmas * sigma < SPREAD_SHARE * rate
 
 
 def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
@@ -332,7 +333,7 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
     """
     if 2 * groups.standing[g] < members.size[g]:
         return False
-    return spreads_less(groups, g, groups.expansion[g])
+    return spreads_less(groups, g, groups.expansion[g], SPREAD_SIGMAS)
 
 
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
@@ -412,7 +413,7 @@ def own_expansion(groups: RebelGroups, g: int) -> float:
     extent2 = max(groups.below2[g], MIN_EXTENT2_PX)
     rate = groups.below_vy[g] / extent2
     sigma = VELOCITY_NOISE_PX / groups.mean_s[g] / math.sqrt(extent2 * groups.members.size[g])
-    return rate if rate > RATE_SIGMAS * sigma and not spreads_less(groups, g, rate) else 0.0
+    return rate if rate > RATE_SIGMAS * sigma and not spreads_less(groups, g, rate, SWING_SIGMAS) else 0.0
 
 
 def gather(

@@ -646,7 +646,7 @@ def test_the_expansion_of_what_moves_is_that_of_its_height_about_the_horizon(
 
 def test_what_moves_away_from_a_wrong_horizon_without_growing_does_not_come(situation: Situation) -> None:
     """A car that drives off: the lens, or the camera's pitch, puts the horizon 80 px below it."""
-    below = np.linspace(-90, -70, 9)
+    below = np.linspace(-100, -60, 9)
     assert own_expansion(situation(horizon_y=240.0), below, 0.5 * below) == pytest.approx(0.5)
     assert own_expansion(situation(horizon_y=240.0), below, np.full(9, 0.5 * -80)) == 0
 
