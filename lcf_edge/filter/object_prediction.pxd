@@ -37,6 +37,7 @@ cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
 cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil
 cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double looming, Situation around) noexcept nogil
 cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
+cdef double bounded(double change) noexcept nogil
 cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(inverse=double)
 cpdef void predict(ObjectColumns objects, ImagePlane plane, Situation around, Settings settings) noexcept nogil

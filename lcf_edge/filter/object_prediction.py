@@ -11,7 +11,7 @@ from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import ObjectState
 
 WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second; ``object_belief.UNSEEN_MPS`` where it is not seen
-MAX_LAG = 0.5  # bounds the correction of a rate from the middle of its window to now
+MAX_LAG = 0.5  # bounds the growth in a frame, and the correction of a rate from the middle of its window to now
 EDGE_PX = 1.0  # inset of a corner from the outline
 SURE_EDGES = 7  # fewer may lie on something else
 COAST_S = 0.3  # an unseen object keeps its trust for this long,
@@ -62,6 +62,11 @@ def velocity_y(y: float, looming: float, around: Situation) -> float:
     return looming * (y - around.horizon_y)
 
 
+def bounded(change: float) -> float:
+    """Returns a relative change, at most ``MAX_LAG`` either way."""
+    return min(max(change, -MAX_LAG), MAX_LAG)
+
+
 def forget_motion(objects: ObjectColumns, o: int) -> None:
     """Reset an object's motion to unknown."""
     objects.looming[o] = objects.sideways[o] = objects.mq[o] = 0.0
@@ -82,7 +87,7 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
             dt_s = 0.0
         objects.x[o] += velocity_x(objects, o, objects.x[o], looming, around) * dt_s
         objects.y[o] += velocity_y(objects.y[o], looming, around) * dt_s
-        growth = 1 + min(max(looming * dt_s, -MAX_LAG), MAX_LAG)
+        growth = 1 + bounded(looming * dt_s)
         objects.width[o] *= growth
         objects.height[o] *= growth
         objects.foot[o] *= growth

@@ -135,10 +135,8 @@ def moves_alike(
     x, y = parts.x[c] / weight, parts.y[c] / weight
     vx, vy = parts.vx[c] / weight, parts.vy[c] / weight
     looming = object_prediction.looming_at(objects, o, parts.forward[c] / weight)
-    dx, dy = (
-        vx - object_prediction.velocity_x(objects, o, x, looming, around),
-        vy - object_prediction.velocity_y(y, looming, around),
-    )
+    dx = vx - object_prediction.velocity_x(objects, o, x, looming, around)
+    dy = vy - object_prediction.velocity_y(y, looming, around)
     fx, fy = around.pinhole.fx, around.pinhole.fy
     across, down = (x - around.focus_x) / fx, (y - around.horizon_y) / fy
     own = 1 / weight
@@ -477,7 +475,7 @@ def observe(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situatio
         vertical_var = (1 / weight + common * common) / (below * below)
         rate = (rate * vertical_var + vertical * variance) / (vertical_var + variance)
         variance = variance * vertical_var / (vertical_var + variance)
-    lag = 1 - min(max(0.5 * elapsed_s * rate, -object_prediction.MAX_LAG), object_prediction.MAX_LAG)
+    lag = 1 - object_prediction.bounded(0.5 * elapsed_s * rate)
     speed_mps = wholes.forward[o] / weight if math.isfinite(around.speed_mps) else NAN
     update_rate(objects, o, 1.0, 0.0, rate / lag, repeated * variance / (lag * lag), speed_mps)
     speed_change.observe(objects, o, rate / lag, repeated * variance / (lag * lag), speed_mps)
@@ -539,11 +537,9 @@ def obeys(
     speed_mps = baselines.depth_m[verdicts.slot[j]] / elapsed_s
     x, y = 0.5 * (edges.x[i] + verdicts.x[j]), 0.5 * (edges.y[i] + verdicts.y[j])
     looming = object_prediction.looming_at(objects, o, speed_mps)
-    lag = 1 - min(max(0.5 * elapsed_s * looming, -object_prediction.MAX_LAG), object_prediction.MAX_LAG)
-    vx, vy = (
-        object_prediction.velocity_x(objects, o, x, looming, around) * lag,
-        object_prediction.velocity_y(y, looming, around) * lag,
-    )
+    lag = 1 - object_prediction.bounded(0.5 * elapsed_s * looming)
+    vx = object_prediction.velocity_x(objects, o, x, looming, around) * lag
+    vy = object_prediction.velocity_y(y, looming, around) * lag
     dx, dy = (edges.x[i] - verdicts.x[j]) / elapsed_s - vx, (edges.y[i] - verdicts.y[j]) / elapsed_s - vy
     most = STRAY_SIGMAS * verdicts.noise[j] / elapsed_s + share * lengths.of(vx, vy)
     return dx * dx + dy * dy < most * most
