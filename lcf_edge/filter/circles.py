@@ -89,11 +89,13 @@ def contact_rate(circles: CircleColumns, c: int, rate: float, dt_s: float, setti
 def stand(circles: CircleColumns, c: int, x: float, range_m: float, around: Situation, settings: Settings) -> None:
     """Set cause, motion, time to contact, range and lateral miss of a circle: what it shows, at ``x``, stands."""
     right_m = (x - around.focus_x) / around.pinhole.fx * range_m
-    rate = around.speed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
+    rate = around.assumed_mps / max(path.way_to(right_m, range_m, around), MIN_RANGE_M)
     rate = contact_rate(circles, c, rate, around.dt_s, settings)
     circles.cause[c] = INCOMING
     circles.ttc[c], circles.range[c] = 1 / rate, range_m
     circles.lateral[c] = path.least_miss(right_m, range_m, around)
+    if not math.isfinite(around.speed_mps):
+        circles.range[c] = circles.lateral[c] = NAN
     dx, dy = circles.x[c] - around.focus_x, circles.y[c] - around.focus_y
     circles.beta[c], circles.speed[c] = math.atan2(dy, dx), rate * lengths.of(dx, dy)
 

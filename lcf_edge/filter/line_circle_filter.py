@@ -151,7 +151,7 @@ class LineCircleFilter:
         self._coarse_groups = CoarseGroups(self._coarse.blocks.columns * self._coarse.blocks.rows)
         self._off_line = OffLine()
         self.shutter = RollingShutter(self._pinhole, lens.height, self._settings)
-        self._speed_mps = math.nan  # of the last frame
+        self._speed_mps, self._assumed_mps = math.nan, math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
@@ -304,20 +304,20 @@ class LineCircleFilter:
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
     def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
-        """Add the motion to the key frames; an unknown speed counts as 1 m/s, as only the direction matters then.
+        """Add the motion to the key frames, at an assumed speed where it is unknown.
 
-        Once the speed is known, the vehicle is taken to have driven at it since the key frames: otherwise the static
-        scene would seem to have kept up with 1 m/s.
+        Once the speed is known, the vehicle is taken to have driven at it since the key frames, and no longer at the
+        assumed one, and the reverse: otherwise the static scene would seem to gain or fall behind.
         """
-        before, self._speed_mps = self._speed_mps, motion.speed_mps
-        if math.isfinite(motion.speed_mps) and not math.isfinite(before):
-            key_frames.scale(self._keys, motion.speed_mps)
-        elif math.fabs(before) > SLOWEST_MPS and not math.isfinite(motion.speed_mps):
-            key_frames.scale(self._keys, 1 / before)
-        speed = motion.speed_mps if math.isfinite(motion.speed_mps) else 1.0
+        was_known, before = math.isfinite(self._speed_mps), self._assumed_mps
+        self._speed_mps, self._assumed_mps = motion.speed_mps, self._around.assumed_mps
+        if math.isfinite(motion.speed_mps) != was_known and math.fabs(before) > SLOWEST_MPS:
+            key_frames.scale(self._keys, self._assumed_mps / before)
+            patches.correct_way(self.patches, self._assumed_mps / before)
         x, y = self._heading.ray_x + self._heading.aside_x, self._heading.ray_y
         scale = 1 / math.sqrt(x * x + y * y + 1)
-        key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, speed * motion.dt_s, motion.dt_s)
+        way_m = self._assumed_mps * motion.dt_s
+        key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, way_m, motion.dt_s)
 
     def _warp(self, rotation: Doubles) -> None:
         """Apply H = K·R·K⁻¹ to every stored image position."""

@@ -22,6 +22,8 @@ cdef double CUT_HIDES
 cdef double MOVES_SIGMAS
 cdef double SLOW_MPS
 cdef double INTO_PATH
+cdef double FOOT_SHARE
+cdef double ASSUMED_SHARE
 cdef double STILL_HZ
 cdef double RATE_SIGMAS
 cdef double EVEN
@@ -44,5 +46,5 @@ cdef int class_of(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence e
 cdef bint rests(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(beside=double, time_s=double, time_sigma_s=double, drift_mps=double)
 cdef void coast(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
-@cython.locals(beside=double)
+@cython.locals(beside=double, range_m=double, doubt=double)
 cdef void believe_without_speed(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil

@@ -25,6 +25,8 @@ CUT_HIDES = 0.75  # with this probability
 MOVES_SIGMAS = 1.5  # a velocity above this is significant
 SLOW_MPS = 0.15
 INTO_PATH = 0.2  # least sideways motion of an object that cuts in, as a share of its forward motion
+FOOT_SHARE = 0.12  # 1 sigma of the height of the lowest edge above the foot, as a share of the object's,
+ASSUMED_SHARE = 0.7  # and of the assumed speed, as a share; both without a speed
 STILL_HZ = 0.05  # before a vehicle at rest, an object with a smaller looming and sideways rate is at rest too
 RATE_SIGMAS = 1.0  # a time to contact is reported for a looming above this
 EVEN = 0.5
@@ -153,26 +155,37 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
 
 
 def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation) -> None:
-    """Set an object's numbers without the vehicle's speed: time to contact from looming, range from the foot."""
+    """Set an object's numbers without the vehicle's speed: time to contact from looming, range from the foot.
+
+    Where the foot does not show, the chance to be met is that of something stationary, at the assumed speed.
+    """
     objects.middle[o] = objects.middle_sigma[o] = objects.range[o] = objects.range_sigma[o] = NAN
     objects.lateral[o] = objects.lateral_sigma[o] = NAN
     objects.forward[o] = objects.forward_sigma[o] = objects.right[o] = objects.right_sigma[o] = NAN
     objects.closest[o] = objects.closest_sigma[o] = NAN
     objects.class_id[o] = UNKNOWN
-    sigma = math.sqrt(evidence.mm)
-    set_contact(objects, o, evidence.looming, sigma, around)
-    beside = EVEN
-    if around.camera_height_m > 0 and evidence.foot > 2 * evidence.foot_sigma and not evidence.is_cut:
-        range_m = 1 / evidence.foot
-        objects.range[o], objects.range_sigma[o] = range_m, range_m * range_m * evidence.foot_sigma
-        objects.right[o], objects.right_sigma[o] = evidence.sideways * range_m, math.sqrt(evidence.qq) * range_m
-        if math.isfinite(objects.ttc[o]):
-            time_s = objects.ttc[o]
-            objects.lateral[o] = range_m * (evidence.across + evidence.sideways * time_s)
-            lateral_var = range_m * range_m * time_s * time_s * evidence.qq
-            objects.lateral_sigma[o] = math.sqrt(lateral_var)
-            half_m = around.half_width_m + evidence.half_width * range_m
-            beside = range_belief.below(half_m, objects.lateral[o], lateral_var)
-            beside -= range_belief.below(-half_m, objects.lateral[o], lateral_var)
+    set_contact(objects, o, evidence.looming, math.sqrt(evidence.mm), around)
+    range_m, doubt = around.assumed_mps * objects.ttc[o], ASSUMED_SHARE
+    if around.camera_height_m > 0 and not evidence.is_cut:
+        above = FOOT_SHARE * objects.height[o] / around.pinhole.fy / around.camera_height_m
+        foot_sigma = lengths.of(evidence.foot_sigma, above)
+        if evidence.foot > 2 * foot_sigma:
+            range_m, doubt = 1 / evidence.foot, foot_sigma / evidence.foot
+            objects.range[o], objects.range_sigma[o] = range_m, doubt * range_m
+            objects.right[o], objects.right_sigma[o] = evidence.sideways * range_m, math.sqrt(evidence.qq) * range_m
+    objects.probability[o] = 0.0
+    if not math.isfinite(objects.ttc[o]):
+        return
+    time_s, time_sigma_s = objects.ttc[o], objects.ttc_sigma[o]
+    right_mps, late_mps = evidence.sideways * range_m, math.sqrt(evidence.qq) * range_m
+    lateral_m = range_m * evidence.across + right_mps * time_s
+    aside = lengths.of(range_m * evidence.across_sigma, doubt * lateral_m)
+    late = lengths.of(late_mps * time_s, right_mps * time_sigma_s)
+    lateral_sigma_m = lengths.of(aside, late)
+    if math.isfinite(objects.range[o]):
+        objects.lateral[o], objects.lateral_sigma[o] = lateral_m, lateral_sigma_m
+    half_m = around.half_width_m + evidence.half_width * range_m
+    beside = range_belief.below(half_m, lateral_m, lateral_sigma_m * lateral_sigma_m)
+    beside -= range_belief.below(-half_m, lateral_m, lateral_sigma_m * lateral_sigma_m)
     soon = 1 - range_belief.below(1 / around.horizon_s, evidence.looming, evidence.mm)
     objects.probability[o] = beside * soon

@@ -46,6 +46,6 @@ cdef bint grows_evenly(PatchGroups groups) noexcept nogil
 cdef void claim(PatchGroups groups, Py_ssize_t p, Patches patches, int circle) noexcept nogil
 @cython.locals(nearest=int, least=double)
 cdef int circle_of(PatchGroups groups, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
-cdef bint continues(PatchGroups groups, CircleColumns circles, Py_ssize_t c) noexcept nogil
+cdef bint continues(PatchGroups groups, CircleColumns circles, Py_ssize_t c, Situation around) noexcept nogil
 @cython.locals(seen=bint, is_shown=bint, is_known=bint, c=int)
 cdef void update(PatchGroups groups, Patches patches, EdgeColumns edges, CircleColumns circles, unsigned char[::1] updated, Situation around, Settings settings, Ids ids) noexcept nogil

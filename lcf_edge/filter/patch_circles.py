@@ -64,7 +64,7 @@ def stands(patches: Patches, p: int, around: Situation) -> bool:
 def is_obstacle(patches: Patches, p: int, around: Situation) -> bool:
     """Whether a patch shows something stationary above the ground that the vehicle reaches within the horizon."""
     inverse, inverse_sigma = patches.inverse[p], patches.inverse_sigma[p]
-    reach_m = around.speed_mps * around.horizon_s
+    reach_m = around.assumed_mps * around.horizon_s
     if not inverse > MIN_SIGMAS * inverse_sigma or not (inverse - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1:
         return False
     range_m = 1 / inverse
@@ -192,11 +192,9 @@ def circle_of(groups: PatchGroups, g: int, circles: CircleColumns, settings: Set
     return nearest
 
 
-def continues(groups: PatchGroups, circles: CircleColumns, c: int) -> bool:
-    """Whether a group is at the range of a circle."""
-    if not circles.range[c] > 0:
-        return False
-    apart = math.fabs(groups.inverse - 1 / circles.range[c])
+def continues(groups: PatchGroups, circles: CircleColumns, c: int, around: Situation) -> bool:
+    """Whether a group is met when a circle is."""
+    apart = math.fabs(groups.inverse - 1 / (around.assumed_mps * circles.ttc[c]))
     return apart < AGREE_SIGMAS / math.sqrt(groups.weight) + AGREE_SHARE * groups.inverse
 
 
@@ -214,7 +212,7 @@ def update(
 
     ``updated``: circles that rebels have updated; those updated here are marked too.
     """
-    if not around.speed_mps > 0:
+    if not around.assumed_mps > 0:
         return
     for p in range(patches.capacity):
         seen = patches.active[p] and not patches.misses[p] and patches.elapsed_s[p] >= MIN_ELAPSED_S
@@ -226,7 +224,7 @@ def update(
         gather(groups, p, patches)
         c = circle_of(groups, p, circles, settings)
         is_known = c >= 0 and circles.cause[c] == INCOMING
-        if groups.members.size[p] < 2 and not (is_known and continues(groups, circles, c)):
+        if groups.members.size[p] < 2 and not (is_known and continues(groups, circles, c, around)):
             continue
         if not is_in_way(groups, p, patches, is_known, around) or (c < 0 and not grows_evenly(groups)):
             continue

@@ -56,6 +56,7 @@ cdef class Patches:
 cdef void weigh(Patches patches) noexcept nogil
 cpdef void derotate(Patches patches, Homography h) noexcept nogil
 cpdef void predict(Patches patches, Situation around) noexcept nogil
+cpdef void correct_way(Patches patches, double factor) noexcept nogil
 cdef bint locate(Patches patches, ImagePlane plane, double x, double y, double half) noexcept nogil
 @cython.locals(row=int, column=int, left=int, top=int, at=Py_ssize_t, upper=double, lower=double)
 cdef void look(Patches patches, const unsigned char[::1] image, Py_ssize_t width) noexcept nogil

@@ -116,19 +116,31 @@ def derotate(patches: Patches, h: Homography) -> None:
 
 
 def predict(patches: Patches, around: Situation) -> None:
-    """Move each patch outward from O, as stationary; without a speed that predicts nothing, and patches end."""
+    """Move each patch outward from O, as stationary."""
     for p in range(patches.capacity):
-        if not math.isfinite(around.speed_mps):
-            patches.active[p] = 0
         if not patches.active[p]:
             continue
-        ahead_m = around.speed_mps * around.dt_s
+        ahead_m = around.assumed_mps * around.dt_s
         growth = 1 + patches.inverse[p] * ahead_m
         patches.x[p] = around.focus_x + (patches.x[p] - around.focus_x) * growth
         patches.y[p] = around.focus_y + (patches.y[p] - around.focus_y) * growth
         patches.scale[p] *= growth
         patches.elapsed_s[p] += around.dt_s
         patches.depth_m[p] += ahead_m
+
+
+def correct_way(patches: Patches, factor: float) -> None:
+    """Multiply the way driven since each patch began, and so its range, by a factor: the speed was another.
+
+    What has no way shows no range, and ends.
+    """
+    for p in range(patches.capacity):
+        if not factor > 0:
+            patches.active[p] = 0
+            continue
+        patches.depth_m[p] *= factor
+        patches.inverse[p] /= factor
+        patches.inverse_sigma[p] /= factor
 
 
 # Looking
@@ -264,20 +276,20 @@ def follow(patches: Patches, image: Bytes, plane: ImagePlane) -> None:
 
 def half_side(around: Situation) -> float:
     """Half-side of a new patch, px: a share of the vehicle's half width at the range of half a horizon."""
-    halfway_m = max(0.5 * around.speed_mps * around.horizon_s, MIN_SPEED_MPS)
+    halfway_m = max(0.5 * around.assumed_mps * around.horizon_s, MIN_SPEED_MPS)
     half = HALF_WIDTH_SHARE * around.half_width_m * around.pinhole.fx / halfway_m
     return min(max(half, MIN_HALF_PX), MAX_HALF_PX)
 
 
 def reach_px(half: float, around: Situation) -> float:
     """Distance from the path within which patches start, px."""
-    halfway_m = 0.5 * around.speed_mps * around.horizon_s
+    halfway_m = 0.5 * around.assumed_mps * around.horizon_s
     return max(BESIDE * around.half_width_m * around.pinhole.fx / halfway_m, BESIDE_HALVES * half)
 
 
 def beside_px(x: float, around: Situation) -> float:
     """Distance from the path at the range of half a horizon, px."""
-    halfway_m = 0.5 * around.speed_mps * around.horizon_s
+    halfway_m = 0.5 * around.assumed_mps * around.horizon_s
     right_m = (x - around.focus_x) / around.pinhole.fx * halfway_m
     return math.fabs(path.least_miss(right_m, halfway_m, around)) / halfway_m * around.pinhole.fx
 
@@ -317,9 +329,9 @@ def next_place(patches: Patches, edges: EdgeColumns, half: float, around: Situat
     ground reached in ``NEAREST_S``.
     """
     fy = around.pinhole.fy
-    halfway_m, reach = 0.5 * around.speed_mps * around.horizon_s, reach_px(half, around)
+    halfway_m, reach = 0.5 * around.assumed_mps * around.horizon_s, reach_px(half, around)
     top = around.horizon_y - max(around.height_m - around.camera_height_m, 0.0) / halfway_m * fy - half
-    bottom = around.horizon_y + fy * around.camera_height_m / (around.speed_mps * NEAREST_S)
+    bottom = around.horizon_y + fy * around.camera_height_m / (around.assumed_mps * NEAREST_S)
     if not around.camera_height_m > 0:
         bottom = around.horizon_y + fy
     best, least = -1, FAR_PX
@@ -422,7 +434,7 @@ def set_template(patches: Patches, p: int) -> bool:
 
 def renew(patches: Patches, edges: EdgeColumns, image: Bytes, plane: ImagePlane, around: Situation) -> None:
     """Start new patches in free rows, around edges near the path."""
-    if not around.speed_mps > MIN_SPEED_MPS:
+    if not around.assumed_mps > MIN_SPEED_MPS:
         return
     half = half_side(around)
     retire(patches, half, around)

@@ -15,10 +15,10 @@ TURN_LASTS_S = 3.0  # no turn can be relied upon for longer
 
 
 def arc_radius_m(yaw_rate_radps: float, around: Situation) -> float:
-    """Radius of the path at a yaw rate, m, positive to the left; infinite: straight, or speed unknown."""
-    speed = around.speed_mps
+    """Radius of the path at a yaw rate, m, positive to the left; infinite: straight."""
+    speed = around.assumed_mps
     least = MIN_CURVATURE * max(math.fabs(speed), MIN_SPEED_MPS)
-    if not math.isfinite(speed) or math.fabs(yaw_rate_radps) < least:
+    if math.fabs(yaw_rate_radps) < least:
         return INFINITY
     return speed / yaw_rate_radps
 
@@ -47,7 +47,7 @@ def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:
     least between arc and straight line.
     """
     arc_m = miss(right_m, ahead_m, around)
-    until_s = ahead_m / max(around.speed_mps, MIN_SPEED_MPS)
+    until_s = ahead_m / max(around.assumed_mps, MIN_SPEED_MPS)
     turn_rad = math.fabs(around.yaw_rate_radps) * min(until_s, TURN_LASTS_S)
     if not turn_rad < SMALL_TURN_RAD:
         return arc_m

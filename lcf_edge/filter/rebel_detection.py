@@ -151,7 +151,7 @@ def lever_of(verdicts: Verdicts, j: int, baselines: Baselines) -> float:
 def near_path(verdicts: Verdicts, edges: EdgeColumns, baselines: Baselines, around: Situation) -> None:
     """Gather candidates: edges that, taken alone, may stand near the path within the horizon."""
     near = 0
-    reach_m = around.speed_mps * around.horizon_s
+    reach_m = around.assumed_mps * around.horizon_s
     for j in range(verdicts.count):
         sigma = sigma_px(verdicts, j)
         lever = lever_of(verdicts, j, baselines)
@@ -241,7 +241,7 @@ def ask_neighbours(verdicts: Verdicts, a: int, settings: Settings) -> None:
 def will_be_met(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situation) -> bool:
     """Whether a candidate, by its neighbours, stands in the way, above the ground, within the horizon."""
     i, inverse, inverse_sigma = verdicts.row[verdicts.near[a]], verdicts.shared, verdicts.shared_sigma
-    reach_m = around.speed_mps * around.horizon_s
+    reach_m = around.assumed_mps * around.horizon_s
     range_m = 1 / max(inverse, MIN_INVERSE_RANGE)
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
     below_m = (edges.y[i] - around.horizon_y) / around.pinhole.focal * range_m
@@ -266,7 +266,7 @@ def find_incoming(
     Near the focus a single edge hardly moves, and a small thing moves much as the ground under it: an edge is judged
     together with its neighbours.
     """
-    if not around.speed_mps > 0:
+    if not around.assumed_mps > 0:
         return
     near_path(verdicts, edges, baselines, around)
     for a in range(verdicts.near_count):

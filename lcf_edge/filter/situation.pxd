@@ -2,6 +2,7 @@ from libc cimport math
 from lcf_edge.filter.flow cimport Pinhole
 
 cdef double SLOWEST_MPS
+cdef double ASSUMED_WIDTHS_HZ
 cdef double LASTING_TURN_S
 cdef double INFINITY
 cdef double NAN
@@ -9,7 +10,7 @@ cdef double NAN
 cdef class Situation:
     cdef public Pinhole pinhole
     cdef public double scene_depth_m, camera_height_m, half_width_m, height_m, horizon_s, pitch_sigma_rad, horizon_sigma_rad
-    cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, ground_mps, turn_share, lever_m, yaw_rate_radps
+    cdef public double focus_x, focus_y, horizon_y, dt_s, speed_mps, assumed_mps, ground_mps, turn_share, lever_m, yaw_rate_radps
     cdef public double lasting_yaw_radps
     cdef double scene_flow_pxps
     cdef public bint flow_is_seen, is_blind

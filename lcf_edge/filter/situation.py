@@ -6,6 +6,7 @@ from lcf_edge.config import Config
 from lcf_edge.filter.flow import Pinhole
 
 SLOWEST_MPS = 0.05  # a slower vehicle is at rest: its scene does not flow, and would bound all motion by 0
+ASSUMED_WIDTHS_HZ = 4.0  # speed that is assumed where none is measured, in vehicle widths per second
 LASTING_TURN_S = 0.3  # a turn that has lasted so long is no swerve
 INFINITY = float("inf")
 NAN = float("nan")
@@ -15,16 +16,17 @@ class Situation:
     """State of this frame that the experts share.
 
     ``focus_x``, ``focus_y``: O, px. ``horizon_y``: px. ``camera_height_m`` 0: unknown. ``speed_mps``: V_ν, NaN:
-    unknown. ``scene_flow_pxps``: image speed at V_ν, or ``SLOWEST_MPS`` if more, of a point at the configured scene
-    depth, one focal length from O, which gives the paper's bounds in V_ν a unit in the image; inf where V_ν is unknown.
-    ``dt_s``: t_f. ``lasting_yaw_radps``: yaw rate, averaged over ``LASTING_TURN_S``. ``noise_px``: 1 sigma of an edge's
-    position; ``corner_var``: variance of a corner's, px², at least ``least_corner_var``; ``excess``: factor by which
-    this image leaves more than they explain. ``focus_var_x``, ``focus_var_y``: variance of O at one instant, px²;
-    ``lasting_var_x``, ``lasting_var_y``: without the shaking of the heading. ``turn_share``: 1 sigma of the image
-    motion by a turn, as a share of it. ``pitch_sigma_rad``: 1 sigma of the horizon as configured,
-    ``horizon_sigma_rad``: by the flow where that is less. ``lever_m``: distance of the camera ahead of the axle.
-    ``ground_is_still``: although at V_ν it must flow (``rest``). ``flow_is_seen``: enough of the static scene is in
-    view to show its flow. ``is_blind``: it is not, and hardly an edge of the image is found again: something covers it.
+    unknown; then ``assumed_mps``, else the same, is a guess by the vehicle's width. ``scene_flow_pxps``: image speed at
+    V_ν, or ``SLOWEST_MPS`` if more, of a point at the configured scene depth, one focal length from O, which gives the
+    paper's bounds in V_ν a unit in the image; inf where V_ν is unknown. ``dt_s``: t_f. ``lasting_yaw_radps``: yaw rate,
+    averaged over ``LASTING_TURN_S``. ``noise_px``: 1 sigma of an edge's position; ``corner_var``: variance of a
+    corner's, px², at least ``least_corner_var``; ``excess``: factor by which this image leaves more than they explain.
+    ``focus_var_x``, ``focus_var_y``: variance of O at one instant, px²; ``lasting_var_x``, ``lasting_var_y``: without
+    the shaking of the heading. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it.
+    ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less.
+    ``lever_m``: distance of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``).
+    ``flow_is_seen``: enough of the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an
+    edge of the image is found again: something covers it.
     """
 
     def __init__(self, config: Config, pinhole: Pinhole) -> None:
@@ -44,6 +46,7 @@ class Situation:
         self.excess, self.focus_var_x, self.focus_var_y = 1.0, 0.0, 0.0
         self.lasting_var_x = self.lasting_var_y = 0.0
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
+        self.assumed_mps = ASSUMED_WIDTHS_HZ * 2 * self.half_width_m
         self.lasting_yaw_radps = NAN
 
 
@@ -55,7 +58,9 @@ def follow(around: Situation, ray_x: float, ray_y: float, speed_mps: float, yaw_
     before = yaw_rate_radps if math.isnan(around.lasting_yaw_radps) else around.lasting_yaw_radps
     around.lasting_yaw_radps = before + (yaw_rate_radps - before) * min(dt_s / LASTING_TURN_S, 1.0)
     around.scene_flow_pxps = INFINITY
+    around.assumed_mps = ASSUMED_WIDTHS_HZ * 2 * around.half_width_m
     if math.isfinite(speed_mps):
+        around.assumed_mps = speed_mps
         around.scene_flow_pxps = max(math.fabs(speed_mps), SLOWEST_MPS) * around.pinhole.focal / around.scene_depth_m
 
 

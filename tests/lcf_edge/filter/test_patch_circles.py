@@ -103,12 +103,31 @@ def test_it_is_an_object_that_stands() -> None:
         pytest.param(Board(right_m=1.2), id="beside the way"),
         pytest.param(Board(range_m=30.0, width_m=4.0, height_m=4.0), id="beyond the horizon"),
         pytest.param(Board(yaw_rate_radps=0.4), id="in a turn, which leaves it aside"),
-        pytest.param(Board(measured_mps=math.nan), id="without a speed"),
         pytest.param(Board(speed_mps=0.0, measured_mps=1.0, frames=40), id="while nothing comes nearer"),
     ],
 )
 def test_what_will_not_be_met_is_not_reported(board: Board) -> None:
     assert not driven(board)
+
+
+@pytest.mark.parametrize("speed_mps", [1.5, 2.4, 3.6])
+def test_without_a_speed_it_is_found_with_its_time_and_no_range_but_by_its_foot(speed_mps: float) -> None:
+    """4 widths a second, 2.4 m/s, are assumed, and what stands ahead is met at any speed."""
+    board, tables, found = Board(speed_mps=speed_mps, measured_mps=math.nan), LineCircleFilter(CONFIG, LENS), []
+    for seq, (corners, motion, image) in enumerate(board):
+        tables.step(corners, motion, image)
+        rebel = tables.rebel
+        for c in np.flatnonzero(rebel.active & (rebel.trust >= CONFIG.filter.tr_s)):
+            assert rebel.cause[c] == Cause.INCOMING
+            assert math.isnan(rebel.range[c]) or rebel.range[c] in tables.objects.range
+            found.append(rebel.ttc[c] * speed_mps / board.distance_m(seq))
+    assert len(found) > 10
+    assert np.median(found) == pytest.approx(1.0, abs=0.15)
+
+
+@pytest.mark.parametrize("right_m", [-3.0, 3.0])
+def test_without_a_speed_what_stands_well_beside_is_none_of_them(right_m: float) -> None:
+    assert not driven(Board(right_m=right_m, measured_mps=math.nan))
 
 
 def test_the_paper_s_profile_has_none() -> None:

@@ -128,22 +128,19 @@ def test_what_is_gone_is_missed_and_ends_after_a_few_images() -> None:
     assert not patches.active[0]
 
 
-def test_it_ends_with_its_time_and_without_a_speed(situation: type[Situation]) -> None:
+def test_it_ends_with_its_time(situation: type[Situation]) -> None:
     image = pattern(640, 480, 1)
-    old, lost = born(image), born(image)
+    old = born(image)
     assert old is not None
-    assert lost is not None
     around = situation(speed_mps=0.0)
     while old.active[0]:
         functions.predict(old, around)
         follow(old, image)
     assert old.elapsed_s[0] == pytest.approx(LIFE_S, abs=2 * around.dt_s)
-    functions.predict(lost, situation(speed_mps=float("nan")))
-    assert not lost.active[0]
 
 
-def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
-    """From 5 m to 4 m: s = 5/4, and 1/Z = (s - 1)/ΔZ."""
+def nearer(situation: type[Situation]) -> Patches:
+    """A patch on something that stood 5 m and stands 4 m ahead."""
     image, around = pattern(640, 480, 7, 4.0), situation(speed_mps=2.0)
     patches = born(image)
     assert patches is not None
@@ -153,9 +150,32 @@ def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situati
             (MIDDLE[k] - (around.focus_x, around.focus_y)[k]) * ahead_m / (5 - ahead_m) for k in range(2)
         )
         follow(patches, grown(image, 5 / (5 - ahead_m), right_px, down_px))
+    return patches
+
+
+def test_what_stands_shows_its_range_by_how_much_it_grew(situation: type[Situation]) -> None:
+    """From 5 m to 4 m: s = 5/4, and 1/Z = (s - 1)/ΔZ."""
+    patches = nearer(situation)
     assert patches.depth_m[0] == pytest.approx(1.0)
     assert 1 / patches.inverse[0] == pytest.approx(4.0, rel=0.1)
     assert abs(patches.inverse[0] - 0.25) < 3 * patches.inverse_sigma[0]
+
+
+@pytest.mark.parametrize("factor", [0.5, 3.0])
+def test_its_range_is_corrected_once_the_speed_is_known(factor: float, situation: type[Situation]) -> None:
+    patches = nearer(situation)
+    before, way_m, sigma = patches.inverse[0], patches.depth_m[0], patches.inverse_sigma[0]
+    functions.correct_way(patches, factor)
+    assert patches.depth_m[0] == pytest.approx(factor * way_m)
+    assert factor * patches.inverse[0] == pytest.approx(before)
+    assert factor * patches.inverse_sigma[0] == pytest.approx(sigma)
+
+
+@pytest.mark.parametrize("factor", [0.0, -0.4])
+def test_without_a_way_ahead_it_has_no_range_and_ends(factor: float, situation: type[Situation]) -> None:
+    patches = nearer(situation)
+    functions.correct_way(patches, factor)
+    assert not patches.active[0]
 
 
 def renew(patches: Patches, image: Grey, around: Situation, x: float = MIDDLE[0], y: float = MIDDLE[1]) -> None:

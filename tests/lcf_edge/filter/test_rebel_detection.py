@@ -240,8 +240,15 @@ def test_the_miss_is_the_distance_from_the_arc_to_the_right(situation: Around, y
 
 
 def test_the_miss_of_a_straight_drive_is_the_offset(situation: Around) -> None:
-    for around in (situation(), situation(speed_mps=math.nan, yaw_rate_radps=1.0), situation(speed_mps=0.0)):
+    for around in (situation(), situation(speed_mps=math.nan), situation(speed_mps=0.0)):
         assert (miss(-2.0, 3.0, around), miss(0.5, 9.0, around)) == (-2.0, 0.5)
+
+
+def test_a_turn_at_an_unknown_speed_is_one_at_the_assumed_speed(situation: Around) -> None:
+    unknown = situation(speed_mps=math.nan, yaw_rate_radps=1.0)
+    known = situation(speed_mps=unknown.assumed_mps, yaw_rate_radps=1.0)
+    assert unknown.assumed_mps == 4 * 2 * unknown.half_width_m
+    assert miss(-2.0, 3.0, unknown) == miss(-2.0, 3.0, known)
 
 
 @pytest.mark.parametrize("yaw_rate_radps", [0.5, -0.5])

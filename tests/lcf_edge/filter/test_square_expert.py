@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from lcf_edge.config import Config, Filter, Memory
+from lcf_edge.config import Camera, Config, Filter, Memory
 from lcf_edge.filter import Corners, LineCircleFilter, Motion, square_expert
 from lcf_edge.filter.flow import Pinhole
 from lcf_edge.filter.group_motion import MotionSums
@@ -231,6 +231,32 @@ def test_without_a_speed_the_contact_is_known_and_no_speed_over_ground(
             assert math.isnan(objects.forward[row])
             assert not math.isnan(objects.ttc[row])
     assert reported
+
+
+def test_without_a_speed_a_wall_ahead_is_met_and_has_a_range_by_its_foot(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    way = drive(clutter(150)) + drive(box((0.0, -0.2, 7.0), (0.5, 1.4, 0.0), landmarks=60))
+    config = Config(camera=Camera(height_m=0.5))
+    seen, off = [], []
+    for seq, tables in enumerate(steps(replace(way, frames=40), config, speed_mps=math.nan)):
+        objects, left_m = tables.objects, 7.0 - SPEED_MPS * seq / FPS
+        for row in published(objects):
+            seen.append(objects.probability[row])
+            off.append(abs(objects.range[row] - left_m) / objects.range_sigma[row])
+            assert objects.ttc[row] * SPEED_MPS == pytest.approx(left_m, rel=0.4)
+    assert len(seen) > 15
+    assert np.median(seen) > 0.8
+    assert np.count_nonzero(np.isfinite(off)) > 10
+    assert np.nanmedian(off) < 2
+
+
+def test_without_a_speed_what_stands_well_beside_is_hardly_met(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    way = drive(clutter(150)) + drive(box((2.5, -0.4, 7.0), (0.5, 0.9, 0.0), landmarks=60))
+    for tables in steps(replace(way, frames=40), speed_mps=math.nan):
+        assert not (tables.objects.probability[published(tables.objects)] > 0.3).any()
 
 
 def test_what_finds_no_place_in_a_full_table_is_counted(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
