@@ -160,7 +160,7 @@ def update(
         shared.confirm(circles, c, members, 0, settings)
     if not updated[c]:
         updated[c] = 1
-        shared.stand(circles, c, members.x[0], around.speed_mps / body.rate, around, settings)
+        shared.stand(circles, c, members.x[0], around.assumed_mps / body.rate, around, settings)
     for k in range(coarse.columns * coarse.rows):
         if body.is_part[k]:
             circle[k] = c

@@ -123,7 +123,7 @@ def look_back(coarse: CoarseMotion, keys: KeyFrames, around: Situation) -> None:
     block_matching.look_back(coarse.blocks)
     turn_back(coarse, around.pinhole, coarse.turned, 0, keys)
     coarse.then_s = around.dt_s
-    coarse.ahead_m = around.speed_mps * around.dt_s if math.isfinite(around.speed_mps) else ANY_WAY_M
+    coarse.ahead_m = around.assumed_mps * around.dt_s
     coarse.focus_x, coarse.focus_y = around.focus_x, around.focus_y
     sigma_px = keys.rate_sigma_radps * around.dt_s * around.pinhole.focal
     coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * sigma_px / coarse.side
@@ -136,7 +136,7 @@ def look_farther_back(
     block_matching.look_farther_back(coarse.blocks, slot)
     turn_back(coarse, around.pinhole, keys.rotation, slot, keys)
     coarse.then_s = baselines.elapsed_s[slot]
-    coarse.ahead_m = baselines.depth_m[slot] if math.isfinite(around.speed_mps) else ANY_WAY_M
+    coarse.ahead_m = baselines.depth_m[slot]
     coarse.focus_x, coarse.focus_y = baselines.focus_x[slot], baselines.focus_y[slot]
     coarse.off_flow = OFF_FLOW + ROTATION_SIGMAS * baselines.sigma_px[slot] / coarse.side
 
@@ -304,7 +304,8 @@ def put(coarse: CoarseMotion, k: int, plane: ImagePlane) -> bool:
 
 def see(coarse: CoarseMotion, k: int, age: int, around: Situation) -> bool:
     """Whether the piece set by ``put`` moves independently; ``age`` of the searched image: LAST or OLDER."""
-    nearest = coarse.ahead_m / (NEAREST_M + math.fabs(coarse.ahead_m)) / coarse.side
+    ahead_m = coarse.ahead_m if math.isfinite(around.speed_mps) else ANY_WAY_M
+    nearest = ahead_m / (NEAREST_M + math.fabs(ahead_m)) / coarse.side
     end_x, end_y = (coarse.focus_x - coarse.x[k]) * nearest, (coarse.focus_y - coarse.y[k]) * nearest
     coarse.share = coarse.shares[age, k]
     if stands_as_lately(coarse, k, end_x, end_y):
@@ -391,7 +392,7 @@ def is_in_way(coarse: CoarseMotion, k: int, range_m: float, around: Situation) -
 
 def seek_all_near(coarse: CoarseMotion, plane: ImagePlane, around: Situation) -> None:
     """Find textured pieces that are met soon, if they stand, against the searched image."""
-    if not around.speed_mps > 0 or not coarse.ahead_m > 0 or coarse.off_flow >= MAX_OFF_FLOW:
+    if not around.assumed_mps > 0 or not coarse.ahead_m > 0 or coarse.off_flow >= MAX_OFF_FLOW:
         return
     for k in range(coarse.columns * coarse.rows):
         known = coarse.links[k] > 0 or coarse.blocks.rough[k] < PLAIN_GREY * block_matching.PIXELS
