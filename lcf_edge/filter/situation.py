@@ -46,7 +46,7 @@ class Situation:
         self.excess, self.focus_var_x, self.focus_var_y = 1.0, 0.0, 0.0
         self.lasting_var_x = self.lasting_var_y = 0.0
         self.dt_s, self.speed_mps, self.yaw_rate_radps, self.scene_flow_pxps = 1.0, NAN, 0.0, INFINITY
-        self.assumed_mps = ASSUMED_WIDTHS_HZ * 2 * self.half_width_m
+        self.assumed_mps = NAN
         self.lasting_yaw_radps = NAN
 
 
