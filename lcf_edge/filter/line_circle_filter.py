@@ -151,7 +151,6 @@ class LineCircleFilter:
         self._coarse_groups = CoarseGroups(self._coarse.blocks.columns * self._coarse.blocks.rows)
         self._off_line = OffLine()
         self.shutter = RollingShutter(self._pinhole, lens.height, self._settings)
-        self._speed_mps, self._assumed_mps = math.nan, math.nan  # of the last frame
         self._missing_px = self._settings.leap_px  # rotation that the gyro lately missed
         capacity = self.edges.capacity
         self._verdicts, self._recent = Verdicts(capacity), Verdicts(1)
@@ -293,7 +292,10 @@ class LineCircleFilter:
         headings.turn_aside(self._heading, motion.speed_mps, motion.path_yaw_rate_radps)
         ray_x, ray_y = self._heading.ray_x + self._heading.aside_x, self._heading.ray_y
         self._around.lever_m = self._heading.lever_m
+        was_known, before_mps = math.isfinite(self._around.speed_mps), self._around.assumed_mps
         follow(self._around, ray_x, ray_y, motion.speed_mps, motion.path_yaw_rate_radps, motion.dt_s)
+        if math.isfinite(motion.speed_mps) != was_known:
+            self._correct_way(before_mps)
         self._advance_keys(rotation, motion)
         self._warp(rotation)
         normal_circles.predict(self.normal.columns, self._plane, self._around)
@@ -303,20 +305,20 @@ class LineCircleFilter:
         object_prediction.predict(self.objects.columns, self._plane, self._around, self._settings)
         feedback.advance(self.psi.columns, self.normal.columns, self._around)  # ψ ends with its circle
 
-    def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
-        """Add the motion to the key frames, at an assumed speed where it is unknown.
+    def _correct_way(self, before_mps: float) -> None:
+        """Once the speed is known, or unknown, take the vehicle to have driven at the present one since the key frames.
 
-        Once the speed is known, the vehicle is taken to have driven at it since the key frames, and no longer at the
-        assumed one, and the reverse: otherwise the static scene would seem to gain or fall behind.
+        At ``before_mps``, as it seemed then, the static scene would now seem to gain or fall behind.
         """
-        was_known, before = math.isfinite(self._speed_mps), self._assumed_mps
-        self._speed_mps, self._assumed_mps = motion.speed_mps, self._around.assumed_mps
-        if math.isfinite(motion.speed_mps) != was_known and math.fabs(before) > SLOWEST_MPS:
-            key_frames.scale(self._keys, self._assumed_mps / before)
-            patches.correct_way(self.patches, self._assumed_mps / before)
+        if math.fabs(before_mps) > SLOWEST_MPS:
+            key_frames.scale(self._keys, self._around.assumed_mps / before_mps)
+            patches.correct_way(self.patches, self._around.assumed_mps / before_mps)
+
+    def _advance_keys(self, rotation: Doubles, motion: Motion) -> None:
+        """Add the motion to the key frames, at an assumed speed where it is unknown."""
         x, y = self._heading.ray_x + self._heading.aside_x, self._heading.ray_y
         scale = 1 / math.sqrt(x * x + y * y + 1)
-        way_m = self._assumed_mps * motion.dt_s
+        way_m = self._around.assumed_mps * motion.dt_s
         key_frames.advance(self._keys, rotation, x * scale, y * scale, scale, way_m, motion.dt_s)
 
     def _warp(self, rotation: Doubles) -> None:

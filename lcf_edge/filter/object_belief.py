@@ -148,8 +148,7 @@ def coast(objects: ObjectColumns, o: int, evidence: Evidence, around: Situation)
     objects.lateral_sigma[o] = lengths.of(aside, late)
     half_m = around.half_width_m + evidence.half_width * range_m
     variance = objects.lateral_sigma[o] * objects.lateral_sigma[o]
-    beside = range_belief.below(half_m, objects.lateral[o], variance)
-    beside -= range_belief.below(-half_m, objects.lateral[o], variance)
+    beside = range_belief.within(half_m, objects.lateral[o], variance)
     soon = range_belief.below(around.horizon_s, time_s, time_sigma_s * time_sigma_s)
     objects.probability[o] = beside * soon
 
@@ -185,7 +184,6 @@ def believe_without_speed(objects: ObjectColumns, o: int, evidence: Evidence, ar
     if math.isfinite(objects.range[o]):
         objects.lateral[o], objects.lateral_sigma[o] = lateral_m, lateral_sigma_m
     half_m = around.half_width_m + evidence.half_width * range_m
-    beside = range_belief.below(half_m, lateral_m, lateral_sigma_m * lateral_sigma_m)
-    beside -= range_belief.below(-half_m, lateral_m, lateral_sigma_m * lateral_sigma_m)
+    beside = range_belief.within(half_m, lateral_m, lateral_sigma_m * lateral_sigma_m)
     soon = 1 - range_belief.below(1 / around.horizon_s, evidence.looming, evidence.mm)
     objects.probability[o] = beside * soon

@@ -74,6 +74,7 @@ cdef void suppose_moving(Belief belief, Evidence evidence, double inverse, Situa
 cdef double lateral_at(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef double lateral_var(Belief belief, Evidence evidence, double inverse) noexcept nogil
 cdef double below(double value, double mean, double variance) noexcept nogil
+cdef double within(double most, double mean, double variance) noexcept nogil
 cdef double met_probability(Belief belief, Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef void take(Belief belief, int quantity, double weight, double value, double variance) noexcept nogil
 @cython.locals(time_s=double)

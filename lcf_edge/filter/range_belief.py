@@ -248,11 +248,16 @@ def below(value: float, mean: float, variance: float) -> float:
     return 0.5 * (1 + math.erf((value - mean) / (ROOT_2 * math.sqrt(max(variance, 1e-12)))))
 
 
+def within(most: float, mean: float, variance: float) -> float:
+    """Probability that a normally distributed quantity is at most ``most`` in size."""
+    return below(most, mean, variance) - below(-most, mean, variance)
+
+
 def met_probability(belief: Belief, evidence: Evidence, inverse: float, around: Situation) -> float:
     """Probability of contact with the set motion: within the half widths, within the horizon."""
     half_m = around.half_width_m + evidence.half_width / inverse
     lateral, variance = lateral_at(belief, evidence, inverse, around), lateral_var(belief, evidence, inverse)
-    beside = below(half_m, lateral, variance) - below(-half_m, lateral, variance)
+    beside = within(half_m, lateral, variance)
     soon = 1 - below(1 / around.horizon_s, belief.inner_rate, belief.inner_rate_var)
     return beside * soon
 

@@ -230,6 +230,7 @@ def test_nor_does_one_far_above_the_assumed_make_circles_of_it(
     tables = LineCircleFilter(Config(), lens)
     for seq, (corners, moved) in enumerate(drive(clutter(250), speed_mps=8.0)):
         tables.step(corners, replace(moved, speed_mps=math.nan) if seq in unknown else moved)
+        assert tables.edges.rebels <= 2
         assert not tables.rebel.active.any()
     assert tables.edges.rebels == 0
 

@@ -125,8 +125,8 @@ def test_without_a_speed_it_is_found_with_its_time_and_no_range_but_by_its_foot(
     assert np.median(found) == pytest.approx(1.0, abs=0.15)
 
 
-@pytest.mark.parametrize("right_m", [-3.0, 3.0])
-def test_without_a_speed_what_stands_well_beside_is_none_of_them(right_m: float) -> None:
+@pytest.mark.parametrize("right_m", [-1.2, 1.2])
+def test_without_a_speed_what_stands_beside_is_none_of_them(right_m: float) -> None:
     assert not driven(Board(right_m=right_m, measured_mps=math.nan))
 
 
