@@ -64,10 +64,10 @@ LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of 
 # What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower;
 # and what takes hardly any, smaller still.
 SMALL, SMALLEST = "-Os", "-Oz"  # the latter is known to GCC from 12
-LITTLE = {"_memoryviews", "alpha", "coarse_motion", "patches", "rebel_detection", "spread"}
+LITTLE = {"_memoryviews", "alpha", "coarse_motion", "edge_equations", "patches", "rebel_detection", "spread"}
 LEAST = {"axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "columns", "derotation", "driving"}
 LEAST |= {"edge_rows", "error_matrix", "feedback", "flow_fit", "ground_speed", "group_motion", "heading"}
-LEAST |= {"image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
+LEAST |= {"hot_pixels", "image_plane", "key_frames", "leaps", "least_squares", "line_expert", "normal_circles"}
 LEAST |= {"object_belief", "object_circles", "object_prediction", "patch_circles", "path", "range_belief"}
 LEAST |= {"rebel_circles", "rebel_groups", "rest", "sample_ring"}
 LEAST |= {"scene_records", "settings", "situation", "speed_change", "square_expert", "stillness", "turmoil"}

@@ -1,9 +1,9 @@
 """``python -m benchmarks.copies RECORDINGS INTO``: copies of recordings that differ in light, noise or start.
 
 Whether something is found in one run may hang on a single corner. The mean over copies that a user would call the same
-recording tells two versions of the filter apart: ``lcf-edge evaluate INTO`` scores them. With ``--sensors`` the images
-stay, but IMU or odometry fail. EuRoC/ASL folders are copied; other recordings, and folders without a file ``settings``,
-are left out.
+recording tells two versions of the filter apart: ``lcf-edge evaluate INTO`` scores them. With ``--camera`` the
+images are those of a worse camera; with ``--sensors`` they stay, but IMU or odometry fail. EuRoC/ASL folders are
+copied; other recordings, and folders without a file ``settings``, are left out.
 """
 
 import argparse
@@ -12,6 +12,7 @@ import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
+from typing import Any
 
 import cv2
 import numpy as np
@@ -57,6 +58,74 @@ ALTERATIONS: dict[str, Alteration] = {
     "noise-1": _noise(1.0),
     "noise-2": _noise(2.0),
     "noise-3": _noise(3.0),
+}
+
+
+def _for_channels(values: npt.NDArray[Any], image: Grey) -> npt.NDArray[Any]:
+    """(height, width) values, to be combined with an image that may have channels."""
+    return values.reshape(*values.shape, *(1 for _ in image.shape[2:]))
+
+
+def _shaded(image: Grey, light: npt.NDArray[Any]) -> Grey:
+    return np.clip(image * _for_channels(light, image), 0, 255).astype(np.uint8)
+
+
+def _defects(share: float, grey: int) -> Alteration:
+    """Pixels that are stuck, the same in every image."""
+
+    def stick(image: Grey, random: np.random.Generator) -> Grey:
+        del random
+        stuck = np.random.default_rng(1).random(image.shape[:2]) < share
+        return np.where(_for_channels(stuck, image), grey, image).astype(np.uint8)
+
+    return stick
+
+
+def _exposure(image: Grey, random: np.random.Generator) -> Grey:
+    return np.clip(image * random.uniform(0.85, 1.15), 0, 255).astype(np.uint8)
+
+
+def _bands(image: Grey, random: np.random.Generator) -> Grey:
+    """Horizontal bands, as lamps on mains make with a rolling shutter."""
+    height, width = image.shape[:2]
+    phase = 2 * np.pi * (2.3 * np.arange(height) / height + random.random())
+    return _shaded(image, np.repeat(1 + 0.1 * np.sin(phase)[:, None], width, axis=1))
+
+
+def _vignetting(image: Grey, random: np.random.Generator) -> Grey:
+    """Down to 70 % at the middle of each side, 40 % in the corners of the image."""
+    del random
+    down, across = (np.linspace(-1, 1, size) ** 2 for size in image.shape[:2])
+    return _shaded(image, 1 - 0.3 * (down[:, None] + across))
+
+
+def _dust(image: Grey, random: np.random.Generator) -> Grey:
+    """Twelve soft spots on the lens, the same in every image."""
+    del random
+    (height, width), place = image.shape[:2], np.random.default_rng(0)
+    light = np.ones((height, width), np.float32)
+    for _ in range(12):
+        at = int(place.uniform(0, width)), int(place.uniform(0, height))
+        radius = max(2, int(place.uniform(0.005, 0.02) * width))
+        cv2.circle(light, at, radius, float(place.uniform(0.5, 0.8)), cv2.FILLED)
+    return _shaded(image, cv2.GaussianBlur(light, (0, 0), max(1.0, width / 160)))
+
+
+def _sharpened(image: Grey, random: np.random.Generator) -> Grey:
+    del random
+    soft = cv2.GaussianBlur(image, (0, 0), 1.0).astype(float)
+    return np.clip(1.8 * image - 0.8 * soft, 0, 255).astype(np.uint8)
+
+
+CAMERAS: dict[str, Alteration] = {
+    "hot-pixels": _defects(0.0005, 255),
+    "many-hot-pixels": _defects(0.003, 255),
+    "dead-pixels": _defects(0.001, 0),
+    "exposure": _exposure,
+    "bands": _bands,
+    "vignetting": _vignetting,
+    "dust": _dust,
+    "sharpened": _sharpened,
 }
 SELECTIONS = {f"from-{first}": slice(first, None) for first in range(10, 61, 10)}
 SELECTIONS |= {"every-second": slice(None, None, 2)}
@@ -129,6 +198,16 @@ def write(recording: Path, into: Path) -> Iterator[str]:
         yield copy.name
 
 
+def write_worse(recording: Path, into: Path) -> Iterator[str]:
+    """Write copies of an ASL recording as by worse cameras; yield the name of each. Raises ``OSError``."""
+    _, rows = lines_of(recording / "mav0/cam0/data.csv")
+    for name, alteration in CAMERAS.items():
+        copy = into / f"{recording.name}@{name}"
+        copy_all_but_images(recording, copy)
+        _copy_images(recording, copy, rows, alteration)
+        yield copy.name
+
+
 def write_failing(recording: Path, into: Path) -> Iterator[str]:
     """Write copies of an ASL recording whose sensors fail, as far as it has them; yield the name of each.
 
@@ -179,14 +258,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = argparse.ArgumentParser(prog="python -m benchmarks.copies", description=__doc__)
     parser.add_argument("recordings", type=Path, help="folder of recordings, each a folder with a file settings")
     parser.add_argument("into", type=Path, help="new folder")
-    parser.add_argument("--sensors", action="store_true", help="copies whose IMU or odometry fails")
+    kind = parser.add_mutually_exclusive_group()
+    kind.add_argument("--camera", action="store_true", help="copies whose camera is worse")
+    kind.add_argument("--sensors", action="store_true", help="copies whose IMU or odometry fails")
     options = parser.parse_args(arguments)
+    write_copies = write_failing if options.sensors else write_worse if options.camera else write
     try:
         found = [each.path for each in find([options.recordings]) if each.settings]
         written = 0
         for path in found:
             if (path / "mav0/cam0/data.csv").is_file():
-                written += sum(1 for _ in (write_failing if options.sensors else write)(path, options.into))
+                written += sum(1 for _ in write_copies(path, options.into))
         sys.stdout.write(f"{written} copies in {options.into}: lcf-edge evaluate {options.into}\n")
     except (LcfError, OSError) as error:
         sys.stderr.write(f"benchmarks.copies: {error}\n")

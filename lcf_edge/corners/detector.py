@@ -10,9 +10,10 @@ from lcf_edge.corners.along_edge import WITHIN, keep_round
 from lcf_edge.corners.appearance import BORDER_PX, appearance
 from lcf_edge.corners.fast import Fast, Grey, Parts, Pixels, Strengths
 from lcf_edge.corners.fast_threshold import FollowingThreshold
+from lcf_edge.corners.hot_pixels import SINGLES, keep_cool
 from lcf_edge.corners.spread import Squares, find_poor, keep_distinct, keep_spread, keep_strongest, leave_poor
 from lcf_edge.filter.inputs import Corners
-from lcf_edge.filter.memory import memory_of
+from lcf_edge.filter.memory import integers, memory_of
 from lcf_edge.lens import Lens
 
 SQUARES = 192  # approximate number that an image is divided into
@@ -52,6 +53,7 @@ class CornerDetector:
         self._room = BORDER_PX, np.array((*size, *size), np.int32) - BORDER_PX
         self._whole = self._inside(np.array([(0, 0, *size)], np.int32))
         self._fast = Fast(*size)
+        self._singles, self._images = integers(*SINGLES), 0
         self._budget_squares = Squares(*size, SPREAD_PX)
         self._squares = Squares(lens.width, lens.height, side_px(lens.width, lens.height))
         most = max(round(MAX_TIMES_MEAN * settings.corners_target / SQUARES), FEW)
@@ -74,6 +76,7 @@ class CornerDetector:
         """
         image = np.ascontiguousarray(image)
         self._fast.look(image)
+        self._images += 1
         found = self._look(image, self._strong.value, self._whole)
         if self._settings.fast_adaptive:
             found = self._shared_out(image, found, self._few(highest_row, horizon_row))
@@ -90,11 +93,15 @@ class CornerDetector:
         return Corners(pixel, position, samples), evicted
 
     def _look(self, image: Grey, threshold: int, parts: Parts, on_dark: int | None = None) -> Found:
-        """Return the corners of parts of the image, without those along an edge or easily mistaken for others."""
+        """Return the corners of parts of the image: no hot pixels, none along an edge or easily mistaken for others."""
         pixel, strength = self._fast.corners(threshold, parts, on_dark)
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
+        if self._settings.fast_adaptive:
+            flat = image.reshape(-1).data
+            count = keep_cool(self._singles, self._images, flat, image.shape[1], pixel.data, strength.data)
+            pixel, strength = pixel[:count], strength[:count]
         if least := self._settings.least_roundness:
             count = keep_round(image.reshape(-1).data, image.shape[1], WITHIN, pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]

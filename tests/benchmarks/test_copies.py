@@ -77,6 +77,40 @@ def test_a_folder_that_exists_and_an_image_that_does_not_are_refused_in_one_line
     assert error.count("\n") == 1
 
 
+def test_a_worse_camera_shows_it_in_every_image(
+    recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    into = tmp_path / "copies"
+    assert copies.main(["--camera", str(recording.parent), str(into)]) == 0
+    assert f"{len(copies.CAMERAS)} copies in {into}" in capsys.readouterr().out
+    assert {each.name.partition("@")[2] for each in into.iterdir()} == set(copies.CAMERAS)
+    original = images_of(recording)
+    for name in copies.CAMERAS:
+        images = images_of(into / f"yard@{name}")
+        assert images.keys() == original.keys()
+        assert all((images[stamp] != original[stamp]).any() for stamp in images)
+        assert (into / f"yard@{name}/truth.jsonl").read_text() == (recording / "truth.jsonl").read_text()
+
+
+@pytest.mark.parametrize("name", copies.CAMERAS)
+def test_a_worse_camera_does_to_colours_what_it_does_to_grey(name: str) -> None:
+    grey = np.random.default_rng(3).integers(0, 256, (60, 80), np.uint8)
+    expected = copies.CAMERAS[name](grey, np.random.default_rng(4))
+    coloured = copies.CAMERAS[name](np.dstack([grey] * 3), np.random.default_rng(4))
+    assert coloured.dtype == np.uint8
+    assert all((coloured[:, :, channel] == expected).all() for channel in range(3))
+
+
+def test_defects_are_the_same_pixels_in_every_image(recording: Path, tmp_path: Path) -> None:
+    list(copies.write_worse(recording, tmp_path))
+    original = images_of(recording)
+    for name, share, grey in (("hot-pixels", 0.0005, 255), ("many-hot-pixels", 0.003, 255), ("dead-pixels", 0.001, 0)):
+        images = images_of(tmp_path / f"yard@{name}")
+        stuck = np.logical_or.reduce([images[stamp] != original[stamp] for stamp in original])
+        assert all((image[stuck] == grey).all() for image in images.values())
+        assert stuck.mean() == pytest.approx(share, abs=2.5 * np.sqrt(share / stuck.size))
+
+
 def samples_of(folder: Path, kind: type) -> list[Any]:
     return [each for each in open_recording(folder, load(None, [])) if isinstance(each, kind)]
 
