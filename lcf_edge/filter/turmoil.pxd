@@ -66,7 +66,8 @@ cdef bint see(Turmoil turmoil, Situation around, Settings settings) noexcept nog
 cdef void join_cells(Turmoil turmoil) noexcept nogil
 @cython.locals(k=int, g=int)
 cdef void gather(Turmoil turmoil) noexcept nogil
-cdef bint is_believed(Turmoil turmoil, int g) noexcept nogil
+@cython.locals(longest_s=cython.double)
+cdef bint is_believed(Turmoil turmoil, int g, Situation around) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int circle_of(Turmoil turmoil, Py_ssize_t g, CircleColumns circles, Settings settings) noexcept nogil
 cdef bint looks_changed(Turmoil turmoil, int g) noexcept nogil

@@ -279,11 +279,12 @@ def gather(turmoil: Turmoil) -> None:
             turmoil.members.variance_y[g] += share * dy * dy
 
 
-def is_believed(turmoil: Turmoil, g: int) -> bool:
-    """Whether a region is large and old enough."""
-    if turmoil.hidden_size[g] >= MIN_HIDDEN_CELLS and turmoil.longest_s[g] >= MIN_HIDDEN_S:
+def is_believed(turmoil: Turmoil, g: int, around: Situation) -> bool:
+    """Whether a region is large and old enough: more than one image, much of which a fence that stands may hide."""
+    longest_s = turmoil.longest_s[g]
+    if turmoil.hidden_size[g] >= MIN_HIDDEN_CELLS and longest_s >= MIN_HIDDEN_S and longest_s > around.dt_s:
         return True
-    return turmoil.size[g] >= MIN_CELLS and turmoil.longest_s[g] >= MIN_S
+    return turmoil.size[g] >= MIN_CELLS and longest_s >= MIN_S
 
 
 def looks_changed(turmoil: Turmoil, g: int) -> bool:
@@ -352,7 +353,7 @@ def update(
     join_cells(turmoil)
     gather(turmoil)
     for g in range(turmoil.across * turmoil.down):
-        if turmoil.place[g] != g or not is_believed(turmoil, g):
+        if turmoil.place[g] != g or not is_believed(turmoil, g, around):
             continue
         c = circle_of(turmoil, g, circles, settings)
         if c < 0 and not looks_changed(turmoil, g):

@@ -234,7 +234,7 @@ class Cover:
     """A drive among landmarks, and from ``from_seq`` on something plain before a part of the image.
 
     ``step_px``: by which it comes in from the left in a frame, until it hides all left of ``right_px``. ``leaves``:
-    every so-many landmark behind it is seen all the same.
+    every so-many landmark behind it is seen all the same. ``images``: in which it hides anything.
     """
 
     drive: Any
@@ -242,11 +242,12 @@ class Cover:
     step_px: float = 60.0
     from_seq: int = 12
     leaves: int = 1000
+    images: int = 1000
 
     def __iter__(self) -> Iterator[tuple[Corners, Any]]:
         for seq, (corners, motion) in enumerate(self.drive):
             seen = np.ones(len(corners.pixel), bool)
-            if seq >= self.from_seq:
+            if self.from_seq <= seq < self.from_seq + self.images:
                 edge_px = min(self.right_px, (seq - self.from_seq + 1) * self.step_px)
                 seen = (corners.position[:, 0] > edge_px) | (np.arange(len(seen)) % self.leaves == 0)
             yield Corners(corners.pixel[seen], corners.position[seen], corners.appearance[seen]), motion
@@ -284,6 +285,18 @@ def test_what_comes_before_the_camera_without_a_corner_is_noticed_by_what_it_hid
 )
 def test_other_reasons_to_lose_what_was_trusted_are_none(slow: Any, changes: dict[str, Any]) -> None:
     assert not any(covered(replace(Cover(slow), **changes)))
+
+
+@pytest.mark.parametrize(("images", "begun"), [(1, False), (6, True)])
+def test_what_hides_much_of_a_single_image_may_be_a_fence_passed_closely(slow: Any, images: int, begun: bool) -> None:
+    """At ten images a second, where one lasts as long as what comes before the camera must."""
+    step_px = 60.0 if begun else 260.0
+    passes = Cover(replace(slow, fps=10.0), step_px=step_px, images=images)
+    tables, circles = LineCircleFilter(CONFIG, slow.lens), 0
+    for corners, motion in passes:
+        tables.step(corners, motion)
+        circles += int(np.count_nonzero(tables.rebel.active))
+    assert (circles > 0) == begun
 
 
 def test_what_sweeps_over_the_whole_image_is_one_circle_until_it_covers_it_and_then(slow: Any) -> None:
