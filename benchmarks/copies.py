@@ -199,7 +199,10 @@ def write(recording: Path, into: Path) -> Iterator[str]:
 
 
 def write_worse(recording: Path, into: Path) -> Iterator[str]:
-    """Write copies of an ASL recording as by worse cameras; yield the name of each. Raises ``OSError``."""
+    """Write copies of an ASL recording as by worse cameras; yield the name of each.
+
+    Raises ``OSError``, and ``RecordingError`` for an image that is none.
+    """
     _, rows = lines_of(recording / "mav0/cam0/data.csv")
     for name, alteration in CAMERAS.items():
         copy = into / f"{recording.name}@{name}"

@@ -9,7 +9,7 @@ from typing import Any, TypeAlias
 Column: TypeAlias = Any  # what [i] can be asked of: typed memory when compiled, else a memoryview
 Grid: TypeAlias = Any  # and [i, j]
 
-ALONE_SHARE = 0.5  # of the strength of a corner, by which a single pixel differs from those around it,
+ALONE_SHARE = 0.7  # of the strength of a corner, by which a single pixel differs from those around it,
 ALONE_GREY = 10  # and grey levels: noise differs by less
 IMAGES = 5  # in which a pixel stands alone before it is hot;
 MISSED = 2  # images between two of them, at most
