@@ -61,6 +61,15 @@ def test_nor_is_what_is_wider_than_a_pixel() -> None:
     assert all(keeper.kept(image, (40, 30)) for _ in range(3 * IMAGES))
 
 
+@pytest.mark.parametrize(("around", "hot"), [(120, True), (140, False)])
+def test_a_defect_stands_out_from_those_around_it_nearly_as_much_as_from_the_ring(around: int, hot: bool) -> None:
+    keeper, image = Keeper(), plain_with()
+    image[29:32, 39:42] = around
+    image[30, 40] = 200
+    kept = [keeper.kept(image, (40, 30)) for _ in range(IMAGES)]
+    assert (kept[-1] == []) == hot
+
+
 def test_a_hot_pixel_may_be_missed_for_a_moment_but_not_for_long() -> None:
     keeper, image = Keeper(), plain_with((40, 30))
     for _ in range(IMAGES):
