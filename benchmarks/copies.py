@@ -184,31 +184,36 @@ def write_image(path: Path, image: Grey) -> None:
 
 
 def write(recording: Path, into: Path) -> Iterator[str]:
-    """Write all copies of an ASL recording into a folder; yield the name of each. Raises ``OSError``."""
+    """Write all copies of an ASL recording into a folder; yield the name of each.
+
+    Raises ``OSError``, and ``RecordingError`` for an image that is none.
+    """
     head, rows = lines_of(recording / "mav0/cam0/data.csv")
     selections = {name: rows[chosen] for name, chosen in SELECTIONS.items()}
     selections["dropped"] = [row for number, row in enumerate(rows) if number % DROPPED]
-    selections |= dict.fromkeys(ALTERATIONS, rows)
     for name, chosen in selections.items():
         copy = into / f"{recording.name}@{name}"
         copy_all_but_images(recording, copy)
         (copy / "mav0/cam0/data.csv").write_text("\n".join([*head, *chosen]) + "\n", "utf-8")
-        _copy_images(recording, copy, chosen, ALTERATIONS.get(name))
+        _copy_images(recording, copy, chosen, None)
         _keep_truth(copy / "truth.jsonl", {int(row.split(",")[0]) for row in chosen})
         yield copy.name
+    yield from write_altered(recording, into, ALTERATIONS)
 
 
-def write_worse(recording: Path, into: Path) -> Iterator[str]:
-    """Write copies of an ASL recording as by worse cameras; yield the name of each.
-
-    Raises ``OSError``, and ``RecordingError`` for an image that is none.
-    """
+def write_altered(recording: Path, into: Path, alterations: dict[str, Alteration]) -> Iterator[str]:
+    """Write copies whose images are altered, else as ``write``."""
     _, rows = lines_of(recording / "mav0/cam0/data.csv")
-    for name, alteration in CAMERAS.items():
+    for name, alteration in alterations.items():
         copy = into / f"{recording.name}@{name}"
         copy_all_but_images(recording, copy)
         _copy_images(recording, copy, rows, alteration)
         yield copy.name
+
+
+def write_worse(recording: Path, into: Path) -> Iterator[str]:
+    """Write copies as by worse cameras, else as ``write``."""
+    return write_altered(recording, into, CAMERAS)
 
 
 def write_failing(recording: Path, into: Path) -> Iterator[str]:

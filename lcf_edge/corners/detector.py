@@ -98,12 +98,12 @@ class CornerDetector:
         if self._visible is not None:
             visible = self._visible[pixel[:, 1], pixel[:, 0]] != 0
             pixel, strength = pixel[visible], strength[visible]
+        flat, width = image.reshape(-1).data, image.shape[1]
         if self._settings.fast_adaptive:
-            flat = image.reshape(-1).data
-            count = keep_cool(self._singles, self._images, flat, image.shape[1], pixel.data, strength.data)
+            count = keep_cool(self._singles, self._images, flat, width, pixel.data, strength.data)
             pixel, strength = pixel[:count], strength[:count]
         if least := self._settings.least_roundness:
-            count = keep_round(image.reshape(-1).data, image.shape[1], WITHIN, pixel.data, strength.data, least)
+            count = keep_round(flat, width, WITHIN, pixel.data, strength.data, least)
             pixel, strength = pixel[:count], strength[:count]
         samples = appearance(image, pixel)
         if self._settings.fast_adaptive:

@@ -30,15 +30,21 @@ def images_of(folder: Path) -> dict[int, np.ndarray]:
     return {each.stamp_ns: each.image for each in open_recording(folder, load(None, [])) if isinstance(each, Frame)}
 
 
+def names_of_copies(arguments: list[str], recording: Path, into: Path, capsys: pytest.CaptureFixture[str]) -> set[str]:
+    """Write copies; what follows the name of the recording in theirs, of which the program tells the number."""
+    assert copies.main([*arguments, str(recording.parent), str(into)]) == 0
+    names = {each.name.partition("@")[2] for each in into.iterdir()}
+    assert f"{len(names)} copies in {into}: lcf-edge evaluate {into}" in capsys.readouterr().out
+    return names
+
+
 def test_every_copy_is_a_recording_with_the_truth_of_its_own_images(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     into = tmp_path / "copies"
-    assert copies.main([str(recording.parent), str(into)]) == 0
-    original = images_of(recording)
-    names = {each.name.partition("@")[2] for each in into.iterdir()}
+    names = names_of_copies([], recording, into, capsys)
     assert names == {*copies.ALTERATIONS, *copies.SELECTIONS, "dropped"}
-    assert f"{len(names)} copies in {into}: lcf-edge evaluate {into}" in capsys.readouterr().out
+    original = images_of(recording)
     for name in names:
         copy = into / f"yard@{name}"
         images = images_of(copy)
@@ -81,9 +87,7 @@ def test_a_worse_camera_shows_it_in_every_image(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     into = tmp_path / "copies"
-    assert copies.main(["--camera", str(recording.parent), str(into)]) == 0
-    assert f"{len(copies.CAMERAS)} copies in {into}" in capsys.readouterr().out
-    assert {each.name.partition("@")[2] for each in into.iterdir()} == set(copies.CAMERAS)
+    assert names_of_copies(["--camera"], recording, into, capsys) == set(copies.CAMERAS)
     original = images_of(recording)
     for name in copies.CAMERAS:
         images = images_of(into / f"yard@{name}")
@@ -119,9 +123,7 @@ def test_sensors_fail_as_the_name_of_the_copy_says(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     into = tmp_path / "copies"
-    assert copies.main(["--sensors", str(recording.parent), str(into)]) == 0
-    assert f"{len(copies.FAILURES)} copies in {into}" in capsys.readouterr().out
-    assert {each.name.partition("@")[2] for each in into.iterdir()} == set(copies.FAILURES)
+    assert names_of_copies(["--sensors"], recording, into, capsys) == set(copies.FAILURES)
     inertial = {name: samples_of(into / f"yard@{name}", ImuSample) for name in copies.FAILURES}
     speeds = {name: samples_of(into / f"yard@{name}", SpeedSample) for name in copies.FAILURES}
     whole, half = samples_of(recording, ImuSample), len(samples_of(recording, ImuSample)) // 2
