@@ -18,6 +18,7 @@ import cv2
 import numpy as np
 import numpy.typing as npt
 
+from lcf_edge.corners.repeats import Repeats
 from lcf_edge.errors import LcfError, RecordingError
 from lcf_edge.evaluate.corpus import find
 
@@ -201,19 +202,21 @@ def write(recording: Path, into: Path) -> Iterator[str]:
     yield from write_altered(recording, into, ALTERATIONS)
 
 
-def write_altered(recording: Path, into: Path, alterations: dict[str, Alteration]) -> Iterator[str]:
-    """Write copies whose images are altered, else as ``write``."""
+def write_altered(
+    recording: Path, into: Path, alterations: dict[str, Alteration], *, by_camera: bool = False
+) -> Iterator[str]:
+    """Write copies whose images are altered, else as ``write``. ``by_camera``: what repeats, repeats as altered."""
     _, rows = lines_of(recording / "mav0/cam0/data.csv")
     for name, alteration in alterations.items():
         copy = into / f"{recording.name}@{name}"
         copy_all_but_images(recording, copy)
-        _copy_images(recording, copy, rows, alteration)
+        _copy_images(recording, copy, rows, alteration, Repeats() if by_camera else None)
         yield copy.name
 
 
 def write_worse(recording: Path, into: Path) -> Iterator[str]:
     """Write copies as by worse cameras, else as ``write``."""
-    return write_altered(recording, into, CAMERAS)
+    return write_altered(recording, into, CAMERAS, by_camera=True)
 
 
 def write_failing(recording: Path, into: Path) -> Iterator[str]:
@@ -240,17 +243,24 @@ def write_failing(recording: Path, into: Path) -> Iterator[str]:
         yield copy.name
 
 
-def _copy_images(recording: Path, copy: Path, rows: Sequence[str], alteration: Alteration | None) -> None:
+def _copy_images(
+    recording: Path, copy: Path, rows: Sequence[str], alteration: Alteration | None, repeats: Repeats | None = None
+) -> None:
     random = np.random.default_rng(0)
+    altered = np.empty((0, 0), np.uint8)
     for row in rows:
-        name = Path("mav0/cam0/data", row.split(",")[1].strip())
+        stamp_ns, file = row.split(",")[:2]
+        name = Path("mav0/cam0/data", file.strip())
         if alteration is None:
             shutil.copyfile(recording / name, copy / name)
             continue
         image = cv2.imread(str(recording / name), cv2.IMREAD_UNCHANGED)
         if image is None:
             raise RecordingError(f"{recording / name}: no image")
-        write_image(copy / name, alteration(np.asarray(image, np.uint8), random))
+        image = np.asarray(image, np.uint8)
+        if repeats is None or not repeats.is_repeat(int(stamp_ns), image.reshape(len(image), -1)):
+            altered = alteration(image, random)
+        write_image(copy / name, altered)
 
 
 def _keep_truth(path: Path, stamps_ns: set[int]) -> None:

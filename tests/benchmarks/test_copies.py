@@ -96,6 +96,19 @@ def test_a_worse_camera_shows_it_in_every_image(
         assert (into / f"yard@{name}/truth.jsonl").read_text() == (recording / "truth.jsonl").read_text()
 
 
+@pytest.mark.parametrize("name", ["exposure", "bands"])
+def test_what_the_recorder_repeated_is_repeated_as_the_worse_camera_showed_it(
+    name: str, recording: Path, tmp_path: Path
+) -> None:
+    images = sorted((recording / "mav0/cam0/data").iterdir())
+    for first, second in zip(images[::2], images[1::2], strict=True):
+        shutil.copyfile(first, second)
+    list(copies.write_worse(recording, tmp_path))
+    shown = list(images_of(tmp_path / f"yard@{name}").values())[2:]  # the first copy may be of a still scene
+    assert all((first == second).all() for first, second in zip(shown[::2], shown[1::2], strict=True))
+    assert all((first != second).any() for first, second in zip(shown[1::2], shown[2::2], strict=False))
+
+
 @pytest.mark.parametrize("name", copies.CAMERAS)
 def test_a_worse_camera_does_to_colours_what_it_does_to_grey(name: str) -> None:
     grey = np.random.default_rng(3).integers(0, 256, (60, 80), np.uint8)
