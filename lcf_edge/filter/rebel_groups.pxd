@@ -46,7 +46,7 @@ cdef class RebelGroups:
     cdef readonly double[::1] mean_s, closing_mps, focus_rate, focus_r2
     cdef double[::1] mean_vx, mean_vy, below2, below_vy
     cdef readonly double[::1] then_x, then_y, spread
-    cdef double[::1] rate_below, r2_below2, spreading
+    cdef double[::1] rate_below, r2_below2, below2_vy, below4, spreading
     cdef readonly double[::1] expansion
     cdef double[::1] weight, weighed_rate, left, right, top, bottom
     cdef readonly int[::1] standing, inwards, flowing, circle
@@ -68,6 +68,7 @@ cpdef void number_groups(RebelGroups groups, int support) noexcept nogil
 cdef void clear_group(RebelGroups groups, Py_ssize_t g) noexcept nogil
 cpdef void average(RebelGroups groups, Members members, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef bint is_paint(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
+cdef double explained(double product, double square) noexcept nogil
 cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
 cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
 cdef bint spreads_less(RebelGroups groups, Py_ssize_t g, double rate, double sigmas) noexcept nogil

@@ -52,10 +52,10 @@ class RebelGroups:
     One row per group: ``members``; means ``mean_vx``, ``mean_vy``, ``mean_s``; ``standing``, number of incoming edges;
     ``inwards``, of those that fall short of the flow; ``closing_mps``, mean ΔZ/t; ``focus_rate``, ``focus_r2``, means
     of μ/t·r² and r²; ``rate_below``, ``r2_below2``, means of μ/t·r²·h and r²·h², h px below the horizon; ``below2``,
-    ``below_vy``, means of h² and h·v_y; ``then_x``, ``then_y``, mean of the earlier positions; ``spread``,
-    ``spreading``, sums about that of squared distance, and of distance times velocity; ``expansion``, V_e/r about O,
-    from the sums ``weight`` and ``weighed_rate``; ``flowing``, normal edges inside; ``odd``, makes no circle;
-    ``circle``, row of C_r, -1: none; ``votes`` for each circle.
+    ``below_vy``, means of h² and h·v_y; ``below2_vy``, ``below4``, of h²·v_y and h⁴; ``then_x``, ``then_y``, mean of
+    the earlier positions; ``spread``, ``spreading``, sums about that of squared distance, and of distance times
+    velocity; ``expansion``, V_e/r about O, from the sums ``weight`` and ``weighed_rate``; ``flowing``, normal edges
+    inside; ``odd``, makes no circle; ``circle``, row of C_r, -1: none; ``votes`` for each circle.
     """
 
     def __init__(self, rebels: int, circles: int) -> None:
@@ -68,6 +68,7 @@ class RebelGroups:
         self.closing_mps, self.focus_rate = [doubles(rebels) for _ in range(2)]
         self.focus_r2, self.below2, self.below_vy = [doubles(rebels) for _ in range(3)]
         self.rate_below, self.r2_below2 = [doubles(rebels) for _ in range(2)]
+        self.below2_vy, self.below4 = [doubles(rebels) for _ in range(2)]
         self.then_x, self.then_y, self.spread, self.spreading = [doubles(rebels) for _ in range(4)]
         self.expansion, self.weight, self.weighed_rate = [doubles(rebels) for _ in range(3)]
         self.left, self.right, self.top, self.bottom = [doubles(rebels) for _ in range(4)]
@@ -231,7 +232,7 @@ def clear_group(groups: RebelGroups, g: int) -> None:
     shared.clear(groups.members, g)
     groups.mean_vx[g] = groups.mean_vy[g] = groups.mean_s[g] = 0.0
     groups.closing_mps[g] = groups.focus_rate[g] = groups.focus_r2[g] = groups.below2[g] = groups.below_vy[g] = 0.0
-    groups.rate_below[g] = groups.r2_below2[g] = 0.0
+    groups.rate_below[g] = groups.r2_below2[g] = groups.below2_vy[g] = groups.below4[g] = 0.0
     groups.then_x[g] = groups.then_y[g] = groups.spread[g] = groups.spreading[g] = 0.0
     groups.left[g] = groups.top[g] = INFINITY
     groups.right[g] = groups.bottom[g] = -INFINITY
@@ -275,6 +276,8 @@ def average(
         groups.r2_below2[g] += share * r2 * below * below
         groups.below2[g] += share * below * below
         groups.below_vy[g] += share * below * groups.vy[k]
+        groups.below4[g] += share * below * below * below * below
+        groups.below2_vy[g] += share * below * below * groups.vy[k]
         groups.left[g], groups.right[g] = min(groups.left[g], edges.x[i]), max(groups.right[g], edges.x[i])
         groups.top[g], groups.bottom[g] = min(groups.top[g], edges.y[i]), max(groups.bottom[g], edges.y[i])
         if verdicts.incoming[j]:
@@ -336,17 +339,23 @@ def is_shifted(groups: RebelGroups, g: int, members: Members) -> bool:
     return spreads_less(groups, g, groups.expansion[g], SPREAD_SIGMAS)
 
 
+def explained(product: float, square: float) -> float:
+    """What a fit of one factor explains, by least squares: mean(x·y)²/mean(x²)."""
+    return product * product / max(square, MIN_EXTENT2_PX)
+
+
 def is_mirrored(groups: RebelGroups, g: int, members: Members) -> bool:
     """Whether a group lies on a level plane: paint on the ground, or lamps reflected in a glossy floor.
 
     There μ/t grows with the distance h below the horizon, whereas on something upright it is the same everywhere: which
-    of μ/t = k·h and μ/t = c has the smaller residual, by least squares in px/s.
+    of μ/t = k·h and μ/t = c has the smaller residual, by least squares in px/s. What crosses and comes nearer flows
+    apart about another point than O, and its μ/t grows as well; but its v_y = c·h, and not k·h².
     """
-    level = groups.focus_rate[g] * groups.focus_rate[g] / max(groups.focus_r2[g], MIN_EXTENT2_PX)
-    slope = groups.rate_below[g] * groups.rate_below[g] / max(groups.r2_below2[g], MIN_EXTENT2_PX)
-    noise = MIRROR_NOISE_PX / groups.mean_s[g]
-    better = (slope - level) * members.size[g]
-    return groups.rate_below[g] > 0 and better > MIRROR_SIGMAS * MIRROR_SIGMAS * noise * noise
+    noise = MIRROR_SIGMAS * MIRROR_NOISE_PX / groups.mean_s[g]
+    least = noise * noise / members.size[g]
+    outward = explained(groups.rate_below[g], groups.r2_below2[g]) - explained(groups.focus_rate[g], groups.focus_r2[g])
+    down = explained(groups.below_vy[g], groups.below2[g]) - explained(groups.below2_vy[g], groups.below4[g])
+    return groups.rate_below[g] > 0 and outward > least and down <= least
 
 
 def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:

@@ -158,6 +158,24 @@ def test_paint_on_the_ground_does_not_stand_in_the_way(situation: Situation, lev
     assert int(circles.active.sum()) == makes
 
 
+@pytest.mark.parametrize(("level", "flat"), [(False, False), (True, True)], ids=["upright", "on the ground"])
+def test_what_crosses_on_a_collision_course_is_no_paint(situation: Situation, level: bool, flat: bool) -> None:
+    """It flows apart about the place where it stays in the image, not about O, and falls short of the ground's flow."""
+    around = situation(camera_height_m=0.3)
+    random = np.random.default_rng(2)
+    x, below = random.uniform(520, 560, 12).astype(np.float32), random.uniform(40, 140, 12).astype(np.float32)
+    looming_hz = 0.6 * below / 80 if level else np.full(12, 0.6)
+    vx, vy = looming_hz * (x - 540), looming_hz * below
+    seen = Seen(EdgeTable(50, 50, 10), x, around.horizon_y + below, vx, vy, around)
+    groups = seen.taken()
+    np.asarray(groups.label)[:12] = 0
+    rebel_groups.number_groups(groups, 1)
+    columns = seen.edges.columns
+    rebel_groups.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
+    assert groups.inwards[0] == 12
+    assert rebel_groups.is_flat(groups, 0, groups.members, around) == flat
+
+
 # Grouping
 
 CROSSING = (300.0, 150.0, 0.0, 120.0)
