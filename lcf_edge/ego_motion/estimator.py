@@ -130,6 +130,7 @@ class EgoMotionEstimator:
         self._turned = [0, 0, 0]  # samples other than 0, by axis
         self._speed_mps = nan
         self._stamp_ns: int | None = None
+        self._began_ns = 0  # of the first frame
         self._samples = Track(IMU_CAPACITY + 2, self._imu.columns)
         self._speeds = Track(SPEED_CAPACITY + 2, self._odometry.columns)
         self._guessed = Track(2, 3)
@@ -175,7 +176,7 @@ class EgoMotionEstimator:
         notes: list[str] = []
         if self._stamp_ns is None:
             notes.append("first frame")
-            self._stamp_ns = stamp_ns
+            self._stamp_ns = self._began_ns = stamp_ns
         if stamp_ns < self._stamp_ns:
             self.refused["frame stamp goes back"] += 1
             stamp_ns = self._stamp_ns
@@ -455,7 +456,8 @@ class EgoMotionEstimator:
                 and not odometry.largest(window, 1) > _REST_YAW_RADPS  # False for NaN
             )
         drove = self._drove_ns is not None and stamp_ns - self._drove_ns < _REST_NS
-        if drove or (still is False and not self.bias.known):
+        began = stamp_ns - self._began_ns < _REST_NS
+        if drove or began or (still is False and not self.bias.known):
             return False  # others may move, but nothing else indicates rest
         return None if self._inertial.may_stand() else False
 

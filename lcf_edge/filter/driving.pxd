@@ -1,6 +1,6 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport lengths, rebel_detection
+from lcf_edge.filter cimport lengths, rebel_detection, situation
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.columns cimport EdgeColumns
 from lcf_edge.filter.rebel_detection cimport Verdicts
@@ -21,7 +21,7 @@ cdef class DrivingTest:
 
 @cython.locals(r=double)
 cdef bint is_away(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
-@cython.locals(i=cython.Py_ssize_t, outward=double, drift=double)
+@cython.locals(i=cython.Py_ssize_t, slot=cython.Py_ssize_t, outward=double, drift=double)
 cdef void look(DrivingTest test, Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(flow=int, i=cython.Py_ssize_t, j=cython.Py_ssize_t)
 cpdef void measure(DrivingTest test, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil

@@ -2,7 +2,7 @@
 
 import math
 
-from lcf_edge.filter import lengths, rebel_detection
+from lcf_edge.filter import lengths, rebel_detection, situation
 from lcf_edge.filter.baselines import Baselines
 from lcf_edge.filter.columns import EdgeColumns
 from lcf_edge.filter.rebel_detection import Verdicts
@@ -39,11 +39,13 @@ def look(
     test: DrivingTest, verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation
 ) -> None:
     """Count one edge."""
-    i = verdicts.row[j]
-    if not is_away(edges, i, around) or baselines.elapsed_s[verdicts.slot[j]] < MIN_BASELINE_S:
+    i, slot = verdicts.row[j], verdicts.slot[j]
+    if not is_away(edges, i, around) or baselines.elapsed_s[slot] < MIN_BASELINE_S:
         return
     test.edges += 1
     outward, drift = verdicts.outward[j], math.fabs(verdicts.drift[j])
+    if baselines.depth_m[slot] < 0 and situation.is_at_rest(around):
+        outward = -outward  # the sign of a speed of about 0 is no reverse
     if lengths.of(outward, drift) < MOVES_SIGMAS * rebel_detection.sigma_px(verdicts, j):
         return
     if drift > MAX_DRIFT_SHARE * outward:

@@ -107,7 +107,7 @@ class TestRotation:
         axes = [[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]]  # of a body: x forward, y left, z up
         ego = estimator(Imu(axes=axes), speed_source="imu")
         feed(ego, np.arange(0, 0.9, 0.01), accel=lambda _: (0.0, 0.0, G))
-        ego.advance(ns(0.7))
+        ego.advance(ns(0.2))
         assert ego.advance(ns(0.8)).speed_mps == 0
         feed(ego, np.arange(0.9, 1.2, 0.01), gyro=lambda _: (0.0, 0.0, 0.5), accel=lambda _: (2.0, 0.0, G))
         ego.advance(ns(0.95))
@@ -350,6 +350,13 @@ class TestBias:
         for t in np.arange(0.1, 2, 0.05):
             motion = ego.advance(ns(t), still=still)
         assert (motion.speed_mps == 0.0) == rests
+
+    def test_a_quiet_imu_is_no_rest_before_images_could_show_whether_the_vehicle_drives(self) -> None:
+        """The IMU is read before the first image comes: whoever starts it while driving smoothly has no speed of 0."""
+        ego = calibrated()
+        feed(ego, np.arange(0, 3, 0.01))
+        rests = {t: ego.advance(ns(t)).speed_mps == 0 for t in (1.0, 1.1, 1.4, 1.6)}
+        assert rests == {1.0: False, 1.1: False, 1.4: False, 1.6: True}
 
     @pytest.mark.parametrize("forward_mps2", [0.0, 0.6], ids=["too gently to be measured", "measurably"])
     def test_the_speed_of_a_start_is_unknown_only_if_the_accelerometer_missed_it(self, forward_mps2: float) -> None:

@@ -37,6 +37,15 @@ def test_who_drives_is_seen_to_drive_whatever_speed_is_measured(street: Any, mea
     assert all(list(verdicts(street, measured_mps))[SOON:])
 
 
+def test_a_speed_that_drifts_about_zero_does_not_hide_it(street: Any) -> None:
+    """Of an accelerometer, which took a smooth drive for a rest: its sign is no reverse."""
+    tables, verdicts = LineCircleFilter(Config(), street.lens), []
+    for number, (corners, motion) in enumerate(street):
+        tables.step(corners, replace(motion, speed_mps=-0.01 if number % 6 < 3 else 0.01))
+        verdicts.append(tables.drives)
+    assert all(verdicts[SOON:])
+
+
 @pytest.mark.parametrize("measured_mps", [0.0, math.nan])
 def test_who_stands_is_not(street: Any, measured_mps: float) -> None:
     assert not any(verdicts(replace(street, speed_mps=0.0), measured_mps))
