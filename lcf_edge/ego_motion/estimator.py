@@ -456,8 +456,8 @@ class EgoMotionEstimator:
                 and not odometry.largest(window, 1) > _REST_YAW_RADPS  # False for NaN
             )
         drove = self._drove_ns is not None and stamp_ns - self._drove_ns < _REST_NS
-        began = stamp_ns - self._began_ns < _REST_NS
-        if drove or began or (still is False and not self.bias.known):
+        just_begun = stamp_ns - self._began_ns < _REST_NS  # images could not show yet that it drives
+        if drove or just_begun or (still is False and not self.bias.known):
             return False  # others may move, but nothing else indicates rest
         return None if self._inertial.may_stand() else False
 
