@@ -187,7 +187,7 @@ def write_image(path: Path, image: Grey) -> None:
 def write(recording: Path, into: Path) -> Iterator[str]:
     """Write all copies of an ASL recording into a folder; yield the name of each.
 
-    Raises ``OSError``, and ``RecordingError`` for an image that is none.
+    Raises ``OSError``, and ``RecordingError`` for an image, or a row of one, that is none.
     """
     head, rows = lines_of(recording / "mav0/cam0/data.csv")
     selections = {name: rows[chosen] for name, chosen in SELECTIONS.items()}
@@ -197,7 +197,7 @@ def write(recording: Path, into: Path) -> Iterator[str]:
         copy_all_but_images(recording, copy)
         (copy / "mav0/cam0/data.csv").write_text("\n".join([*head, *chosen]) + "\n", "utf-8")
         _copy_images(recording, copy, chosen, None)
-        _keep_truth(copy / "truth.jsonl", {int(row.split(",")[0]) for row in chosen})
+        _keep_truth(copy / "truth.jsonl", {_image_of(recording, row)[0] for row in chosen})
         yield copy.name
     yield from write_altered(recording, into, ALTERATIONS)
 
@@ -249,8 +249,7 @@ def _copy_images(
     random = np.random.default_rng(0)
     altered = np.empty((0, 0), np.uint8)
     for row in rows:
-        stamp_ns, file = row.split(",")[:2]
-        name = Path("mav0/cam0/data", file.strip())
+        stamp_ns, name = _image_of(recording, row)
         if alteration is None:
             shutil.copyfile(recording / name, copy / name)
             continue
@@ -258,9 +257,18 @@ def _copy_images(
         if image is None:
             raise RecordingError(f"{recording / name}: no image")
         image = np.asarray(image, np.uint8)
-        if repeats is None or not repeats.is_repeat(int(stamp_ns), image.reshape(len(image), -1)):
+        if repeats is None or not repeats.is_repeat(stamp_ns, image.reshape(len(image), -1)):
             altered = alteration(image, random)
         write_image(copy / name, altered)
+
+
+def _image_of(recording: Path, row: str) -> tuple[int, Path]:
+    """Stamp, ns, and file of an image, by its row."""
+    stamp_ns, _, name = row.partition(",")
+    try:
+        return int(stamp_ns), Path("mav0/cam0/data", name.partition(",")[0].strip())
+    except ValueError as error:
+        raise RecordingError(f"{recording / 'mav0/cam0/data.csv'}: a row is no image: {row!r}") from error
 
 
 def _keep_truth(path: Path, stamps_ns: set[int]) -> None:

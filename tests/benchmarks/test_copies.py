@@ -83,6 +83,18 @@ def test_a_folder_that_exists_and_an_image_that_does_not_are_refused_in_one_line
     assert error.count("\n") == 1
 
 
+@pytest.mark.parametrize("arguments", [[], ["--camera"]], ids=["copies", "worse cameras"])
+def test_a_row_without_a_stamp_is_refused_in_one_line(
+    arguments: list[str], recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    with (recording / "mav0/cam0/data.csv").open("a") as rows:
+        rows.write("soon,late.png\n")
+    assert copies.main([*arguments, str(recording.parent), str(tmp_path / "copies")]) == 1
+    error = capsys.readouterr().err
+    assert "yard/mav0/cam0/data.csv: a row is no image: 'soon,late.png'" in error
+    assert error.count("\n") == 1
+
+
 def test_a_worse_camera_shows_it_in_every_image(
     recording: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
