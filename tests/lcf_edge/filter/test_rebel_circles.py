@@ -76,6 +76,15 @@ class Seen:
         rebel_groups.take_rebels(groups, self.count, self.breaking, self.verdicts, columns, self.baselines)
         return groups
 
+    def as_one_group(self, around: Any) -> RebelGroups:
+        """In one group, with its statistics."""
+        groups = self.taken()
+        np.asarray(groups.label)[: self.count] = 0
+        rebel_groups.number_groups(groups, 1)
+        columns = self.edges.columns
+        rebel_groups.average(groups, groups.members, self.verdicts, columns, self.baselines, around)
+        return groups
+
 
 class Scene:
     """Rebel edges that move as described, and the circles that they make."""
@@ -167,11 +176,7 @@ def test_what_crosses_on_a_collision_course_is_no_paint(situation: Situation, le
     looming_hz = 0.6 * below / 80 if level else np.full(12, 0.6)
     vx, vy = looming_hz * (x - 540), looming_hz * below
     seen = Seen(EdgeTable(50, 50, 10), x, around.horizon_y + below, vx, vy, around)
-    groups = seen.taken()
-    np.asarray(groups.label)[:12] = 0
-    rebel_groups.number_groups(groups, 1)
-    columns = seen.edges.columns
-    rebel_groups.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
+    groups = seen.as_one_group(around)
     assert groups.inwards[0] == 12
     assert rebel_groups.is_flat(groups, 0, groups.members, around) == flat
 
@@ -674,9 +679,4 @@ def own_expansion(around: Any, below: Floats, vy: Floats, vx: float = 0.0) -> fl
     aside = np.full(len(below), vx)
     x, y = 400 + 0.5 * aside, around.horizon_y + below + 0.5 * vy
     seen = Seen(EdgeTable(50, 50, 10), x, y, aside, vy, around, seen_s=0.5)
-    groups = seen.taken()
-    np.asarray(groups.label)[: len(below)] = 0
-    rebel_groups.number_groups(groups, 1)
-    columns = seen.edges.columns
-    rebel_groups.average(groups, groups.members, seen.verdicts, columns, seen.baselines, around)
-    return rebel_groups.own_expansion(groups, 0)
+    return rebel_groups.own_expansion(seen.as_one_group(around), 0)
