@@ -1,5 +1,6 @@
 cimport cython
 from libc.stdlib cimport abs
+from lcf_edge.filter cimport rounding
 
 cdef int KEYS
 cdef int WINDOW
@@ -17,6 +18,9 @@ cdef class Blocks:
 
 @cython.locals(k=cython.Py_ssize_t, pixels=cython.Py_ssize_t)
 cdef void take(Blocks blocks, const unsigned char[::1] small) noexcept nogil
+cdef bint has_image(Blocks blocks) noexcept nogil
+@cython.locals(column=int, row=int)
+cdef int grey(Blocks blocks, double x, double y) noexcept nogil
 @cython.locals(k=int)
 cpdef void hide(Blocks blocks, const unsigned char[::1] hidden) noexcept nogil
 @cython.locals(x=int, y=int, word=cython.ulonglong, grey=cython.ulonglong)

@@ -6,6 +6,7 @@ it, row by row.
 
 import numpy as np
 
+from lcf_edge.filter import rounding
 from lcf_edge.filter.inputs import KEYS
 from lcf_edge.filter.memory import Bytes, Words, integers, memory_of, octets
 
@@ -47,6 +48,17 @@ def take(blocks: Blocks, small: Bytes) -> None:
         blocks.words_last[k] = blocks.words[k]
     lay_out(blocks, blocks.now, 0, blocks.words)
     blocks.count = min(blocks.count + 1, 2)
+
+
+def has_image(blocks: Blocks) -> bool:
+    """Whether an image was taken."""
+    return blocks.count > 0
+
+
+def grey(blocks: Blocks, x: float, y: float) -> int:
+    """Returns the grey of this image, small px."""
+    column, row = min(rounding.whole(x), blocks.width - 1), min(rounding.whole(y), blocks.height - 1)
+    return blocks.now[row * blocks.width + column]
 
 
 def hide(blocks: Blocks, hidden: Bytes) -> None:

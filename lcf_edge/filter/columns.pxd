@@ -35,7 +35,8 @@ cdef class CircleColumns:
 @cython.final
 cdef class ObjectColumns:
     cdef public Py_ssize_t capacity
-    cdef unsigned char[::1] active, class_id, state, left
+    cdef unsigned char[::1] active, class_id, state, left, watched
+    cdef unsigned char[:, ::1] looks
     cdef unsigned int[::1] id
     cdef int[::1] support
     cdef double[::1] x, y, width, height, looming, sideways, mm, qq, mq, log_odds, foot, trust, age_s, unseen_s

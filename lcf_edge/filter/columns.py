@@ -78,6 +78,7 @@ class ObjectColumns:
         self.active, self.id, self.class_id = memory["active"], memory["id"], memory["class_id"]
         self.state, self.support, self.trust = memory["state"], memory["support"], memory["trust"]
         self.recent_edges, self.left = memory["recent_edges"], memory["left"]
+        self.watched, self.looks = memory["watched"], memory["looks"]
         self.x, self.y, self.width, self.height = memory["x"], memory["y"], memory["width"], memory["height"]
         self.looming, self.sideways = memory["looming"], memory["sideways"]
         self.mm, self.qq, self.mq, self.log_odds = memory["mm"], memory["qq"], memory["mq"], memory["log_odds"]

@@ -7,6 +7,7 @@ import numpy as np
 import numpy.typing as npt
 
 APPEARANCE_SAMPLES = 16
+LOOK_SIDE = 5  # by as many samples, of the place of an object before a vehicle at rest
 KEYS = 16  # key frames in an edge's history
 UNKNOWN = (nan, nan, nan)
 

@@ -44,6 +44,7 @@ cdef void set_contact(ObjectColumns objects, Py_ssize_t o, double rate, double s
 @cython.locals(into_path=bint, goes_on=bint, goes_aside=bint)
 cdef int class_of(ObjectColumns objects, Py_ssize_t o, Belief belief, Evidence evidence) noexcept nogil
 cdef bint rests(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+cdef bint is_still(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(time_s=double, time_sigma_s=double, drift_mps=double)
 cdef void coast(ObjectColumns objects, Py_ssize_t o, Evidence evidence, Situation around) noexcept nogil
 @cython.locals(range_m=double, doubt=double)

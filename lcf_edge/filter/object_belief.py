@@ -121,6 +121,11 @@ def rests(objects: ObjectColumns, o: int, around: Situation) -> bool:
     """Whether neither an object nor the vehicle moves; the image then holds no new information about its range."""
     if not situation.is_at_rest(around) or objects.log_odds[o] < 0 or not objects.range[o] > 0:
         return False
+    return is_still(objects, o)
+
+
+def is_still(objects: ObjectColumns, o: int) -> bool:
+    """Whether an object, before a vehicle at rest, is at rest too."""
     return math.fabs(objects.looming[o]) < STILL_HZ and math.fabs(objects.sideways[o]) < STILL_HZ
 
 

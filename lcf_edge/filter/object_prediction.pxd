@@ -1,6 +1,8 @@
 cimport cython
 from libc cimport math
-from lcf_edge.filter cimport flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter cimport block_matching, flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter.block_matching cimport Blocks
+from lcf_edge.filter.coarse_motion cimport CoarseMotion
 from lcf_edge.filter.columns cimport EdgeColumns, ObjectColumns
 from lcf_edge.filter.flow cimport Homography
 from lcf_edge.filter.image_plane cimport ImagePlane
@@ -25,6 +27,16 @@ cdef double RESTING_S
 cdef double NEAR_M
 cdef double SOON_S
 cdef double REMNANT_SHARE
+cdef int LOOK_SIDE
+cdef double CHANGED_GREY
+cdef double LIGHT_SHARE
+cdef int UNKNOWN
+cdef int SAME
+cdef int CHANGED
+cdef int NOT_YET
+cdef int WATCHED
+cdef int MOVED
+cdef int NO_LONGER
 cdef double LEAVES_S
 cdef double LOSES_HZ
 cdef double PASSED_M
@@ -62,4 +74,12 @@ cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane 
 cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
 cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
-cdef void go_on(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef void go_on(ObjectColumns objects, Py_ssize_t o, bint gone, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+@cython.locals(across=double, down=double, x=double, y=double)
+cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, ImagePlane plane) noexcept nogil
+@cython.locals(k=int)
+cdef void look(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
+@cython.locals(k=int, now=int, change=double, count=double, before=double, gained=double, squares=double, light=double)
+cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
+@cython.locals(stopped=bint, stands=bint)
+cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

@@ -2,10 +2,12 @@
 
 import math
 
-from lcf_edge.filter import flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter import block_matching, flow, image_plane, lengths, object_belief, situation, speed_change
+from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import EdgeColumns, ObjectColumns
 from lcf_edge.filter.flow import Homography
 from lcf_edge.filter.image_plane import ImagePlane
+from lcf_edge.filter.inputs import LOOK_SIDE
 from lcf_edge.filter.settings import Settings
 from lcf_edge.filter.situation import Situation
 from lcf_edge.messages import ObjectState
@@ -31,6 +33,10 @@ MIN_THROUGH = 3  # at least so many,
 THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
 LOSES_HZ = 20.0  # trust lost per second after that
 PASSED_M = 0.1  # an unseen object nearer than this is passed
+CHANGED_GREY = 10.0  # RMS difference of the samples from which a place looks different
+LIGHT_SHARE = 0.15  # by which the light on it may change
+UNKNOWN, SAME, CHANGED = 0, 1, 2
+NOT_YET, WATCHED, MOVED, NO_LONGER = 0, 1, 2, 3
 HIDDEN, COASTING = int(ObjectState.HIDDEN), int(ObjectState.COASTING)
 INFINITY = float("inf")
 NAN = float("nan")
@@ -108,6 +114,69 @@ def predict(objects: ObjectColumns, plane: ImagePlane, around: Situation, settin
             not is_in_sight(objects, o, plane) and not is_beside(objects, o, around, settings)
         ):
             objects.active[o] = 0
+
+
+# What stands before a vehicle at rest: as long as its place in the image looks the same, it is there
+
+
+def grey(objects: ObjectColumns, o: int, k: int, coarse: CoarseMotion, plane: ImagePlane) -> int:
+    """Returns the grey of the downscaled image at the ``k``-th sample of an object's box, -1: outside of the image."""
+    across, down = k % LOOK_SIDE + 0.5, k // LOOK_SIDE + 0.5
+    x = objects.x[o] + (across / LOOK_SIDE - 0.5) * objects.width[o]
+    y = objects.y[o] + (down / LOOK_SIDE - 0.5) * objects.height[o]
+    if not image_plane.project(plane, x, y):
+        return -1
+    return block_matching.grey(coarse.blocks, plane.u / coarse.side, plane.v / coarse.side)
+
+
+def look(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane) -> None:
+    """Remember how the place of an object looks."""
+    for k in range(LOOK_SIDE * LOOK_SIDE):
+        objects.looks[o, k] = max(grey(objects, o, k, coarse, plane), 0)
+    objects.watched[o] = WATCHED
+
+
+def looks_different(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane) -> bool:
+    """Whether that place looks different now, but for the light on it."""
+    count = before = gained = squares = 0.0
+    for k in range(LOOK_SIDE * LOOK_SIDE):
+        now = grey(objects, o, k, coarse, plane)
+        if now >= 0:
+            change = now - objects.looks[o, k] + 0.0
+            count += 1
+            before += objects.looks[o, k]
+            gained += change
+            squares += change * change
+    light = min(max(gained, -LIGHT_SHARE * before), LIGHT_SHARE * before) / max(count, 1.0)
+    return squares - (2 * gained - light * count) * light > CHANGED_GREY * CHANGED_GREY * count
+
+
+def watch(
+    objects: ObjectColumns, o: int, count: int, coarse: CoarseMotion, plane: ImagePlane, around: Situation
+) -> int:
+    """Returns whether the place of an object looks as when the vehicle stopped, or it stopped near a vehicle at rest.
+
+    Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. ``UNKNOWN`` of
+    what moves sideways, may move, or had few edges. ``count``: of its edges.
+    """
+    if not situation.is_at_rest(around):
+        objects.watched[o] = NOT_YET
+        return UNKNOWN
+    if math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
+        objects.watched[o] = MOVED
+        return UNKNOWN
+    if objects.watched[o] == WATCHED:
+        return CHANGED if looks_different(objects, o, coarse, plane) else SAME
+    stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M
+    if stopped:
+        stopped = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
+    stands = objects.watched[o] == NOT_YET and objects.log_odds[o] > 0 and objects.recent_edges[o] >= SURE_EDGES
+    if objects.watched[o] == NOT_YET:
+        objects.watched[o] = NO_LONGER
+    if not (stopped or stands) or objects.unseen_s[o] > 0 or not block_matching.has_image(coarse.blocks):
+        return UNKNOWN
+    look(objects, o, coarse, plane)
+    return SAME
 
 
 # How long they are kept
@@ -241,12 +310,18 @@ def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
 
 
 def go_on(
-    objects: ObjectColumns, o: int, edges: EdgeColumns, plane: ImagePlane, around: Situation, settings: Settings
+    objects: ObjectColumns,
+    o: int,
+    gone: bool,
+    edges: EdgeColumns,
+    plane: ImagePlane,
+    around: Situation,
+    settings: Settings,
 ) -> None:
     """Keep an object without edges in this frame as hidden or coasting; in the end, delete it.
 
     It is kept for longer where missing edges are expected: stationary before a stationary vehicle, very near, or out
-    of view.
+    of view. ``gone``: its place looks different from when it was seen there.
     """
     objects.unseen_s[o] += around.dt_s
     by = object_in_place_of(objects, o)
@@ -261,7 +336,7 @@ def go_on(
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
     elif lingers(objects, o, around):
-        patience_s = RESTING_S if is_seen_through(objects, o, edges) else LINGERS_S
+        patience_s = RESTING_S if gone or is_seen_through(objects, o, edges) else LINGERS_S
     elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
     elif is_met_soon(objects, o, settings):

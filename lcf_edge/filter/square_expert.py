@@ -252,6 +252,7 @@ def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> 
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
     objects.class_id[o], objects.state[o], objects.support[o], objects.left[o] = UNKNOWN, SEEN, 0, 0
+    objects.watched[o] = object_prediction.NO_LONGER
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
     objects.probability[o] = 0.0
     object_prediction.forget_motion(objects, o)
@@ -692,6 +693,13 @@ def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situat
     return 1.0 if wholes.count[o] >= object_prediction.SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
 
 
+def see_at_rest(objects: ObjectColumns, o: int, around: Situation) -> None:
+    """Update an object that stands before a vehicle at rest."""
+    objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
+    objects.looming[o] = objects.sideways[o] = 0.0
+    objects.reference[o] = around.speed_mps
+
+
 def renew_numbers(
     objects: ObjectColumns, o: int, squares: Squares, unmeasured: bool, plane: ImagePlane, around: Situation
 ) -> None:
@@ -735,8 +743,14 @@ def update(
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
+        place = object_prediction.watch(objects, o, count, coarse, plane, around)
+        if place == object_prediction.CHANGED and count >= MIN_EDGES:
+            observe(objects, o, squares.wholes, around)
+        gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)
         remnant = False
-        if count >= MIN_EDGES:
+        if place == object_prediction.SAME or (squares.resting[o] >= MIN_EDGES and count < MIN_EDGES and not gone):
+            see_at_rest(objects, o, around)
+        elif count >= MIN_EDGES and not gone:
             objects.recent_edges[o] = max(objects.recent_edges[o] * math.exp(-around.dt_s / RECENT_S), count)
             remnant = object_prediction.is_remnant(objects, o, count, plane, around)
             objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
@@ -751,19 +765,18 @@ def update(
                 if objects.age_s[o] == 0:
                     object_prediction.forget_motion(objects, o)
                 observe(objects, o, squares.wholes, around)
-        elif squares.resting[o] >= MIN_EDGES:
-            objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
-            objects.looming[o] = objects.sideways[o] = 0.0
-            objects.reference[o] = around.speed_mps
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
-            object_prediction.go_on(objects, o, edges, plane, around, settings)
+            object_prediction.go_on(objects, o, gone, edges, plane, around, settings)
             if not objects.active[o]:
                 continue
         renew_numbers(
             objects,
             o,
             squares,
-            remnant or objects.unseen_s[o] > 0 or object_belief.rests(objects, o, around),
+            remnant
+            or place == object_prediction.SAME
+            or objects.unseen_s[o] > 0
+            or object_belief.rests(objects, o, around),
             plane,
             around,
         )

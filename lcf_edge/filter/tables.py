@@ -15,7 +15,7 @@ import numpy.typing as npt
 
 from lcf_edge.filter import edge_rows
 from lcf_edge.filter.columns import CircleColumns, CornerColumns, EdgeColumns, GroupColumns, ObjectColumns, PsiColumns
-from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, KEYS
+from lcf_edge.filter.inputs import APPEARANCE_SAMPLES, KEYS, LOOK_SIDE
 from lcf_edge.filter.line_expert import group_at
 from lcf_edge.filter.memory import memory_of
 
@@ -200,6 +200,14 @@ OBJECT_COLUMNS = (
     Column("state", "`messages.ObjectState`", "", ("square_expert", "object_prediction"), np.uint8),
     Column("support", "edges behind it", "1", ("square_expert",), np.int32),
     Column("recent_edges", "edges that lately showed it", "1", ("square_expert",)),
+    Column(
+        "watched",
+        "since the vehicle rests: whether its place is compared with `looks`",
+        "",
+        ("square_expert", "object_prediction"),
+        np.uint8,
+    ),
+    Column("looks", "grey samples of its place", "grey", ("object_prediction",), np.uint8, (LOOK_SIDE * LOOK_SIDE,)),
     Column("trust", "Tr", "1", ("square_expert", "object_prediction")),
     Column("age_s", "since it was founded", "s", ("square_expert", "object_prediction")),
     Column("unseen_s", "since edges last showed it", "s", ("square_expert", "object_prediction")),

@@ -349,6 +349,49 @@ def test_before_a_vehicle_that_stands_an_object_is_not_held_by_what_lies_beside_
     assert (np.abs(edges.x[: edges.count][own] - tables.objects.x[row]) <= 1.5 * width).all()
 
 
+def grey_image(tables: LineCircleFilter, grey: int) -> npt.NDArray[np.uint8]:
+    """A downscaled image, all of one grey but for a gradient."""
+    blocks = tables._coarse.blocks
+    return np.tile(np.arange(blocks.width, dtype=np.uint8), (blocks.height, 1)) + np.uint8(grey)
+
+
+@pytest.mark.parametrize(("then", "stays"), [(60, True), (64, True), (120, False)], ids=["same", "lit", "different"])
+def test_what_stands_before_a_vehicle_at_rest_is_there_as_long_as_its_place_looks_the_same(
+    drive: Drive, box: Landmarks, clutter: Landmarks, then: int, stays: bool
+) -> None:
+    """Its corners come and go, and what it hid has some as well."""
+    wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
+    tables, mine = LineCircleFilter(Config(), wall.lens), looks_of(wall, slice(150, None))
+    image = grey_image(tables, 60)
+    for corners, motion in wall:
+        tables.step(corners, motion, small=image)
+    for _ in range(10):
+        tables.step(corners, replace(motion, speed_mps=0.0), small=image)
+    (row,) = published(tables.objects)
+    before = tables.objects.range[row], tables.objects.x[row], tables.objects.width[row]
+    for _ in range(200):
+        tables.step(without(corners, mine), replace(motion, speed_mps=0.0), small=grey_image(tables, then))
+    assert (row in published(tables.objects)) is stays
+    if stays:
+        assert (tables.objects.range[row], tables.objects.x[row], tables.objects.width[row]) == pytest.approx(before)
+
+
+def test_where_it_looks_different_a_few_edges_do_not_hold_what_stood_before_a_vehicle_at_rest(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """What it hid rests as well, and would show for ever that it is there."""
+    wall = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
+    tables, gone = LineCircleFilter(Config(), wall.lens), looks_of(wall, slice(154, None))
+    for corners, motion in wall:
+        tables.step(corners, motion, small=grey_image(tables, 60))
+    for _ in range(10):
+        tables.step(corners, replace(motion, speed_mps=0.0), small=grey_image(tables, 60))
+    assert len(published(tables.objects)) == 1
+    for _ in range(60):
+        tables.step(without(corners, gone), replace(motion, speed_mps=0.0), small=grey_image(tables, 150))
+    assert not published(tables.objects)
+
+
 def test_who_leaves_the_image_at_its_side_is_expected_there_for_a_second(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
