@@ -81,5 +81,5 @@ cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, I
 cdef void look(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(k=int, now=int, change=double, count=double, before=double, gained=double, squares=double, light=double)
 cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
-@cython.locals(stopped=bint, stands=bint)
+@cython.locals(is_well_seen=bint, stopped=bint, stands=bint)
 cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

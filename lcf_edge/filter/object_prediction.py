@@ -167,9 +167,8 @@ def watch(
         return UNKNOWN
     if objects.watched[o] == WATCHED:
         return CHANGED if looks_different(objects, o, coarse, plane) else SAME
-    stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M
-    if stopped:
-        stopped = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
+    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
+    stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M and is_well_seen
     stands = objects.watched[o] == NOT_YET and objects.log_odds[o] > 0 and objects.recent_edges[o] >= SURE_EDGES
     if objects.watched[o] == NOT_YET:
         objects.watched[o] = NO_LONGER
