@@ -51,10 +51,10 @@ class Result:
     outcomes: dict[str, Outcome] = field(default_factory=dict)
 
 
-def contest(seed: int, names: Sequence[str]) -> Result:
-    """Run drivers through the world of a seed."""
+def contest(seed: int, names: Sequence[str], wait_s: float = 1.0) -> Result:
+    """Run drivers through the world of a seed; ``wait_s``: how long they stand before a box that ends their course."""
     cv2.setNumThreads(1)
-    world = worlds.make(seed)
+    world = worlds.make(seed).changed(arrived_s=wait_s)
     result = Result(seed, world.cruise_mps, world.condition, world.events)
     logs: dict[str, Log] = {}
     rights: dict[str, list[bool]] = {}
@@ -132,12 +132,12 @@ def worst(results: Sequence[Result], name: str) -> Result:
     return max(results, key=badness)
 
 
-def _run(seeds: Sequence[int], names: Sequence[str], jobs: int) -> Iterator[Result]:
+def _run(seeds: Sequence[int], names: Sequence[str], wait_s: float, jobs: int) -> Iterator[Result]:
     if jobs == 1:
-        yield from (contest(seed, names) for seed in seeds)
+        yield from (contest(seed, names, wait_s) for seed in seeds)
         return
     with ProcessPoolExecutor(jobs) as pool_of_processes:
-        yield from pool_of_processes.map(contest, seeds, [names] * len(seeds))
+        yield from pool_of_processes.map(contest, seeds, [names] * len(seeds), [wait_s] * len(seeds))
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -146,6 +146,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--worlds", type=int, default=12, help="how many (default 12)")
     parser.add_argument("--seed", type=int, default=0, help="of the first (default 0)")
     parser.add_argument("--drivers", default=",".join(NAMES), help="with commas (default all: %(default)s)")
+    parser.add_argument("--wait", type=float, default=1.0, help="before a box that ends the course, s (default 1)")
     parser.add_argument("--jobs", type=int, default=1, help="processes (default 1)")
     parser.add_argument("--video", type=Path, default=Path("drive-out"), help="folder of the video (default drive-out)")
     options = parser.parse_args(arguments)
@@ -157,7 +158,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     seeds = range(options.seed, options.seed + options.worlds)
     results = []
     with tqdm(total=len(seeds), disable=None, file=sys.stderr, ncols=80) as bar:
-        for result in _run(seeds, names, options.jobs):
+        for result in _run(seeds, names, options.wait, options.jobs):
             results.append(result)
             bar.update()
     data = {"seeds": [seeds[0], seeds[-1]], "drivers": names, "results": results}

@@ -18,7 +18,6 @@ from lcf_edge.rendered.rendering import Renderer
 BODIES_EVERY = 2  # steps of the vehicle
 LATE_STEPS = 4  # samples that are read between an image and its processing
 STANDS_MPS = 0.02
-_ARRIVED_S = 1.0  # of standstill before the obstacle that ends its course
 _NEAR_END_M = 1.5
 
 
@@ -110,7 +109,7 @@ def drive(world: World, driver: Driver, *, with_images: bool = True) -> Log:
         advance(seq * steps + LATE_STEPS, (seq + 1) * steps)
         left_m = world.course.length_m - vehicle.travelled_m
         stood_s = stood_s + 1 / world.fps if vehicle.speed_mps < STANDS_MPS else 0.0
-        if left_m <= 0 or (world.blocked and left_m < _NEAR_END_M and stood_s >= _ARRIVED_S):
+        if left_m <= 0 or (world.blocked and left_m < _NEAR_END_M and stood_s >= world.arrived_s):
             log.arrived = True
             break
     log.distance_m, log.seconds = vehicle.travelled_m, (seq + 1) / world.fps

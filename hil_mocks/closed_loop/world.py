@@ -69,6 +69,7 @@ class World:
     build: Build
     bodies: tuple[Body, ...]
     blocked: bool = False  # its course ends before a box in the path
+    arrived_s: float = 1.0  # how long it then has to stand there
     start_mps: float = 0.0
     waits_m: tuple[tuple[float, float], ...] = ()  # where it stops of its own accord, and for how long, s
     fps: float = 20.0

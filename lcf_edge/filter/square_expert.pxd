@@ -98,6 +98,7 @@ cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns ci
 @cython.locals(share=double)
 cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
+cdef void measure(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, int place, Situation around) noexcept nogil
 cdef void see_at_rest(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(remnant=bint, gone=bint, count=int, place=int)

@@ -693,6 +693,15 @@ def belief_in(objects: ObjectColumns, o: int, wholes: MotionSums, around: Situat
     return 1.0 if wholes.count[o] >= object_prediction.SURE_EDGES or objects.trust[o] < settings.tr_cr else UNSURE
 
 
+def measure(objects: ObjectColumns, o: int, wholes: MotionSums, place: int, around: Situation) -> None:
+    """Update an object's box and motion from its edges; where its ``place`` has changed its motion was observed."""
+    show(objects, o, wholes, around)
+    if objects.age_s[o] == 0:
+        object_prediction.forget_motion(objects, o)
+    if place != object_prediction.CHANGED:
+        observe(objects, o, wholes, around)
+
+
 def see_at_rest(objects: ObjectColumns, o: int, around: Situation) -> None:
     """Update an object that stands before a vehicle at rest."""
     objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0
@@ -761,10 +770,7 @@ def update(
                 objects.active[o] = 0
                 continue
             if not remnant:
-                show(objects, o, squares.wholes, around)
-                if objects.age_s[o] == 0:
-                    object_prediction.forget_motion(objects, o)
-                observe(objects, o, squares.wholes, around)
+                measure(objects, o, squares.wholes, place, around)
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
             object_prediction.go_on(objects, o, gone, edges, plane, around, settings)
             if not objects.active[o]:

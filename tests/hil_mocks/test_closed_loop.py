@@ -127,6 +127,14 @@ def test_what_is_run_into_is_reported_once_with_the_speed_and_taken_away() -> No
     assert not driver.moments[-1].known
 
 
+@pytest.mark.parametrize("arrived_s", [1.0, 3.0])
+def test_before_a_box_that_ends_its_course_the_vehicle_stands_for_as_long_as_is_asked(arrived_s: float) -> None:
+    blocked = world(body(0.0, 3.0), blocked=True, start_mps=0.0, arrived_s=arrived_s, course=Course(1.0))
+    log = ended(blocked, Watching(0.0))
+    assert log.arrived
+    assert log.seconds == pytest.approx(arrived_s, abs=0.11)
+
+
 def test_nobody_walks_into_a_vehicle_that_stands() -> None:
     walker = body(0.0, 5.0, Leg(0.0, -5.0, 1.0))
     drawn = world(walker, start_mps=0.0)
