@@ -64,13 +64,13 @@ LINKED += ["-flto-partition=one"]  # divided into parts, GCC 12 leaves loops of 
 # What takes little of a frame, or loses little by it, is made small instead: a quarter smaller, and a tenth slower;
 # and what takes hardly any, smaller still.
 SMALL, SMALLEST = "-Os", "-Oz"  # the latter is known to GCC from 12
-LITTLE = {"coarse_motion", "patches"}
+LITTLE = {"coarse_motion"}
 LEAST = {"_memoryviews", "alpha", "axis_bias", "baselines", "body_ahead", "circles", "coarse_circles", "columns"}
 LEAST |= {"derotation", "driving", "edge_equations", "edge_rows", "error_matrix", "feedback", "flow", "flow_fit"}
 LEAST |= {"ground_speed", "group_motion", "heading", "hot_pixels", "image_plane", "key_frames", "leaps"}
 LEAST |= {"least_squares", "line_expert", "normal_circles", "object_belief", "object_circles", "object_prediction"}
-LEAST |= {"patch_circles", "path", "range_belief", "rebel_circles", "rebel_detection", "rebel_groups", "rest"}
-LEAST |= {"sample_ring", "scene_records", "settings", "situation", "speed_change", "spread", "square_expert"}
+LEAST |= {"patch_circles", "patches", "path", "range_belief", "rebel_circles", "rebel_detection", "rebel_groups"}
+LEAST |= {"rest", "sample_ring", "scene_records", "settings", "situation", "speed_change", "spread", "square_expert"}
 LEAST |= {"stillness", "turmoil"}
 
 # A changed declaration changes the layout of what other modules share: all are compiled anew.

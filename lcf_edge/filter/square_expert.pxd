@@ -56,6 +56,7 @@ cdef class Squares:
 cpdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
 @cython.locals(weight=double)
 cdef bint is_moving(MotionSums parts, Py_ssize_t c, Settings settings) noexcept nogil
+cdef bint shows_object(MotionSums parts, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 cdef bint expands_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double looming) noexcept nogil
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
@@ -101,5 +102,5 @@ cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Si
 cdef void measure(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, int place, Situation around) noexcept nogil
 cdef void see_at_rest(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(remnant=bint, gone=bint, count=int, place=int)
+@cython.locals(remnant=bint, gone=bint, count=int, shown=int, place=int)
 cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

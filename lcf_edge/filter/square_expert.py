@@ -152,6 +152,19 @@ def moves_alike(
     )
 
 
+def shows_object(parts: MotionSums, c: int, around: Situation, settings: Settings) -> bool:
+    """Whether a circle is no part of the ground and, before a vehicle at rest, moves or expands now.
+
+    Edges that seem to have fallen short of the flow, since the vehicle was at rest earlier than it knew, do not.
+    """
+    if group_motion.is_ground(parts, c, around):
+        return False
+    if not situation.is_at_rest(around) or is_moving(parts, c, settings):
+        return True
+    group_motion.fit_expansion(parts, c)
+    return math.fabs(parts.expansion) > object_belief.STILL_HZ
+
+
 def measure_circles(
     parts: MotionSums,
     circles: CircleColumns,
@@ -252,7 +265,7 @@ def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> 
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
     objects.class_id[o], objects.state[o], objects.support[o], objects.left[o] = UNKNOWN, SEEN, 0, 0
-    objects.watched[o] = object_prediction.NO_LONGER
+    objects.watched[o] = object_prediction.FOUNDED
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
     objects.probability[o] = 0.0
     object_prediction.forget_motion(objects, o)
@@ -346,7 +359,7 @@ def gather(
             o = nearest_object(objects, squares, circles, c, around, settings)
         if o >= 0:
             circles.square[c] = o
-        elif circles.trust[c] >= settings.tr_s and (in_turmoil or not group_motion.is_ground(squares.parts, c, around)):
+        elif circles.trust[c] >= settings.tr_s and (in_turmoil or shows_object(squares.parts, c, around, settings)):
             o = free_row(objects)
             if o < 0:
                 evicted += 1
@@ -752,7 +765,8 @@ def update(
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
-        place = object_prediction.watch(objects, o, count, coarse, plane, around)
+        shown = max(count, squares.resting[o])
+        place = object_prediction.watch(objects, o, shown, coarse, plane, around)
         if place == object_prediction.CHANGED and count >= MIN_EDGES:
             observe(objects, o, squares.wholes, around)
         gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)
