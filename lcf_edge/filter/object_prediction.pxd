@@ -31,6 +31,7 @@ cdef int LOOK_SIDE
 cdef double CHANGED_GREY
 cdef double LIGHT_SHARE
 cdef double LOOKS_AFTER
+cdef double SHOWS_HZ
 cdef int UNKNOWN
 cdef int SAME
 cdef int CHANGED
@@ -84,6 +85,7 @@ cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, I
 cdef void look(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(k=int, now=int, change=double, count=double, before=double, gained=double, squares=double, light=double)
 cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
+cdef bint shows_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(just_lost=bint)
 cdef void stir(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(is_well_seen=bint)

@@ -36,6 +36,7 @@ PASSED_M = 0.1  # an unseen object nearer than this is passed
 CHANGED_GREY = 10.0  # RMS difference of the samples from which a place looks different
 LIGHT_SHARE = 0.15  # by which the light on it may change
 LOOKS_AFTER = 1.5  # frames after it was lost
+SHOWS_HZ = 0.025  # a sideways or looming rate above this shows that an object moves
 UNKNOWN, SAME, CHANGED = 0, 1, 2  # what the place of an object tells
 NOT_YET, WATCHED, MOVED, LOST, FOUNDED = 0, 1, 2, 3, 4  # of an object, before a vehicle at rest: ``watch``
 HIDDEN, COASTING = int(ObjectState.HIDDEN), int(ObjectState.COASTING)
@@ -151,6 +152,11 @@ def looks_different(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane:
     return squares - (2 * gained - light * count) * light > CHANGED_GREY * CHANGED_GREY * count
 
 
+def shows_motion(objects: ObjectColumns, o: int) -> bool:
+    """Whether an object moves before a vehicle at rest, be it ever so slowly."""
+    return max(math.fabs(objects.sideways[o]), math.fabs(objects.looming[o])) > SHOWS_HZ
+
+
 def stir(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane, around: Situation) -> None:
     """Keep an object that was lost right before a vehicle at rest as long as something stirs in its place.
 
@@ -171,7 +177,7 @@ def begin_to_watch(objects: ObjectColumns, o: int, count: int, coarse: CoarseMot
     """
     is_well_seen = count >= REMNANT_SHARE * objects.recent_edges[o]
     if objects.watched[o] == MOVED:
-        if not objects.range[o] < NEAR_M or not object_belief.is_still(objects, o):
+        if not objects.range[o] < NEAR_M or shows_motion(objects, o):
             return UNKNOWN
         if objects.recent_edges[o] < SURE_EDGES:
             return CHANGED
@@ -203,7 +209,7 @@ def watch(
         if objects.watched[o] != WATCHED and lingers(objects, o, around):
             stir(objects, o, coarse, plane, around)
         may_move = objects.watched[o] == NOT_YET and objects.log_odds[o] < 0
-        if objects.watched[o] == FOUNDED and object_belief.is_still(objects, o):
+        if objects.watched[o] == FOUNDED and not shows_motion(objects, o):
             return CHANGED if objects.range[o] < NEAR_M else UNKNOWN
         if may_move or objects.watched[o] == FOUNDED or math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
             objects.watched[o] = MOVED

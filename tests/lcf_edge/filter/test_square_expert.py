@@ -511,6 +511,19 @@ def test_who_was_lost_right_before_a_vehicle_that_stands_is_there_until_it_sees_
     assert remembered_s(way, hidden, 0.1) == pytest.approx(about_s, abs=0.2)
 
 
+@pytest.mark.parametrize(("right_mps", "is_there"), [(0.04, True), (0.015, False)], ids=["sways", "hardly moves"])
+def test_what_is_first_seen_right_before_a_vehicle_at_rest_is_there_if_it_moves(
+    drive: Drive, box: Landmarks, clutter: Landmarks, right_mps: float, is_there: bool
+) -> None:
+    """What somebody uncovered who left would else be taken for something that stands."""
+    sways = drive(box((0.0, 0.2, 1.0), (0.3, 0.6, 0.1), landmarks=60), np.array([right_mps, 0, 0]))
+    way = replace(drive(clutter(150)) + sways, frames=100, speed_mps=0.0)
+    tables = LineCircleFilter(Config(camera=Camera(height_m=0.5)), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion, small=grey_image(tables, 60))
+    assert bool(published(tables.objects)) is is_there
+
+
 @pytest.mark.parametrize(("stirs_s", "about_s"), [(0, 6.0), (20, 26.0)])
 def test_who_was_lost_right_before_a_vehicle_at_rest_is_there_as_long_as_he_stirs(
     drive: Drive, box: Landmarks, clutter: Landmarks, stirs_s: int, about_s: float
