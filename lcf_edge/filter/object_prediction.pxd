@@ -88,7 +88,7 @@ cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coar
 cdef bint shows_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(just_lost=bint)
 cdef void stir(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(is_well_seen=bint)
+@cython.locals(is_well_seen=bint, is_near=bint)
 cdef int begin_to_watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(may_move=bint)
 cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

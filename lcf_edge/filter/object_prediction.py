@@ -172,16 +172,13 @@ def stir(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane
 def begin_to_watch(objects: ObjectColumns, o: int, count: int, coarse: CoarseMotion, plane: ImagePlane) -> int:
     """Look at the place of an object if that shows it; returns what its place tells.
 
-    It does where enough of its recent edges are found, and of what may move, when it has stopped nearby. Less than that
-    is what it hid, of what was lost while the vehicle stopped, or never had more than a few edges.
+    It does where enough of its recent edges are found, and of what may move, when it has stopped nearby. Of what was
+    lost while the vehicle stopped, less than that is what it hid.
     """
     is_well_seen = count >= REMNANT_SHARE * objects.recent_edges[o]
     if objects.watched[o] == MOVED:
-        if not objects.range[o] < NEAR_M or shows_motion(objects, o):
-            return UNKNOWN
-        if objects.recent_edges[o] < SURE_EDGES:
-            return CHANGED
-        if count < SURE_EDGES or not is_well_seen:
+        is_near = objects.range[o] < NEAR_M and not shows_motion(objects, o)
+        if not (is_near and is_well_seen and count >= SURE_EDGES):
             return UNKNOWN
     elif objects.watched[o] == LOST or objects.unseen_s[o] > 0:
         if not is_well_seen:
