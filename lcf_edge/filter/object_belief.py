@@ -90,8 +90,6 @@ def believe(objects: ObjectColumns, o: int, belief: Belief, evidence: Evidence, 
         objects.lateral[o] = objects.lateral_sigma[o] = NAN
     set_contact(objects, o, belief.mean[range_belief.RATE], belief.sigma[range_belief.RATE], around)
     objects.class_id[o] = class_of(objects, o, belief, evidence)
-    if objects.recent_edges[o] == 0 and situation.is_at_rest(around):
-        objects.class_id[o] = UNKNOWN  # in turmoil; before a vehicle at rest, nothing that stands is
 
 
 def set_contact(objects: ObjectColumns, o: int, rate: float, sigma: float, around: Situation) -> None:

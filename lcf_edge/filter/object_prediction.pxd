@@ -31,15 +31,13 @@ cdef int LOOK_SIDE
 cdef double CHANGED_GREY
 cdef double LIGHT_SHARE
 cdef double LOOKS_AFTER
-cdef double SHOWS_HZ
 cdef int UNKNOWN
 cdef int SAME
 cdef int CHANGED
 cdef int NOT_YET
 cdef int WATCHED
 cdef int MOVED
-cdef int LOST
-cdef int FOUNDED
+cdef int NO_LONGER
 cdef double LEAVES_S
 cdef double LOSES_HZ
 cdef double PASSED_M
@@ -61,7 +59,6 @@ cdef bint is_in_image(ObjectColumns objects, Py_ssize_t o, double x, ImagePlane 
 cdef bint is_in_sight(ObjectColumns objects, Py_ssize_t o, ImagePlane plane) noexcept nogil
 cdef bint is_passed(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, Situation around, Settings settings) noexcept nogil
-@cython.locals(aside_m=double)
 cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(is_lost=bint)
@@ -85,10 +82,7 @@ cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, I
 cdef void look(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(k=int, now=int, change=double, count=double, before=double, gained=double, squares=double, light=double)
 cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
-cdef bint shows_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(just_lost=bint)
 cdef void stir(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(is_well_seen=bint, is_near=bint)
-cdef int begin_to_watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane) noexcept nogil
-@cython.locals(may_move=bint)
+@cython.locals(is_well_seen=bint, stopped=bint, stands=bint)
 cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

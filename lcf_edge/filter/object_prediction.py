@@ -36,9 +36,8 @@ PASSED_M = 0.1  # an unseen object nearer than this is passed
 CHANGED_GREY = 10.0  # RMS difference of the samples from which a place looks different
 LIGHT_SHARE = 0.15  # by which the light on it may change
 LOOKS_AFTER = 1.5  # frames after it was lost
-SHOWS_HZ = 0.025  # a sideways or looming rate above this shows that an object moves
-UNKNOWN, SAME, CHANGED = 0, 1, 2  # what the place of an object tells
-NOT_YET, WATCHED, MOVED, LOST, FOUNDED = 0, 1, 2, 3, 4  # of an object, before a vehicle at rest: ``watch``
+UNKNOWN, SAME, CHANGED = 0, 1, 2
+NOT_YET, WATCHED, MOVED, NO_LONGER = 0, 1, 2, 3
 HIDDEN, COASTING = int(ObjectState.HIDDEN), int(ObjectState.COASTING)
 INFINITY = float("inf")
 NAN = float("nan")
@@ -152,11 +151,6 @@ def looks_different(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane:
     return squares - (2 * gained - light * count) * light > CHANGED_GREY * CHANGED_GREY * count
 
 
-def shows_motion(objects: ObjectColumns, o: int) -> bool:
-    """Whether an object moves before a vehicle at rest, be it ever so slowly."""
-    return max(math.fabs(objects.sideways[o]), math.fabs(objects.looming[o])) > SHOWS_HZ
-
-
 def stir(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane, around: Situation) -> None:
     """Keep an object that was lost right before a vehicle at rest as long as something stirs in its place.
 
@@ -169,52 +163,34 @@ def stir(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane
             objects.unseen_s[o] = around.dt_s
 
 
-def begin_to_watch(objects: ObjectColumns, o: int, count: int, coarse: CoarseMotion, plane: ImagePlane) -> int:
-    """Look at the place of an object if that shows it; returns what its place tells.
-
-    It does where enough of its recent edges are found, and of what may move, when it has stopped nearby. Of what was
-    lost while the vehicle stopped, less than that is what it hid.
-    """
-    is_well_seen = count >= REMNANT_SHARE * objects.recent_edges[o]
-    if objects.watched[o] == MOVED:
-        is_near = objects.range[o] < NEAR_M and not shows_motion(objects, o)
-        if not (is_near and is_well_seen and count >= SURE_EDGES):
-            return UNKNOWN
-    elif objects.watched[o] == LOST or objects.unseen_s[o] > 0:
-        if not is_well_seen:
-            objects.watched[o] = LOST
-            return CHANGED
-    elif objects.recent_edges[o] < SURE_EDGES:
-        return UNKNOWN
-    look(objects, o, coarse, plane)
-    objects.watched[o] = WATCHED
-    return SAME
-
-
 def watch(
     objects: ObjectColumns, o: int, count: int, coarse: CoarseMotion, plane: ImagePlane, around: Situation
 ) -> int:
     """Returns whether the place of an object looks as when the vehicle stopped, or it stopped near a vehicle at rest.
 
-    Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. What was founded
-    nearby since, and has not moved, is what somebody uncovered who left. ``UNKNOWN`` of what moves, or may. ``count``:
-    of its edges.
+    Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. ``UNKNOWN`` of
+    what moves sideways, may move, or had few edges. ``count``: of its edges.
     """
     if not situation.is_at_rest(around):
         objects.watched[o] = NOT_YET
-    elif block_matching.has_image(coarse.blocks):
-        if objects.watched[o] != WATCHED and lingers(objects, o, around):
-            stir(objects, o, coarse, plane, around)
-        may_move = objects.watched[o] == NOT_YET and objects.log_odds[o] < 0
-        if objects.watched[o] == FOUNDED and not shows_motion(objects, o):
-            return CHANGED if objects.range[o] < NEAR_M else UNKNOWN
-        if may_move or objects.watched[o] == FOUNDED or math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
-            objects.watched[o] = MOVED
-        elif objects.watched[o] == WATCHED:
-            return CHANGED if looks_different(objects, o, coarse, plane) else SAME
-        else:
-            return begin_to_watch(objects, o, count, coarse, plane)
-    return UNKNOWN
+        return UNKNOWN
+    if objects.watched[o] != WATCHED and lingers(objects, o, around) and block_matching.has_image(coarse.blocks):
+        stir(objects, o, coarse, plane, around)
+    if math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
+        objects.watched[o] = MOVED
+        return UNKNOWN
+    if objects.watched[o] == WATCHED:
+        return CHANGED if looks_different(objects, o, coarse, plane) else SAME
+    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
+    stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M and is_well_seen
+    stands = objects.watched[o] == NOT_YET and objects.log_odds[o] > 0 and objects.recent_edges[o] >= SURE_EDGES
+    if objects.watched[o] == NOT_YET:
+        objects.watched[o] = NO_LONGER
+    if not (stopped or stands) or objects.unseen_s[o] > 0 or not block_matching.has_image(coarse.blocks):
+        return UNKNOWN
+    look(objects, o, coarse, plane)
+    objects.watched[o] = WATCHED
+    return SAME
 
 
 # How long they are kept
@@ -246,10 +222,7 @@ def is_beside(objects: ObjectColumns, o: int, around: Situation, settings: Setti
 
 def outside_s(objects: ObjectColumns, o: int, around: Situation) -> float:
     """Returns for how long an object is kept that left the image, s: longer if it moves towards the path."""
-    if comes(objects, o, around):
-        return COMING_S
-    aside_m = math.fabs(objects.x[o] - around.focus_x) / around.pinhole.fx * objects.range[o]
-    return COAST_S if situation.is_at_rest(around) and aside_m > 2 * around.half_width_m else OUTSIDE_S
+    return COMING_S if comes(objects, o, around) else OUTSIDE_S
 
 
 def comes(objects: ObjectColumns, o: int, around: Situation) -> bool:
@@ -376,8 +349,6 @@ def go_on(
         objects.left[o] = 1
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
-    elif gone and objects.watched[o] == FOUNDED and objects.recent_edges[o] > 0:
-        patience_s = COAST_S
     elif lingers(objects, o, around):
         patience_s = RESTING_S if gone or is_seen_through(objects, o, edges) else LINGERS_S
     elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:

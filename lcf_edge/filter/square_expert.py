@@ -265,7 +265,7 @@ def give_birth(objects: ObjectColumns, o: int, settings: Settings, ids: Ids) -> 
     objects.trust[o] = settings.tr_s - FRAMES_UNREPORTED - 1
     objects.age_s[o] = objects.unseen_s[o] = objects.log_odds[o] = 0.0
     objects.class_id[o], objects.state[o], objects.support[o], objects.left[o] = UNKNOWN, SEEN, 0, 0
-    objects.watched[o] = object_prediction.FOUNDED
+    objects.watched[o] = object_prediction.NO_LONGER
     objects.range[o] = objects.middle[o] = objects.middle_sigma[o] = objects.ttc[o] = objects.foot[o] = NAN
     objects.probability[o] = 0.0
     object_prediction.forget_motion(objects, o)
@@ -765,8 +765,7 @@ def update(
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
-        shown = max(count, squares.resting[o])
-        place = object_prediction.watch(objects, o, shown, coarse, plane, around)
+        place = object_prediction.watch(objects, o, count, coarse, plane, around)
         if place == object_prediction.CHANGED and count >= MIN_EDGES:
             observe(objects, o, squares.wholes, around)
         gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)

@@ -135,24 +135,6 @@ def test_it_is_an_object_of_which_hardly_more_than_its_place_is_known(calm: Any)
     assert objects.range_sigma[o] > 0.1 * objects.range[o]
 
 
-@pytest.mark.parametrize("place", [AHEAD, (320.0, 380.0)], ids=["farther off", "right before it"])
-def test_before_a_vehicle_at_rest_it_is_not_said_to_stand_and_ends_with_it(
-    calm: Any, place: tuple[float, float]
-) -> None:
-    """What somebody uncovered who left rests as well, and does not show that he is there."""
-    storm = Storm(replace(calm, speed_mps=0.0, frames=120), place, until_seq=40)
-    tables, random, told_s = LineCircleFilter(CONFIG, calm.lens), np.random.default_rng(2), []
-    blocks = tables._coarse.blocks
-    still = np.tile(np.arange(blocks.width, dtype=np.uint8), (blocks.height, 1))
-    for seq, (corners, motion) in enumerate(storm):
-        wild = storm.from_seq <= seq < storm.until_seq
-        tables.step(corners, motion, small=random.integers(0, 255, still.shape, np.uint8) if wild else still)
-        for o in np.flatnonzero(tables.objects.active & (tables.objects.trust >= CONFIG.filter.tr_s)):
-            assert tables.objects.class_id[o] == ObjectClass.UNKNOWN
-            told_s.append(seq * motion.dt_s)
-    assert 2.0 < told_s[-1] < 40 * motion.dt_s + 3.0
-
-
 def test_what_was_to_be_met_and_is_still_in_turmoil_moves_otherwise(
     drive: Drive, clutter: Landmarks, box: Landmarks
 ) -> None:
