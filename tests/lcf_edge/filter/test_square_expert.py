@@ -392,6 +392,17 @@ def test_where_it_looks_different_a_few_edges_do_not_hold_what_stood_before_a_ve
     assert not published(tables.objects)
 
 
+@pytest.mark.parametrize("velocity_mps", [(0.0, -0.8), (0.4, 0.0)], ids=["comes straight", "crosses"])
+def test_before_a_vehicle_at_rest_what_comes_or_moves_is_an_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks, velocity_mps: tuple[float, float]
+) -> None:
+    right_mps, forward_mps = velocity_mps
+    body = drive(box((0.0, 0.0, 3.5), (0.5, 0.5, 0.1), landmarks=60), np.array([right_mps, 0, forward_mps]))
+    *_, tables = steps(replace(drive(clutter(150)) + body, frames=24, speed_mps=0.0))
+    (row,) = published(tables.objects)
+    assert tables.objects.class_id[row] == (ObjectClass.ONCOMING if forward_mps else ObjectClass.CROSSING)
+
+
 def test_where_a_vehicle_was_at_rest_earlier_than_it_knew_the_ground_is_no_object(
     drive: Drive, clutter: Landmarks
 ) -> None:
