@@ -162,7 +162,7 @@ class Bodies:
     def step(self, dt_s: float, vehicle: Vehicle) -> None:
         """Advance all movers by one step."""
         for mover in self._movers:
-            wish = self._wish(mover, dt_s, vehicle.travelled_m)
+            wish = self._wish(mover, dt_s, vehicle)
             wish += self._evades(mover, wish, vehicle, dt_s)
             row = mover.row
             self.velocity[row] = wish
@@ -172,25 +172,38 @@ class Bodies:
                 way = math.remainder(way, math.tau)
                 self.heading[row] += min(max(way, -_TURNING_RADPS * dt_s), _TURNING_RADPS * dt_s)
 
-    def _wish(self, mover: _Mover, dt_s: float, travelled_m: float) -> Floats:
+    def _wish(self, mover: _Mover, dt_s: float, vehicle: Vehicle) -> Floats:
         """The velocity that its legs demand."""
         mover.rests_s = max(mover.rests_s - dt_s, 0.0)
-        legs = mover.body.legs
+        legs, travelled_m = mover.body.legs, vehicle.travelled_m
         if mover.leg == len(legs) or mover.rests_s > 0 or travelled_m < legs[mover.leg].from_m:
             mover.speed_mps = 0.0
             return np.zeros(2)
         leg = legs[mover.leg]
-        rest = np.array([leg.x_m, leg.z_m]) - self.position[mover.row]
+        target = np.array([leg.x_m, leg.z_m])
+        rest = target - self.position[mover.row]
         left_m = math.hypot(*rest)
         step = mover.body.acceleration_mps2 * dt_s
         stops = leg.rest_s > 0 or mover.leg + 1 == len(legs) or legs[mover.leg + 1].from_m > travelled_m
         most = min(leg.speed_mps, math.sqrt(2 * mover.body.acceleration_mps2 * left_m)) if stops else leg.speed_mps
         mover.speed_mps += min(max(most - mover.speed_mps, -step), step)
-        if left_m <= max(mover.speed_mps * dt_s, 0.02):
+        arrived = left_m <= max(mover.speed_mps * dt_s, 0.02)
+        if arrived or not (stops or self._is_free(target, mover, vehicle)):
             mover.leg += 1
             mover.rests_s = leg.rest_s
         velocity: Floats = rest * (mover.speed_mps / max(left_m, 1e-9))
         return velocity
+
+    def _is_free(self, place: Floats, mover: _Mover, vehicle: Vehicle) -> bool:
+        """Whether a mover can get to a place. It would walk round and round what is there."""
+        others = np.arange(len(self.position)) != mover.row
+        nearest = _nearest(place, self.position[others], self.heading[others], self.half[others])
+        away = place - np.concatenate([nearest, _nearest(place, *_hull(vehicle))])
+        return bool(np.hypot(*away.T).min() >= self._clearance_m(mover))
+
+    def _clearance_m(self, mover: _Mover) -> float:
+        """Distance of its middle that a mover keeps from others."""
+        return float(self.half[mover.row].max()) + _REACH_M
 
     def _evades(self, mover: _Mover, wish: Floats, vehicle: Vehicle, dt_s: float) -> Floats:
         """Its deviation from a wanted velocity; it changes steadily, so that who is hemmed in does not tremble."""
@@ -208,18 +221,16 @@ class Bodies:
         """
         row = mover.row
         here = self.position[row]
-        keep = float(self.half[row].max()) + _REACH_M
+        keep = self._clearance_m(mover)
         near = np.flatnonzero(np.abs(self.position - here).sum(axis=1) < _NEAR_M)
         near = near[near != row]
         points = [_nearest(here, self.position[near], self.heading[near], self.half[near])]
         right_m, ahead_m = (vehicle.axes @ (here - vehicle.position)).tolist()
         if vehicle.speed_mps < _SLOW_MPS or ahead_m < abs(right_m) / self._sees:
-            middle = vehicle.position - vehicle.ahead * vehicle.build.length_m / 2
-            half = np.array([[vehicle.build.half_width_m, vehicle.build.length_m / 2]])
-            points.append(_nearest(here, middle[None], np.array([vehicle.heading_rad]), half))
+            points.append(_nearest(here, *_hull(vehicle)))
         away = here - np.concatenate(points)
         distance = np.hypot(*away.T)
-        speed = math.hypot(*wish)
+        wanted, speed = wish, math.hypot(*wish)
         hindered = False
         for number in np.argsort(-distance):
             share = min(max((keep - distance[number]) / _REACH_M + 1, 0.0), 1.0)
@@ -231,13 +242,21 @@ class Bodies:
             if mover.side == 0:
                 mover.side = 1 if wish @ along >= -_EVEN_SHARE * speed else -1
             wish = (1 - share) * wish + share * speed * mover.side * along
-        mover.hindered_s = mover.hindered_s + dt_s if hindered else max(mover.hindered_s - dt_s, 0.0)
-        if mover.hindered_s == 0:
+        gets_on = wish @ wanted > _EVEN_SHARE * speed**2
+        mover.hindered_s = max(mover.hindered_s - dt_s, 0.0) if gets_on else mover.hindered_s + dt_s
+        if not hindered and mover.hindered_s == 0:
             mover.side, mover.patience_s = 0, _PATIENCE_S
         elif mover.hindered_s > mover.patience_s:  # blocked on this side: try the other one, and farther
             mover.side, mover.hindered_s = -mover.side, dt_s
             mover.patience_s *= 2
         return wish
+
+
+def _hull(vehicle: Vehicle) -> tuple[Floats, Floats, Floats]:
+    """Middle (1, 2), heading (1,) and half sizes (1, 2) of the vehicle's rectangle."""
+    build = vehicle.build
+    middle = vehicle.position - vehicle.ahead * build.length_m / 2
+    return middle[None], np.array([vehicle.heading_rad]), np.array([[build.half_width_m, build.length_m / 2]])
 
 
 def _nearest(point: Floats, middle: Floats, heading: Floats, half: Floats) -> Floats:

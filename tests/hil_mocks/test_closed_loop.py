@@ -145,6 +145,16 @@ def test_nobody_walks_into_a_vehicle_that_stands() -> None:
     assert bodies.position[0, 1] < -2.0  # he went round it
 
 
+def test_who_meets_a_vehicle_on_his_way_goes_past_it_and_on() -> None:
+    way = (Leg(0.0, z, 0.8) for z in (3.0, 1.5, 0.0, -0.4, -1.5, -5.0))
+    drawn = world(body(0.1, 5.0, *way), start_mps=0.0)
+    vehicle, bodies = Vehicle(drawn.build, drawn.course), Bodies(drawn)
+    for _ in range(1500):
+        bodies.step(0.01, vehicle)
+        assert bodies.velocity[0, 1] <= 0.01  # he never turns back to a place that the vehicle is at
+    assert bodies.position[0, 1] == pytest.approx(-5.0, abs=0.1)
+
+
 def test_nobody_walks_through_a_box() -> None:
     walker = body(0.1, 5.0, Leg(0.0, 12.0, 1.2))
     drawn = world(walker, body(0.0, 8.0, name="box", width=1.0, length=1.0), start_mps=0.0)
