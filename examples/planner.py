@@ -18,8 +18,8 @@ slow enough to stop before what it would come near to. The fastest good speed is
 - Where the range is unknown, the time to contact stands in for it. What has neither range nor contact is left out.
 - A vehicle that rests waits for whatever moves nearer than ``CLOSE_M``: so near it fills the image, and its numbers are
   worth least.
-- A higher speed than before has to be good for ``PATIENCE_S``, and for ``REST_S`` where the vehicle rests; a lower one
-  is wanted at once.
+- A higher speed than before has to be good for ``PATIENCE_S``, and for ``REST_S`` where the vehicle rests. A lower one
+  counts once two scenes in a row ask for it: what only one shows is mostly nothing.
 """
 
 import sys
@@ -109,7 +109,7 @@ class Planner:
 
     def __init__(self, vehicle: Vehicle) -> None:
         self.vehicle = vehicle
-        self._target_mps = 0.0
+        self._target_mps = self._last_mps = 0.0
         self._good_s = 0.0
 
     def target_mps(
@@ -118,8 +118,9 @@ class Planner:
         """The speed to drive at now, m/s."""
         good = good_speed(objects, speed, cruise, self.vehicle, curvature)
         self._good_s = self._good_s + dt_s if good > self._target_mps else 0.0
-        if good <= self._target_mps or self._good_s >= (REST_S if abs(speed) < RESTS_MPS else PATIENCE_S):
+        if self._good_s >= (REST_S if abs(speed) < RESTS_MPS else PATIENCE_S):
             self._target_mps = good
+        self._target_mps, self._last_mps = min(self._target_mps, max(good, self._last_mps)), good
         return min(self._target_mps, cruise)
 
 
