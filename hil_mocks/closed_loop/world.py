@@ -14,6 +14,7 @@ _REACH_M = 0.3  # clearance that movers keep from others
 _SLOW_MPS = 0.25  # a vehicle slower than this is stepped around
 _EVEN_SHARE = 0.1  # of its speed: less sideways motion counts as straight ahead
 _PATIENCE_S = 3.0
+_NOWHERE_M = 0.3  # who gets no farther than this until his patience ends is blocked
 _NEAR_M = 8.0
 _TURNING_RADPS = 3.0
 _TURNS_MPS = 0.1  # a slower mover keeps its heading
@@ -130,6 +131,7 @@ class _Mover:
         self.evades: Floats = np.zeros(2)  # its velocity less the one that its legs demand, m/s
         self.side = 0  # that it goes round what is in its way, 1: to the right of what it wants
         self.hindered_s = 0.0
+        self.hindered_at: Floats = np.zeros(2)
         self.patience_s = _PATIENCE_S
 
 
@@ -230,7 +232,7 @@ class Bodies:
             points.append(_nearest(here, *_hull(vehicle)))
         away = here - np.concatenate(points)
         distance = np.hypot(*away.T)
-        wanted, speed = wish, math.hypot(*wish)
+        speed = math.hypot(*wish)
         hindered = False
         for number in np.argsort(-distance):
             share = min(max((keep - distance[number]) / _REACH_M + 1, 0.0), 1.0)
@@ -242,9 +244,10 @@ class Bodies:
             if mover.side == 0:
                 mover.side = 1 if wish @ along >= -_EVEN_SHARE * speed else -1
             wish = (1 - share) * wish + share * speed * mover.side * along
-        gets_on = wish @ wanted > _EVEN_SHARE * speed**2
-        mover.hindered_s = max(mover.hindered_s - dt_s, 0.0) if gets_on else mover.hindered_s + dt_s
-        if not hindered and mover.hindered_s == 0:
+        if mover.hindered_s == 0 or math.hypot(*(here - mover.hindered_at)) > _NOWHERE_M:
+            mover.hindered_s, mover.hindered_at = 0.0, here.copy()
+        mover.hindered_s = mover.hindered_s + dt_s if hindered else max(mover.hindered_s - dt_s, 0.0)
+        if mover.hindered_s == 0:
             mover.side, mover.patience_s = 0, _PATIENCE_S
         elif mover.hindered_s > mover.patience_s:  # blocked on this side: try the other one, and farther
             mover.side, mover.hindered_s = -mover.side, dt_s

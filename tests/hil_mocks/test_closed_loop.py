@@ -145,11 +145,13 @@ def test_nobody_walks_into_a_vehicle_that_stands() -> None:
     assert bodies.position[0, 1] < -2.0  # he went round it
 
 
-def test_who_meets_a_vehicle_on_his_way_goes_past_it_and_on() -> None:
-    way = (Leg(0.0, z, 0.8) for z in (3.0, 1.5, 0.0, -0.4, -1.5, -5.0))
-    drawn = world(body(0.1, 5.0, *way), start_mps=0.0)
+@pytest.mark.parametrize("half_width_m", [0.3, 0.6])
+@pytest.mark.parametrize("speed_mps", [0.4, 0.8])
+def test_who_meets_a_vehicle_on_his_way_goes_past_it_and_on(half_width_m: float, speed_mps: float) -> None:
+    way = (Leg(0.0, z, speed_mps) for z in (3.0, 1.5, 0.0, -0.4, -1.5, -5.0))
+    drawn = world(body(0.1, 4.0, *way), start_mps=0.0, build=Build(half_width_m=half_width_m))
     vehicle, bodies = Vehicle(drawn.build, drawn.course), Bodies(drawn)
-    for _ in range(1500):
+    for _ in range(3500):
         bodies.step(0.01, vehicle)
         assert bodies.velocity[0, 1] <= 0.01  # he never turns back to a place that the vehicle is at
     assert bodies.position[0, 1] == pytest.approx(-5.0, abs=0.1)
