@@ -22,6 +22,7 @@ cdef double LINGERS_S
 cdef double SAME_PLACE_M
 cdef double THROUGH_S
 cdef int MIN_THROUGH
+cdef int MIN_OWN
 cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
@@ -38,6 +39,7 @@ cdef int NOT_YET
 cdef int WATCHED
 cdef int MOVED
 cdef int NO_LONGER
+cdef int EMPTY
 cdef double LEAVES_S
 cdef double LOSES_HZ
 cdef double PASSED_M
@@ -63,6 +65,7 @@ cdef double outside_s(ObjectColumns objects, Py_ssize_t o, Situation around) noe
 cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(is_lost=bint)
 cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
+cdef bint is_in_middle(ObjectColumns objects, Py_ssize_t o, double x, double y) noexcept nogil
 @cython.locals(through=int)
 cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
 @cython.locals(across=bint)
@@ -75,6 +78,7 @@ cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane 
 cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
 cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
+@cython.locals(has_gone=bint)
 cdef void go_on(ObjectColumns objects, Py_ssize_t o, bint gone, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 @cython.locals(across=double, down=double, x=double, y=double)
 cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, ImagePlane plane) noexcept nogil
@@ -84,5 +88,5 @@ cdef void look(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePl
 cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(just_lost=bint)
 cdef void stir(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(is_well_seen=bint, stopped=bint, stands=bint)
-cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
+@cython.locals(is_well_seen=bint, is_empty=bint, stopped=bint, stands=bint)
+cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, int through, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

@@ -15,6 +15,7 @@ from lcf_edge.messages import ObjectState
 WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second; ``object_belief.UNSEEN_MPS`` where it is not seen
 MAX_LAG = 0.5  # bounds the growth in a frame, and the correction of a rate from the middle of its window to now
 EDGE_PX = 1.0  # inset of a corner from the outline
+MIN_OWN = 2  # edges of an object that stops before a vehicle at rest
 SURE_EDGES = 7  # fewer may lie on something else
 COAST_S = 0.3  # an unseen object keeps its trust for this long,
 HIDDEN_S = 1.0  # occluded by another one,
@@ -29,7 +30,7 @@ RESTING_S = 2.0  # stationary, or near and seen through, before a stationary veh
 LINGERS_S = 6.0  # and near, not seen through;
 SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
 THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
-MIN_THROUGH = 3  # at least so many,
+MIN_THROUGH = 3  # at least so many, and before a vehicle at rest more than its own,
 THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
 LOSES_HZ = 20.0  # trust lost per second after that
 PASSED_M = 0.1  # an unseen object nearer than this is passed
@@ -37,7 +38,7 @@ CHANGED_GREY = 10.0  # RMS difference of the samples from which a place looks di
 LIGHT_SHARE = 0.15  # by which the light on it may change
 LOOKS_AFTER = 1.5  # frames after it was lost
 UNKNOWN, SAME, CHANGED = 0, 1, 2
-NOT_YET, WATCHED, MOVED, NO_LONGER = 0, 1, 2, 3
+NOT_YET, WATCHED, MOVED, NO_LONGER, EMPTY = 0, 1, 2, 3, 4
 HIDDEN, COASTING = int(ObjectState.HIDDEN), int(ObjectState.COASTING)
 INFINITY = float("inf")
 NAN = float("nan")
@@ -164,29 +165,40 @@ def stir(objects: ObjectColumns, o: int, coarse: CoarseMotion, plane: ImagePlane
 
 
 def watch(
-    objects: ObjectColumns, o: int, count: int, coarse: CoarseMotion, plane: ImagePlane, around: Situation
+    objects: ObjectColumns,
+    o: int,
+    count: int,
+    through: int,
+    coarse: CoarseMotion,
+    plane: ImagePlane,
+    around: Situation,
 ) -> int:
     """Returns whether the place of an object looks as when the vehicle stopped, or it stopped near a vehicle at rest.
 
     Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. ``UNKNOWN`` of
-    what moves sideways, may move, or had few edges. ``count``: of its edges.
+    what moves sideways, may move, or had few edges. ``CHANGED`` of what is not there: more edges of what lies
+    behind are seen in its middle than of its own. ``count``: of its edges; ``through``: of those behind.
     """
-    if not situation.is_at_rest(around):
+    if not situation.is_at_rest(around) or not block_matching.has_image(coarse.blocks):
         objects.watched[o] = NOT_YET
         return UNKNOWN
-    if objects.watched[o] != WATCHED and lingers(objects, o, around) and block_matching.has_image(coarse.blocks):
+    is_empty = through >= MIN_THROUGH and through > count
+    if objects.watched[o] != WATCHED and not is_empty and lingers(objects, o, around):
         stir(objects, o, coarse, plane, around)
     if math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
         objects.watched[o] = MOVED
         return UNKNOWN
     if objects.watched[o] == WATCHED:
         return CHANGED if looks_different(objects, o, coarse, plane) else SAME
-    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
+    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], MIN_OWN)
     stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M and is_well_seen
     stands = objects.watched[o] == NOT_YET and objects.log_odds[o] > 0 and objects.recent_edges[o] >= SURE_EDGES
     if objects.watched[o] == NOT_YET:
         objects.watched[o] = NO_LONGER
-    if not (stopped or stands) or objects.unseen_s[o] > 0 or not block_matching.has_image(coarse.blocks):
+    if is_empty or objects.watched[o] == EMPTY:
+        objects.watched[o] = EMPTY
+        return CHANGED
+    if not (stopped or stands) or objects.unseen_s[o] > 0:
         return UNKNOWN
     look(objects, o, coarse, plane)
     objects.watched[o] = WATCHED
@@ -238,14 +250,18 @@ def lingers(objects: ObjectColumns, o: int, around: Situation) -> bool:
     return is_lost and (not objects.left[o] or comes(objects, o, around))
 
 
+def is_in_middle(objects: ObjectColumns, o: int, x: float, y: float) -> bool:
+    """Whether a point is near the centre of an object's box."""
+    across, down = math.fabs(x - objects.x[o]), math.fabs(y - objects.y[o])
+    return across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]
+
+
 def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
     """Whether stationary edges are seen in the middle of the box of a lost object."""
     through = 0
     for i in range(edges.count):
-        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S:
-            across, down = math.fabs(edges.x[i] - objects.x[o]), math.fabs(edges.y[i] - objects.y[o])
-            if across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]:
-                through += 1
+        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S and is_in_middle(objects, o, edges.x[i], edges.y[i]):
+            through += 1
     return through >= MIN_THROUGH
 
 
@@ -350,7 +366,8 @@ def go_on(
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
     elif lingers(objects, o, around):
-        patience_s = RESTING_S if gone or is_seen_through(objects, o, edges) else LINGERS_S
+        has_gone = gone or objects.recent_edges[o] < SURE_EDGES or is_seen_through(objects, o, edges)
+        patience_s = RESTING_S if has_gone else LINGERS_S
     elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
     elif is_met_soon(objects, o, settings):

@@ -49,6 +49,7 @@ cdef class Squares:
     cdef MotionSums wholes
     cdef readonly int[::1] members
     cdef int[::1] resting
+    cdef int[::1] through
     cdef unsigned char[::1] obedient
     cdef Evidence evidence
     cdef Belief belief
@@ -92,6 +93,8 @@ cdef bint is_in_reach(MotionSums bounds, Py_ssize_t o, double x, double y) noexc
 cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 @cython.locals(moves=bint)
 cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(is_fixed=bint, other=bint)
+cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(beside=bint)
 cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Py_ssize_t i) noexcept nogil
 @cython.locals(share=double)

@@ -66,13 +66,14 @@ class Squares:
     """Scratch memory of one frame.
 
     ``parts``: the motion of each circle; ``wholes``: of each object; ``members``: its edges; ``resting``: those of
-    them that are matched while the vehicle is at rest; ``bounds``: within which edges may join it. ``obedient``:
-    whether the edge of a verdict moves as its object does.
+    them that are matched while the vehicle is at rest; ``through``: of other edges that are then seen in its
+    middle; ``bounds``: within which edges may join it. ``obedient``: whether the edge of a verdict moves as its object
+    does.
     """
 
     def __init__(self, circles: int, objects: int, edges: int) -> None:
         self.parts, self.wholes, self.bounds = MotionSums(circles), MotionSums(objects), MotionSums(objects)
-        self.members, self.resting = integers(objects), integers(objects)
+        self.members, self.resting, self.through = [integers(objects) for _ in range(3)]
         self.obedient = octets(edges)
         self.evidence, self.belief = Evidence(), Belief()
 
@@ -617,6 +618,33 @@ def take_others(
                 break
 
 
+def see_through(
+    objects: ObjectColumns,
+    squares: Squares,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """Count the edges seen in the middle of each object's box that are not its own, before a vehicle at rest.
+
+    Those that do not move as it does, as the vehicle has stopped, and those that have been fixed for ``THROUGH_S``.
+    """
+    for o in range(objects.capacity):
+        squares.through[o] = 0
+    if not situation.is_at_rest(around):
+        return
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        is_fixed = edges.fixed_s[i] >= object_prediction.THROUGH_S
+        for o in range(objects.capacity):
+            other = objects.active[o] and edges.square[i] != o
+            if not other or not object_prediction.is_in_middle(objects, o, edges.x[i], edges.y[i]):
+                continue
+            if is_fixed or not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around):
+                squares.through[o] += 1
+
+
 def square_of(objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
     """Returns the object that an edge belongs to, by its circle or as before; -1: none.
 
@@ -761,11 +789,12 @@ def update(
     unite(objects, squares, circles, edges, around, settings)
     take_members(objects, squares, circles, verdicts, edges, coarse, coarse_groups, baselines, around)
     take_others(objects, squares, verdicts, edges, baselines, around)
+    see_through(objects, squares, verdicts, edges, baselines, around)
     for o in range(objects.capacity):
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
-        place = object_prediction.watch(objects, o, count, coarse, plane, around)
+        place = object_prediction.watch(objects, o, count, squares.through[o], coarse, plane, around)
         if place == object_prediction.CHANGED and count >= MIN_EDGES:
             observe(objects, o, squares.wholes, around)
         gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)

@@ -392,6 +392,20 @@ def test_where_it_looks_different_a_few_edges_do_not_hold_what_stood_before_a_ve
     assert not published(tables.objects)
 
 
+def test_a_few_edges_do_not_hold_what_a_vehicle_that_has_stopped_sees_through(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """They may lie on what it hid, and would show for ever that it is there."""
+    way = replace(drive(clutter(150)) + drive(box((0.0, -0.2, 4.0), (0.6, 0.9, 0.0), landmarks=40)), frames=30)
+    tables, most = LineCircleFilter(Config(), way.lens), looks_of(way, slice(158, None))
+    for step, (corners, motion) in enumerate(way):
+        tables.step(without(corners, most) if step >= 27 else corners, motion, small=grey_image(tables, 60))
+    assert len(published(tables.objects)) == 1
+    for _ in range(round(3 * FPS)):
+        tables.step(without(corners, most), replace(motion, speed_mps=0.0), small=grey_image(tables, 60))
+    assert not published(tables.objects)
+
+
 @pytest.mark.parametrize("velocity_mps", [(0.0, -0.8), (0.4, 0.0)], ids=["comes straight", "crosses"])
 def test_before_a_vehicle_at_rest_what_comes_or_moves_is_an_object(
     drive: Drive, box: Landmarks, clutter: Landmarks, velocity_mps: tuple[float, float]
