@@ -22,7 +22,6 @@ cdef double LINGERS_S
 cdef double SAME_PLACE_M
 cdef double THROUGH_S
 cdef int MIN_THROUGH
-cdef int MIN_OWN
 cdef double THROUGH_SHARE
 cdef double RESTING_S
 cdef double NEAR_M
@@ -66,8 +65,8 @@ cdef bint comes(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept 
 @cython.locals(is_lost=bint)
 cdef bint lingers(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef bint is_in_middle(ObjectColumns objects, Py_ssize_t o, double x, double y) noexcept nogil
-@cython.locals(through=int)
-cdef bint is_seen_through(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
+@cython.locals(through=int, is_fixed=bint)
+cdef int fixed_behind(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) noexcept nogil
 @cython.locals(across=bint)
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(apart_m=double, across=bint)
@@ -89,4 +88,4 @@ cdef bint looks_different(ObjectColumns objects, Py_ssize_t o, CoarseMotion coar
 @cython.locals(just_lost=bint)
 cdef void stir(ObjectColumns objects, Py_ssize_t o, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
 @cython.locals(is_well_seen=bint, is_empty=bint, stopped=bint, stands=bint)
-cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, int through, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil
+cdef int watch(ObjectColumns objects, Py_ssize_t o, int count, int own, int through, CoarseMotion coarse, ImagePlane plane, Situation around) noexcept nogil

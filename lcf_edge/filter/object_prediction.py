@@ -15,7 +15,6 @@ from lcf_edge.messages import ObjectState
 WANDER_MPS = 1.0  # 1 sigma of the change of a velocity in one second; ``object_belief.UNSEEN_MPS`` where it is not seen
 MAX_LAG = 0.5  # bounds the growth in a frame, and the correction of a rate from the middle of its window to now
 EDGE_PX = 1.0  # inset of a corner from the outline
-MIN_OWN = 2  # edges of an object that stops before a vehicle at rest
 SURE_EDGES = 7  # fewer may lie on something else
 COAST_S = 0.3  # an unseen object keeps its trust for this long,
 HIDDEN_S = 1.0  # occluded by another one,
@@ -30,7 +29,7 @@ RESTING_S = 2.0  # stationary, or near and seen through, before a stationary veh
 LINGERS_S = 6.0  # and near, not seen through;
 SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
 THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
-MIN_THROUGH = 3  # at least so many, and before a vehicle at rest more than its own,
+MIN_THROUGH = 3  # at least so many, and before a vehicle at rest more than it lately had of its own,
 THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
 LOSES_HZ = 20.0  # trust lost per second after that
 PASSED_M = 0.1  # an unseen object nearer than this is passed
@@ -168,6 +167,7 @@ def watch(
     objects: ObjectColumns,
     o: int,
     count: int,
+    own: int,
     through: int,
     coarse: CoarseMotion,
     plane: ImagePlane,
@@ -176,25 +176,26 @@ def watch(
     """Returns whether the place of an object looks as when the vehicle stopped, or it stopped near a vehicle at rest.
 
     Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. ``UNKNOWN`` of
-    what moves sideways, may move, or had few edges. ``CHANGED`` of what is not there: more edges of what lies
-    behind are seen in its middle than of its own. ``count``: of its edges; ``through``: of those behind.
+    what moves sideways, may move, or had few edges. ``CHANGED`` of what is not there: it has few edges left, and in its
+    middle more of those behind are seen than it lately had. ``count``: of its edges, ``own``: of its members among
+    them, ``through``: of those behind.
     """
     if not situation.is_at_rest(around) or not block_matching.has_image(coarse.blocks):
         objects.watched[o] = NOT_YET
         return UNKNOWN
-    is_empty = through >= MIN_THROUGH and through > count
-    if objects.watched[o] != WATCHED and not is_empty and lingers(objects, o, around):
+    if objects.watched[o] != WATCHED and through < MIN_THROUGH and lingers(objects, o, around):
         stir(objects, o, coarse, plane, around)
     if math.fabs(objects.sideways[o]) >= object_belief.STILL_HZ:
         objects.watched[o] = MOVED
         return UNKNOWN
     if objects.watched[o] == WATCHED:
         return CHANGED if looks_different(objects, o, coarse, plane) else SAME
-    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], MIN_OWN)
+    is_well_seen = count >= max(REMNANT_SHARE * objects.recent_edges[o], SURE_EDGES)
     stopped = objects.watched[o] == MOVED and objects.range[o] < NEAR_M and is_well_seen
     stands = objects.watched[o] == NOT_YET and objects.log_odds[o] > 0 and objects.recent_edges[o] >= SURE_EDGES
     if objects.watched[o] == NOT_YET:
         objects.watched[o] = NO_LONGER
+    is_empty = through >= MIN_THROUGH and through > objects.recent_edges[o] and own < SURE_EDGES
     if is_empty or objects.watched[o] == EMPTY:
         objects.watched[o] = EMPTY
         return CHANGED
@@ -256,13 +257,14 @@ def is_in_middle(objects: ObjectColumns, o: int, x: float, y: float) -> bool:
     return across < THROUGH_SHARE * objects.width[o] and down < THROUGH_SHARE * objects.height[o]
 
 
-def is_seen_through(objects: ObjectColumns, o: int, edges: EdgeColumns) -> bool:
-    """Whether stationary edges are seen in the middle of the box of a lost object."""
+def fixed_behind(objects: ObjectColumns, o: int, edges: EdgeColumns) -> int:
+    """Returns the number of stationary edges in the middle of the box of an object that are not its own."""
     through = 0
     for i in range(edges.count):
-        if edges.matched[i] and edges.fixed_s[i] >= THROUGH_S and is_in_middle(objects, o, edges.x[i], edges.y[i]):
+        is_fixed = edges.matched[i] and edges.fixed_s[i] >= THROUGH_S
+        if is_fixed and edges.square[i] != o and is_in_middle(objects, o, edges.x[i], edges.y[i]):
             through += 1
-    return through >= MIN_THROUGH
+    return through
 
 
 def is_behind(objects: ObjectColumns, o: int) -> bool:
@@ -366,7 +368,7 @@ def go_on(
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
     elif lingers(objects, o, around):
-        has_gone = gone or objects.recent_edges[o] < SURE_EDGES or is_seen_through(objects, o, edges)
+        has_gone = gone or objects.recent_edges[o] < SURE_EDGES or fixed_behind(objects, o, edges) >= MIN_THROUGH
         patience_s = RESTING_S if has_gone else LINGERS_S
     elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S

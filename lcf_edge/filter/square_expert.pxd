@@ -93,7 +93,7 @@ cdef bint is_in_reach(MotionSums bounds, Py_ssize_t o, double x, double y) noexc
 cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 @cython.locals(moves=bint)
 cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(is_fixed=bint, other=bint)
+@cython.locals(is_counted=bint, other=bint)
 cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(beside=bint)
 cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Py_ssize_t i) noexcept nogil
@@ -105,5 +105,5 @@ cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Si
 cdef void measure(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, int place, Situation around) noexcept nogil
 cdef void see_at_rest(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(remnant=bint, gone=bint, count=int, place=int)
+@cython.locals(remnant=bint, gone=bint, count=int, own=int, through=int, place=int)
 cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

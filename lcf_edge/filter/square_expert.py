@@ -594,7 +594,8 @@ def take_others(
     """Let edges that are no rebels join the object that they are near to and move with.
 
     Feet on the ground, for instance, hardly break the flow. Those that do not move as stationary points become members
-    of the object; the others, only inside the box of its members, count for this frame.
+    of the object; the others, only inside the box of its members, count for this frame. Before a vehicle at rest, what
+    does not move may as well lie behind the object.
     """
     shown = 0
     for o in range(objects.capacity):
@@ -606,8 +607,10 @@ def take_others(
         i = verdicts.row[j]
         if edges.square[i] >= 0:
             continue
-        x, y = edges.x[i], edges.y[i]
-        moves = still_px(verdicts, j) > STRAY_SIGMAS * verdicts.noise[j]
+        x, y, noise_px = edges.x[i], edges.y[i], STRAY_SIGMAS * verdicts.noise[j]
+        if situation.is_at_rest(around) and lengths.of(x - verdicts.x[j], y - verdicts.y[j]) < noise_px:
+            continue
+        moves = still_px(verdicts, j) > noise_px
         for o in range(objects.capacity):
             if not (is_in_reach(squares.bounds, o, x, y) if moves else is_in_reach(squares.wholes, o, x, y)):
                 continue
@@ -631,17 +634,15 @@ def see_through(
     Those that do not move as it does, as the vehicle has stopped, and those that have been fixed for ``THROUGH_S``.
     """
     for o in range(objects.capacity):
-        squares.through[o] = 0
-    if not situation.is_at_rest(around):
-        return
-    for j in range(verdicts.count):
+        is_counted = objects.active[o] and situation.is_at_rest(around)
+        squares.through[o] = object_prediction.fixed_behind(objects, o, edges) if is_counted else 0
+    for j in range(verdicts.count if situation.is_at_rest(around) else 0):
         i = verdicts.row[j]
-        is_fixed = edges.fixed_s[i] >= object_prediction.THROUGH_S
         for o in range(objects.capacity):
-            other = objects.active[o] and edges.square[i] != o
+            other = objects.active[o] and edges.square[i] != o and edges.fixed_s[i] < object_prediction.THROUGH_S
             if not other or not object_prediction.is_in_middle(objects, o, edges.x[i], edges.y[i]):
                 continue
-            if is_fixed or not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around):
+            if not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around):
                 squares.through[o] += 1
 
 
@@ -794,7 +795,8 @@ def update(
         if not objects.active[o]:
             continue
         count = squares.wholes.count[o]
-        place = object_prediction.watch(objects, o, count, squares.through[o], coarse, plane, around)
+        own, through = squares.resting[o], squares.through[o]
+        place = object_prediction.watch(objects, o, count, own, through, coarse, plane, around)
         if place == object_prediction.CHANGED and count >= MIN_EDGES:
             observe(objects, o, squares.wholes, around)
         gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)
