@@ -177,8 +177,8 @@ def watch(
 
     Nothing flows then, and corners come and go: a few that are left may be of it, or of what it hid. ``UNKNOWN`` of
     what moves sideways, may move, or had few edges. ``CHANGED`` of what is not there: it has few edges left, and in its
-    middle more of those behind are seen than it lately had. ``count``: of its edges, ``own``: of its members among
-    them, ``through``: of those behind.
+    middle more of those behind are seen than it lately had. ``count``: of its edges, ``own``: of its members found
+    in this frame, ``through``: of those behind.
     """
     if not situation.is_at_rest(around) or not block_matching.has_image(coarse.blocks):
         objects.watched[o] = NOT_YET
