@@ -24,6 +24,7 @@ cdef double LIKENESS
 cdef int RING
 cdef double RING_LIKENESS
 cdef double RING_GREY
+cdef double STAYS_PX
 cdef int MAX_SEEN
 cdef int MAX_SEARCHES
 cdef double SLOW_S
@@ -77,8 +78,8 @@ cdef void seek_moving(CoarseMotion coarse, double end_x, double end_y, double of
 cdef bint is_distinct(CoarseMotion coarse) noexcept nogil
 @cython.locals(highest=int)
 cdef double finer(int before, int middle, int after) noexcept nogil
-@cython.locals(x=int, y=int, middle=int)
-cdef void set_motion(CoarseMotion coarse, int k) noexcept nogil
+@cython.locals(x=int, y=int, middle=int, left=int, top=int)
+cdef bint set_motion(CoarseMotion coarse, int k) noexcept nogil
 cdef bint are_alike(CoarseMotion coarse, double vx, double vy, double other_vx, double other_vy) noexcept nogil
 @cython.locals(column=int, row=int, r=int, c=int, b=int)
 cdef void chain(CoarseMotion coarse, int k, double dt_s) noexcept nogil

@@ -37,6 +37,7 @@ LIKENESS = 0.5  # largest error where it moves, as a share of the least where it
 RING = 3  # small px around the match, where a distinct piece fits worse by
 RING_LIKENESS = 1.25  # this factor,
 RING_GREY = 0.5  # and this much for each pixel
+STAYS_PX = 0.8  # small px: what moves less in the image as the camera turns may be a drop on the lens, or an own part
 MAX_SEEN = 40  # pieces per frame searched along their flow line,
 MAX_SEARCHES = 20  # and all around
 SLOW_S = 0.3  # greatest age of the older image,
@@ -250,8 +251,8 @@ def finer(before: int, middle: int, after: int) -> float:
     return 0.5 * (before - after) / highest if highest > 0 else 0.0
 
 
-def set_motion(coarse: CoarseMotion, k: int) -> None:
-    """Set the velocity of a moving piece."""
+def set_motion(coarse: CoarseMotion, k: int) -> bool:
+    """Set the velocity of a moving piece; return whether it has moved in the image."""
     x, y = nearest_px(coarse.base_x) + coarse.across, nearest_px(coarse.base_y) + coarse.down
     middle = coarse.least_moving
     across = x + finer(difference(coarse, x - 1, y, WORST), middle, difference(coarse, x + 1, y, WORST))
@@ -259,6 +260,8 @@ def set_motion(coarse: CoarseMotion, k: int) -> None:
     coarse.vx[k] = (coarse.base_x - across) * coarse.side / coarse.then_s
     coarse.vy[k] = (coarse.base_y - down) * coarse.side / coarse.then_s
     coarse.elapsed_s[k] = coarse.then_s
+    left, top = block_matching.STEP * (k % coarse.columns), block_matching.STEP * (k // coarse.columns)
+    return max(math.fabs(across - left), math.fabs(down - top)) > STAYS_PX
 
 
 def are_alike(coarse: CoarseMotion, vx: float, vy: float, other_vx: float, other_vy: float) -> bool:
@@ -415,8 +418,7 @@ def see_all(coarse: CoarseMotion, age: int, plane: ImagePlane, around: Situation
         if age == LAST:
             coarse.came_x[k], coarse.came_y[k] = coarse.base_x, coarse.base_y
         is_measured = coarse.came_x[k] >= 0 and coarse.off_flow < MAX_OFF_FLOW
-        if is_measured and see(coarse, k, age, around):
-            set_motion(coarse, k)
+        if is_measured and see(coarse, k, age, around) and set_motion(coarse, k):
             chain(coarse, k, around.dt_s)
 
 

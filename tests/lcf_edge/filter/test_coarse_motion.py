@@ -52,7 +52,7 @@ class Passing:
 
     ``left``, ``top``, ``width``, ``height``: px, in the first image. ``pxps``: its motion. ``turn_rad``: by which the
     camera turns in each frame. ``grows``: by which it stands nearer in each. ``until_seq``: then it is gone.
-    ``contrast``: of the background. ``blobs``: of the thing itself, grey levels.
+    ``contrast``: of the background. ``blobs``: of the thing itself, grey levels. ``on_lens``: it turns with the camera.
     """
 
     left: float = 120.0
@@ -67,6 +67,7 @@ class Passing:
     frames: int = 8
     contrast: float = 1.0
     blobs: float = 0.0
+    on_lens: bool = False
     dt_s: float = DT_S
 
     def __iter__(self) -> Iterator[tuple[Motion, Grey]]:
@@ -76,7 +77,7 @@ class Passing:
             start = LENS.width - round(shift_px)
             image = 150 + self.contrast * (BACKGROUND[:, start : start + LENS.width] - 150.0)
             if seq < self.until_seq:
-                self.draw(image, seq, round(shift_px))
+                self.draw(image, seq, 0 if self.on_lens else round(shift_px))
             noisy = image + random.normal(0, 2, image.shape)
             cosine, sine = math.cos(self.turn_rad), math.sin(self.turn_rad)
             rotation = np.array([[cosine, 0, sine], [0, 1, 0], [-sine, 0, cosine]])
@@ -120,6 +121,16 @@ def driven(scene: Passing, config: Config = CONFIG) -> Iterator[tuple[int, LineC
 def rebels(scene: Passing) -> list[int]:
     """How many circles are reported in each frame."""
     return [int((tables.rebel.active & (tables.rebel.trust >= 3)).sum()) for _, tables in driven(scene)]
+
+
+@pytest.mark.parametrize(("pxps", "moves"), [(0.0, False), (160.0, True)], ids=["stays", "moves"])
+@pytest.mark.parametrize("turn_rad", [0.03, -0.03], ids=["turning left", "turning right"])
+def test_a_drop_that_stays_in_the_image_as_the_camera_turns_does_not_move(
+    turn_rad: float, pxps: float, moves: bool
+) -> None:
+    way_pxps = pxps if turn_rad < 0 else -pxps
+    drop = Passing(280.0, width=80.0, height=80.0, pxps=(way_pxps, 0.0), turn_rad=turn_rad, on_lens=True)
+    assert any(rebels(drop)) == moves
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 0.015, -0.015], ids=["straight", "turning left", "turning right"])
