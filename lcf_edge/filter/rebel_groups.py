@@ -142,9 +142,31 @@ def stand_together(groups: RebelGroups, a: int, b: int, distance: float, around:
     The few corners of something large and plain lie far apart in the image.
     """
     nearer, farther = max(groups.inverse[a], groups.inverse[b]), min(groups.inverse[a], groups.inverse[b])
-    if not farther > 0 or distance >= NEAR_LINK_M * around.pinhole.fx * nearer:
+    if not farther > 0 or distance >= min(NEAR_LINK_M * nearer, FAR_LINK_RAD) * around.pinhole.fx:
         return False
     return nearer - farther < STAND_SHARE * nearer
+
+
+def are_on_body(
+    groups: RebelGroups, a: int, b: int, edges: EdgeColumns, i: int, k: int, around: Situation, settings: Settings
+) -> bool:
+    """Whether two rebels, edges ``i`` and ``k``, may be corners of one large and plain thing.
+
+    They move almost the same; it rises above the horizon, and hides all that flows behind it: none is between them.
+    """
+    ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
+    reach = 0.5 * lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
+    if min(edges.y[i], edges.y[k]) >= around.horizon_y or 2 * reach >= FAR_LINK_RAD * around.pinhole.focal:
+        return False
+    most = LIKE_SPEED * max(lengths.of(ax, ay), lengths.of(bx, by))
+    if max(lengths.of(ax - bx, ay - by), noise_between(groups, a, b)) >= most:
+        return False
+    x, y = 0.5 * (edges.x[i] + edges.x[k]), 0.5 * (edges.y[i] + edges.y[k])
+    for n in range(edges.count):
+        flows = edges.matched[n] and edges.trust[n] > settings.tr_s and not edges.own_way(n)
+        if flows and lengths.of(edges.x[n] - x, edges.y[n] - y) < reach:
+            return False
+    return True
 
 
 def lowest_label(groups: RebelGroups, k: int) -> int:
@@ -169,6 +191,23 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
             k = verdicts.row[groups.verdict[b]]
             distance = lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
             if are_linked(groups, a, b, distance, around, settings) or stand_together(groups, a, b, distance, around):
+                join(groups, a, b)
+
+
+def join_sparse(
+    groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around: Situation, settings: Settings
+) -> None:
+    """Merge clusters too small for a group where they may be corners of one large and plain thing."""
+    measure_sizes(groups)
+    for a in range(groups.count):
+        if groups.group[lowest_label(groups, a)] >= settings.rebel_support:
+            continue
+        i = verdicts.row[groups.verdict[a]]
+        for b in range(a):
+            other, k = lowest_label(groups, b), verdicts.row[groups.verdict[b]]
+            if other == lowest_label(groups, a) or groups.group[other] >= settings.rebel_support:
+                continue
+            if are_on_body(groups, a, b, edges, i, k, around, settings):
                 join(groups, a, b)
 
 
@@ -438,6 +477,7 @@ def gather(
     """Make the groups of a frame of its rebels, the first ``rebels`` rows of ``breaking``."""
     take_rebels(groups, rebels, breaking, verdicts, edges, baselines)
     cluster(groups, verdicts, edges, around, settings)
+    join_sparse(groups, verdicts, edges, around, settings)
     join_near(groups, verdicts, edges, around, settings.rebel_support)
     number_groups(groups, settings.rebel_support)
     average(groups, groups.members, verdicts, edges, baselines, around)

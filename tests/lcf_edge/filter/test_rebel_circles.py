@@ -140,7 +140,12 @@ def standing(around: Any, x: Floats, y: Floats, vx: Floats, vy: Floats) -> Circl
     scene = Scene(around)
     seen = Seen(scene.edges, x, y, vx, vy, around)
     np.asarray(seen.verdicts.mover)[:], np.asarray(seen.verdicts.incoming)[:] = 0, 1
-    columns, circles = scene.edges.columns, scene.circles.columns
+    return circles_of(scene, seen)
+
+
+def circles_of(scene: Scene, seen: Seen) -> CircleTable:
+    """Circles that these rebels alone make."""
+    around, columns, circles = scene.around, scene.edges.columns, scene.circles.columns
     none = Patches(0), PatchGroups(0), Turmoil(640, 480), *coarse()
     rebel_circles.update(
         scene.groups, columns, circles, seen.verdicts, seen.breaking, seen.count, *none, seen.baselines, around,
@@ -239,6 +244,23 @@ def test_few_rebels_far_apart_on_something_plain_that_stands_near_are_one(
     assert int(standing(around, x, y, vx, vy).active.sum()) == makes
 
 
+@pytest.mark.parametrize(("range_m", "groups"), [(1.2, 1), (0.3, 2)], ids=["stand", "seem to"])
+def test_two_who_seem_to_stand_right_before_a_vehicle_that_starts_stay_two(
+    situation: Situation, range_m: float, groups: int
+) -> None:
+    """Who moved while it was at rest seems as near as anything at which its first motion explains his."""
+    around = situation()
+    apart_px = min(0.25 * 500 / range_m, 300.0)
+    x, still = np.array([150.0, 150.0 + apart_px], np.float32), np.full(2, 150.0, np.float32)
+    looming_hz = around.speed_mps / range_m
+    vx, vy = looming_hz * (x - around.focus_x), looming_hz * (still - around.focus_y)
+    seen = Seen(EdgeTable(50, 50, 10), x, still, vx, vy, around)
+    np.asarray(seen.verdicts.mover)[:], np.asarray(seen.verdicts.incoming)[:] = 0, 1
+    taken = seen.taken()
+    rebel_groups.cluster(taken, seen.verdicts, seen.edges.columns, around, SETTINGS)
+    assert len({lowest(taken, row) for row in range(2)}) == groups
+
+
 @pytest.mark.parametrize("number", range(1, 6))
 def test_too_few_rebels_make_no_circle(scene: Scene, number: int) -> None:
     assert bool(scene.update(CROSSING, number=number).trust) == (number >= SETTINGS.rebel_support)
@@ -249,7 +271,14 @@ def linked(x: Floats, y: Floats, vx: Floats, vy: Floats, around: Any) -> list[in
     seen = Seen(EdgeTable(50, 50, 10), x, y, vx, vy, around)
     groups = seen.taken()
     rebel_groups.cluster(groups, seen.verdicts, seen.edges.columns, around, SETTINGS)
-    return [rebel_groups.lowest_label(groups, row) for row in range(seen.count)]
+    return [lowest(groups, row) for row in range(seen.count)]
+
+
+def lowest(groups: RebelGroups, row: int) -> int:
+    """The lowest rebel of a rebel's cluster."""
+    while groups.label[row] != row:
+        row = groups.label[row]
+    return row
 
 
 def test_parts_of_an_object_that_grows_are_linked_though_they_fly_apart(situation: Situation) -> None:
@@ -279,6 +308,28 @@ def test_few_rebels_far_apart_on_something_that_passes_fast_go_together(
     still = np.zeros(6, np.float32)
     vx = np.where(np.arange(6) % 2, slower, 1.0).astype(np.float32) * speed_pxps
     assert len(set(linked(x, still + 150, vx, still, situation()))) == groups
+
+
+@pytest.mark.parametrize(
+    ("top_px", "flowing", "other_pxps", "makes"),
+    [(150.0, 0, 100.0, 1), (260.0, 0, 100.0, 0), (150.0, 9, 100.0, 0), (150.0, 0, 0.0, 1), (150.0, 0, -100.0, 2)],
+    ids=["a body", "on the ground", "edges that flow between", "half of them", "two bodies"],
+)
+def test_few_rebels_far_apart_go_together_where_what_is_upright_hides_all_that_flows(
+    situation: Situation, top_px: float, flowing: int, other_pxps: float, makes: int
+) -> None:
+    """Something large and plain that moves slowly in the image: its corners are 60 px apart, with nothing between."""
+    around = situation()
+    columns, rows = np.meshgrid([200.0, 260.0, 320.0], [0.0, 60.0])
+    x, y = columns.ravel().astype(np.float32), (top_px + rows.ravel()).astype(np.float32)
+    vx = np.where(np.arange(6) % 2, other_pxps, 100.0).astype(np.float32)
+    scene = Scene(around)
+    seen = Seen(scene.edges, x, y, vx, np.zeros(6, np.float32), around)
+    between = scene.edges.append(flowing)
+    across, down = np.meshgrid([230.0, 260.0, 290.0], [10.0, 30.0, 50.0])
+    scene.edges.x[between], scene.edges.y[between] = across.ravel()[:flowing], top_px + down.ravel()[:flowing]
+    scene.edges.trust[between], scene.edges.matched[between] = TR_MAX, True
+    assert int(circles_of(scene, seen).active.sum()) == makes
 
 
 def test_a_few_rebels_in_a_crowd_that_flows_make_and_keep_no_circle(situation: Situation) -> None:

@@ -5,7 +5,6 @@ import numpy.typing as npt
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.filter import edge_rows
 from lcf_edge.filter.tables import NO_CIRCLE, EdgeTable
 
 COLUMNS = (
@@ -67,11 +66,10 @@ def test_new_rows_are_empty_whoever_was_there_before() -> None:
     assert not table.rebel[rows].any()
 
 
-def test_a_copy_has_the_history_of_the_original() -> None:
+def test_a_row_that_moves_into_a_gap_has_its_history() -> None:
     table = numbered(10)
-    row = table.append(1).start
-    edge_rows.copy_row(table.columns, 7, row)
-    assert whole(table)[row] == 7
+    table.remove(np.arange(10) == 7)
+    assert whole(table)[7] == 9
 
 
 def test_the_least_trusted_leave_the_youngest_of_equals_first() -> None:
