@@ -8,8 +8,7 @@ cdef double SMALL_TURN_RAD
 cdef double TURN_LASTS_S
 
 cdef double arc_radius_m(double yaw_rate_radps, Situation around) noexcept nogil
-cdef double miss_by(double radius, double right_m, double ahead_m, Situation around) noexcept nogil
+cdef double miss_at(double yaw_rate_radps, double right_m, double ahead_m, Situation around) noexcept nogil
 cpdef double miss(double right_m, double ahead_m, Situation around) noexcept nogil
-cdef double lasting_miss(double right_m, double ahead_m, Situation around) noexcept nogil
 cpdef double least_miss(double right_m, double ahead_m, Situation around) noexcept nogil
 cpdef double way_to(double right_m, double ahead_m, Situation around) noexcept nogil

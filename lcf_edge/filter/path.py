@@ -23,8 +23,9 @@ def arc_radius_m(yaw_rate_radps: float, around: Situation) -> float:
     return speed / yaw_rate_radps
 
 
-def miss_by(radius: float, right_m: float, ahead_m: float, around: Situation) -> float:
-    """Distance of a point from an arc, m, right positive. ``radius``: m, positive to the left."""
+def miss_at(yaw_rate_radps: float, right_m: float, ahead_m: float, around: Situation) -> float:
+    """Lateral miss: distance of a point from the path at a yaw rate, m, right positive."""
+    radius = arc_radius_m(yaw_rate_radps, around)
     if not math.isfinite(radius):
         return right_m
     before_axle_m = ahead_m + around.lever_m
@@ -34,12 +35,7 @@ def miss_by(radius: float, right_m: float, ahead_m: float, around: Situation) ->
 
 def miss(right_m: float, ahead_m: float, around: Situation) -> float:
     """Lateral miss: distance of a point from the vehicle's path, m, right positive."""
-    return miss_by(arc_radius_m(around.yaw_rate_radps, around), right_m, ahead_m, around)
-
-
-def lasting_miss(right_m: float, ahead_m: float, around: Situation) -> float:
-    """Lateral miss of a point on the path as it has lasted, m, right positive: a swerve will soon be over."""
-    return miss_by(arc_radius_m(around.lasting_yaw_radps, around), right_m, ahead_m, around)
+    return miss_at(around.yaw_rate_radps, right_m, ahead_m, around)
 
 
 def least_miss(right_m: float, ahead_m: float, around: Situation) -> float:

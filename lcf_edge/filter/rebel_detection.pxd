@@ -22,6 +22,7 @@ cdef double COMMON_NOISE_PX
 cdef double ALIKE_SIGMAS
 cdef double OWN_SIGMAS
 cdef double NEAR_PATH
+cdef double SWERVE_SHARE
 cdef double NEAR_SIGMAS
 cdef int MAX_CANDIDATES
 cdef double NEW_THREAT

@@ -30,7 +30,8 @@ GROUND_DIPS = 0.8  # share of the camera's height by which the ground may lie de
 COMMON_NOISE_PX = 0.3  # noise above this is common to neighbours, and does not average out
 ALIKE_SIGMAS = 2.0  # of both, by which neighbours at the same depth, or on the same level plane, may differ,
 OWN_SIGMAS = 2.0  # and an edge from what they show together
-NEAR_PATH = 1.5  # half widths within which candidates lie from the path, and new threats from the one that has lasted
+NEAR_PATH = 1.5  # half widths within which candidates lie from the path, and new threats from the one that has lasted,
+SWERVE_SHARE = 0.4  # of the horizon, if they are reached later: a swerve is over sooner
 NEAR_SIGMAS = 2.0  # by which a candidate may move slower than it should
 MAX_CANDIDATES = 200  # all pairs are compared
 NEW_THREAT = 0.97  # share of the horizon within which a threat begins; hysteresis against flicker
@@ -249,7 +250,12 @@ def will_be_met(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situatio
     return (
         path.way_to(right_m, range_m, around) < soon_m
         and math.fabs(path.miss(right_m, range_m, around)) < around.half_width_m
-        and (edges.rebel[i] or math.fabs(path.lasting_miss(right_m, range_m, around)) < NEAR_PATH * around.half_width_m)
+        and (
+            edges.rebel[i]
+            or path.way_to(right_m, range_m, around) < SWERVE_SHARE * reach_m
+            or math.fabs(path.miss_at(around.lasting_yaw_radps, right_m, range_m, around))
+            < NEAR_PATH * around.half_width_m
+        )
         and around.camera_height_m - below_m < around.height_m
         and (inverse - inverse_sigma) * SLOWER_HORIZONS * reach_m > 1
         and inverse > RANGE_SIGMAS * inverse_sigma

@@ -218,14 +218,16 @@ def test_on_an_arc_what_stands_on_it_is_incoming_and_what_lies_straight_ahead_is
 
 
 @pytest.mark.parametrize(
-    ("known", "lasting_yaw_radps", "is_met"), [(False, 0.5, True), (False, 0, False), (True, 0, True)]
+    ("known", "horizon_s", "lasting_yaw_radps", "is_met"),
+    [(False, 3.0, 0.5, True), (False, 3.0, 0, False), (True, 3.0, 0, True), (False, 6.0, 0, True)],
+    ids=["a turn", "a swerve", "a swerve at what is known", "a swerve at what is reached before it is over"],
 )
-def test_a_new_threat_also_lies_near_the_arc_that_has_lasted(
-    watch: Watch, known: bool, lasting_yaw_radps: float, is_met: bool
+def test_a_new_threat_that_is_reached_late_also_lies_near_the_arc_that_has_lasted(
+    watch: Watch, known: bool, horizon_s: float, lasting_yaw_radps: float, is_met: bool
 ) -> None:
     arc_m, turn = 2.0 / 0.5, 0.9  # rad, from the start to contact
     on_it = (-arc_m * (1 - math.cos(turn)), -0.5, arc_m * math.sin(turn))
-    swerving = watch([on_it], yaw_rate_radps=0.5, lasting_yaw_radps=lasting_yaw_radps)
+    swerving = watch([on_it], yaw_rate_radps=0.5, lasting_yaw_radps=lasting_yaw_radps, horizon_s=horizon_s)
     assert swerving.verdict(known=known).incoming.tolist() == [is_met]
 
 
