@@ -78,7 +78,7 @@ cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexce
 @cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
 cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil
 @cython.locals(has_gone=bint)
-cdef void go_on(ObjectColumns objects, Py_ssize_t o, bint gone, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
+cdef void go_on(ObjectColumns objects, Py_ssize_t o, bint gone, int through, EdgeColumns edges, ImagePlane plane, Situation around, Settings settings) noexcept nogil
 @cython.locals(across=double, down=double, x=double, y=double)
 cdef int grey(ObjectColumns objects, Py_ssize_t o, int k, CoarseMotion coarse, ImagePlane plane) noexcept nogil
 @cython.locals(k=int)

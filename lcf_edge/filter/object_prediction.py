@@ -333,10 +333,11 @@ def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
 def is_met_soon(objects: ObjectColumns, o: int, settings: Settings) -> bool:
     """Whether a well trusted object farther than ``NEAR_M`` will probably be met within ``SOON_S``.
 
-    Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides.
+    Only what is large in the image grows so fast that its corners are lost, and not what something nearer hides, nor
+    what does not loom: its motion is unknown.
     """
     is_large = max(objects.width[o], objects.height[o]) > settings.min_coast_px
-    is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S
+    is_soon = objects.range[o] >= NEAR_M and objects.ttc[o] < SOON_S and objects.looming[o] * LINGERS_S > 1
     is_trusted = objects.trust[o] >= settings.tr_coast and objects.state[o] != HIDDEN
     return is_trusted and is_large and is_soon and objects.probability[o] > object_belief.EVEN
 
@@ -345,6 +346,7 @@ def go_on(
     objects: ObjectColumns,
     o: int,
     gone: bool,
+    through: int,
     edges: EdgeColumns,
     plane: ImagePlane,
     around: Situation,
@@ -353,7 +355,8 @@ def go_on(
     """Keep an object without edges in this frame as hidden or coasting; in the end, delete it.
 
     It is kept for longer where missing edges are expected: stationary before a stationary vehicle, very near, or out
-    of view. ``gone``: its place looks different from when it was seen there.
+    of view. ``gone``: its place looks different from when it was seen there; ``through``: number of edges in its middle
+    that move differently: then its corners are not lost, but it has stopped or turned.
     """
     objects.unseen_s[o] += around.dt_s
     by = object_in_place_of(objects, o)
@@ -372,7 +375,7 @@ def go_on(
         patience_s = RESTING_S if has_gone else LINGERS_S
     elif math.fabs(around.speed_mps) < object_belief.SLOW_MPS and objects.log_odds[o] > 0:
         patience_s = RESTING_S
-    elif is_met_soon(objects, o, settings):
+    elif through < MIN_THROUGH and is_met_soon(objects, o, settings):
         patience_s = LINGERS_S
     elif objects.range[o] < NEAR_M:
         patience_s = near_s(objects, o, around)

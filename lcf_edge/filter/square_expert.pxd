@@ -93,7 +93,7 @@ cdef bint is_in_reach(MotionSums bounds, Py_ssize_t o, double x, double y) noexc
 cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 @cython.locals(moves=bint)
 cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(is_counted=bint, other=bint)
+@cython.locals(at_rest=bint, other=bint)
 cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(beside=bint)
 cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Py_ssize_t i) noexcept nogil

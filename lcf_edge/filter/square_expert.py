@@ -629,17 +629,21 @@ def see_through(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """Count the edges seen in the middle of each object's box that are not its own, before a vehicle at rest.
+    """Count the edges seen in the middle of the box of each object that is not seen, or is before a vehicle at rest.
 
-    Those that do not move as it does, as the vehicle has stopped, and those that have been fixed for ``THROUGH_S``.
+    Not its own: those that do not move as it does and, before a vehicle at rest, those that have been fixed for
+    ``THROUGH_S``.
     """
+    at_rest = situation.is_at_rest(around)
     for o in range(objects.capacity):
-        is_counted = objects.active[o] and situation.is_at_rest(around)
-        squares.through[o] = object_prediction.fixed_behind(objects, o, edges) if is_counted else 0
-    for j in range(verdicts.count if situation.is_at_rest(around) else 0):
-        i = verdicts.row[j]
-        for o in range(objects.capacity):
-            other = objects.active[o] and edges.square[i] != o and edges.fixed_s[i] < object_prediction.THROUGH_S
+        squares.through[o] = 0
+        if not objects.active[o] or (objects.unseen_s[o] == 0 and not at_rest):
+            continue
+        if at_rest:
+            squares.through[o] = object_prediction.fixed_behind(objects, o, edges)
+        for j in range(verdicts.count):
+            i = verdicts.row[j]
+            other = edges.square[i] != o and edges.fixed_s[i] < object_prediction.THROUGH_S
             if not other or not object_prediction.is_in_middle(objects, o, edges.x[i], edges.y[i]):
                 continue
             if not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around):
@@ -816,7 +820,7 @@ def update(
             if not remnant:
                 measure(objects, o, squares.wholes, place, around)
         elif not go_on_in_turmoil(objects, o, circles, around, settings):
-            object_prediction.go_on(objects, o, gone, edges, plane, around, settings)
+            object_prediction.go_on(objects, o, gone, through, edges, plane, around, settings)
             if not objects.active[o]:
                 continue
         renew_numbers(

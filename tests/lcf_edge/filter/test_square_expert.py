@@ -643,6 +643,43 @@ def test_what_is_lost_shortly_before_a_fast_vehicle_meets_it_is_there_until_then
         assert not any(shown[lost + round(0.6 * FPS) :])
 
 
+def test_what_does_not_loom_is_not_waited_for_though_its_contact_seems_near(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """As what was left of turmoil, whose motion is unknown: it would stay where it is, always about to be met."""
+    ahead = drive(box((0.1, -0.4, 13.0), (1.2, 1.2, 0.0), landmarks=60))
+    way = replace(drive(clutter(150)) + ahead, frames=36, speed_mps=6.0)
+    mine, lost = looks_of(way, slice(150, None)), 20
+    tables, reported = LineCircleFilter(Config(), way.lens), []
+    for seq, (corners, motion) in enumerate(way):
+        tables.step(corners if seq < lost else without(corners, mine), motion)
+        if seq == lost:
+            (row,) = published(tables.objects)
+            tables.objects.looming[row] = 0.0
+        reported.append(len(published(tables.objects)))
+    assert reported[lost - 1] == 1
+    assert set(reported[lost + round(0.6 * FPS) :]) == {0}
+
+
+@pytest.mark.parametrize(("range_m", "speed_mps"), [(6.0, 2.0), (7.0, 2.5), (6.5, 2.2)])
+def test_who_stops_before_he_is_in_the_way_is_not_waited_for(
+    drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, speed_mps: float
+) -> None:
+    """His corners are not lost, as those of something that grows too fast would be: they tell that he stands."""
+    walker = drive(box((-0.27 * range_m, -0.4, range_m), (0.4, 1.4, 0.2), landmarks=60), np.array([0.6, 0, 0]))
+    way = replace(drive(clutter(150)) + walker, frames=26, speed_mps=speed_mps)
+    stopped = replace(way, points_m=way.in_camera(25), velocity_mps=np.zeros((210, 3)), frames=20)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (row,) = published(tables.objects)
+    assert tables.objects.probability[row] > 0.5
+    assert tables.objects.ttc[row] < 2.0
+    for seq, (corners, motion) in enumerate(list(stopped)[1:]):
+        tables.step(corners, motion)
+        assert seq < 0.5 * FPS or not published(tables.objects)
+
+
 def test_without_a_speed_who_is_lost_nearby_is_remembered_for_a_second(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
