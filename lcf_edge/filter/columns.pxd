@@ -47,7 +47,8 @@ cdef class ObjectColumns:
 
 @cython.final
 cdef class PsiColumns:
-    cdef public Py_ssize_t capacity, live_count
+    cdef public Py_ssize_t capacity
+    cdef Py_ssize_t live_count
     cdef unsigned char[::1] active, shape
     cdef unsigned int[::1] id
     cdef double[::1] x, y, width, height, trust, expansion, life_s

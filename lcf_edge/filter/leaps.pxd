@@ -22,8 +22,8 @@ cdef class Leaps:
     cdef readonly int[::1] part, rows, seen, lost
     cdef int[::1] votes, voter, shifts
     cdef readonly double[::1] u, v
-    cdef public int count, across, down
-    cdef int asking, most
+    cdef public int count, across
+    cdef int down, asking, most
 
 cdef void ask(Leaps leaps, ImagePlane plane, EdgeColumns edges) noexcept nogil
 cdef bint is_lost(Leaps leaps, int part) noexcept nogil

@@ -439,6 +439,7 @@ class LineCircleFilter:
         alpha.judge_all(verdicts, edges, keys, baselines, around, settings)
         ground_speed.measure(self.ground, edges, verdicts, baselines, around)
         self.floor.measure(around)
+        around.floor_mirrors = self.floor.is_glossy
         driving.measure(self._driving, verdicts, edges, baselines, around)
         around.ground_mps = self.ground.speed_mps
         alpha.release_obedient(verdicts, edges, around, settings)

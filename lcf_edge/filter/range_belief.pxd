@@ -55,7 +55,8 @@ cdef class Evidence:
     cdef public bint is_cut
 
 cdef class Belief:
-    cdef public double stands, log_odds, met, middle, middle_sigma
+    cdef public double stands, met, middle
+    cdef double log_odds, middle_sigma
     cdef readonly double[::1] mean, sigma, inverse, standing, moving
     cdef double[::1] weight
     cdef double inner_forward, inner_right, inner_forward_var, inner_right_var, inner_rate, inner_rate_var

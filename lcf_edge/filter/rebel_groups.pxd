@@ -13,6 +13,8 @@ cdef double VELOCITY_NOISE_PX
 cdef double LIKE_SPEED
 cdef double RATE_SIGMAS
 cdef double LEADER_HEIGHT_SHARE
+cdef double DOUBTFUL_HEIGHT_SHARE
+cdef int MANY_REBELS
 cdef double MIRROR_NOISE_PX
 cdef double MIRROR_SIGMAS
 cdef double MOVER_SHARE
@@ -76,6 +78,7 @@ cdef bint is_mirrored(RebelGroups groups, Py_ssize_t g, Members members) noexcep
 cdef void fit_expansion(RebelGroups groups, Verdicts verdicts) noexcept nogil
 cdef bint spreads_less(RebelGroups groups, Py_ssize_t g, double rate, double sigmas) noexcept nogil
 cdef bint is_shifted(RebelGroups groups, Py_ssize_t g, Members members) noexcept nogil
+@cython.locals(is_doubtful=bint)
 cpdef bint is_flat(RebelGroups groups, Py_ssize_t g, Members members, Situation around) noexcept nogil
 cdef bint ground_would_flow(EdgeColumns edges, Py_ssize_t i, Situation around) noexcept nogil
 @cython.locals(few=bint, flat=bint, stands=bint, inside=bint)

@@ -15,7 +15,9 @@ from lcf_edge.filter.situation import Situation
 VELOCITY_NOISE_PX = 4.0  # 1 sigma of a rebel's velocity, times its elapsed time
 LIKE_SPEED = 0.5  # share by which the velocities of linked rebels may differ
 RATE_SIGMAS = 2.0  # by which an expansion must exceed its noise
-LEADER_HEIGHT_SHARE = 0.3  # least height of a leader, as a share of the camera's; paint and reflections have less
+LEADER_HEIGHT_SHARE = 0.3  # least height of a leader, as a share of the camera's; paint and reflections have less,
+DOUBTFUL_HEIGHT_SHARE = 0.5  # or this, above a glossy floor, or with fewer than
+MANY_REBELS = 7  # rebels
 MIRROR_NOISE_PX = 0.6  # 1 sigma of an edge's motion
 MIRROR_SIGMAS = 3.0  # of it, by which a level plane must fit a group better than something upright
 MOVER_SHARE = 0.25  # of the edges in a moving circle that must be rebels: in repetitive texture, edges swap places
@@ -410,7 +412,9 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
         return True
     half = 0.5 * shared.EXTENT_SIGMAS * math.sqrt(members.variance_y[g])
     foot = max(members.y[g] + half - around.horizon_y, 0.0)
-    return members.y[g] - half > lowest + (1 - LEADER_HEIGHT_SHARE) * foot
+    is_doubtful = around.floor_mirrors or members.size[g] < MANY_REBELS
+    share = DOUBTFUL_HEIGHT_SHARE if is_doubtful else LEADER_HEIGHT_SHARE
+    return members.y[g] - half > lowest + (1 - share) * foot
 
 
 def is_paint(groups: RebelGroups, g: int, members: Members, around: Situation) -> bool:

@@ -15,6 +15,7 @@ cdef class Situation:
     cdef double scene_flow_pxps
     cdef public bint flow_is_seen, is_blind
     cdef bint ground_is_still
+    cdef public bint floor_mirrors
     cdef public double noise_px, corner_var, excess, focus_var_x, focus_var_y, lasting_var_x, lasting_var_y
     cdef double least_corner_var
 

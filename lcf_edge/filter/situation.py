@@ -25,6 +25,7 @@ class Situation:
     the shaking of the heading. ``turn_share``: 1 sigma of the image motion by a turn, as a share of it.
     ``pitch_sigma_rad``: 1 sigma of the horizon as configured, ``horizon_sigma_rad``: by the flow where that is less.
     ``lever_m``: distance of the camera ahead of the axle. ``ground_is_still``: although at V_ν it must flow (``rest``).
+    ``floor_mirrors``: it is glossy (``glossy_floor``).
     ``flow_is_seen``: enough of the static scene is in view to show its flow. ``is_blind``: it is not, and hardly an
     edge of the image is found again: something covers it.
     """
@@ -37,7 +38,7 @@ class Situation:
         self.horizon_s = config.vehicle.horizon_s
         self.pitch_sigma_rad = self.horizon_sigma_rad = config.filter.pitch_sigma_rad
         self.focus_x, self.focus_y, self.horizon_y = pinhole.cx, pinhole.cy, pinhole.cy
-        self.ground_is_still = False
+        self.ground_is_still = self.floor_mirrors = False
         self.flow_is_seen, self.is_blind = True, False
         self.ground_mps = NAN
         self.turn_share = self.lever_m = 0.0

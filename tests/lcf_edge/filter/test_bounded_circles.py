@@ -31,12 +31,14 @@ Situation = Callable[..., Any]
 # Paint
 
 
-def lies_flat(around: Any, top_px: float, foot_px: float, *, short: int = 8, level: bool = True) -> bool:
-    """A group of 8 edges from ``top_px`` to ``foot_px`` under the horizon; ``short``: that fall short of the flow."""
+def lies_flat(
+    around: Any, top_px: float, foot_px: float, *, edges: int = 8, short: int = 8, level: bool = True
+) -> bool:
+    """A group of ``edges`` from ``top_px`` to ``foot_px`` under the horizon; ``short``: that fall short of the flow."""
     groups = RebelGroups(10, 2)
     groups.groups = 1
     members = groups.members
-    members.size[0], members.y[0] = 8, around.horizon_y + 0.5 * (top_px + foot_px)
+    members.size[0], members.y[0] = edges, around.horizon_y + 0.5 * (top_px + foot_px)
     members.variance_y[0] = ((foot_px - top_px) / EXTENT_SIGMAS) ** 2
     groups.inwards[0], groups.mean_s[0] = short, 0.4
     if level:  # upright: everywhere the same expansion
@@ -50,6 +52,17 @@ def test_a_thin_strip_on_the_ground_is_flat(situation: Situation) -> None:
 
 def test_what_reaches_up_from_its_foot_is_not(situation: Situation) -> None:
     assert not lies_flat(situation(camera_height_m=0.3), 40.0, 80.0)
+
+
+@pytest.mark.parametrize(("edges", "mirrors"), [(8, True), (6, False)], ids=["a glossy floor", "few edges"])
+def test_where_lamps_may_be_mirrored_a_leader_reaches_up_to_half_the_height_of_the_camera(
+    situation: Situation, edges: int, mirrors: bool
+) -> None:
+    around = situation(camera_height_m=0.3)
+    assert not lies_flat(around, 50.0, 80.0)
+    around.floor_mirrors = mirrors
+    assert lies_flat(around, 50.0, 80.0, edges=edges)
+    assert not lies_flat(around, 30.0, 80.0, edges=edges)
 
 
 @pytest.mark.parametrize("short", [0, 1, 4])
