@@ -61,8 +61,8 @@ def test_where_lamps_may_be_mirrored_a_leader_reaches_up_to_half_the_height_of_t
     around = situation(camera_height_m=0.3)
     assert not lies_flat(around, 50.0, 80.0)
     around.floor_mirrors = mirrors
-    assert lies_flat(around, 50.0, 80.0, edges=edges)
-    assert not lies_flat(around, 30.0, 80.0, edges=edges)
+    assert lies_flat(around, 50.0, 80.0, edges=edges, short=edges)
+    assert not lies_flat(around, 30.0, 80.0, edges=edges, short=edges)
 
 
 @pytest.mark.parametrize("short", [0, 1, 4])
