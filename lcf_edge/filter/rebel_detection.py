@@ -247,12 +247,13 @@ def will_be_met(verdicts: Verdicts, a: int, edges: EdgeColumns, around: Situatio
     right_m = (edges.x[i] - around.focus_x) / around.pinhole.fx * range_m
     below_m = (edges.y[i] - around.horizon_y) / around.pinhole.focal * range_m
     soon_m = reach_m if edges.rebel[i] else reach_m * NEW_THREAT
+    way_m = path.way_to(right_m, range_m, around)
     return (
-        path.way_to(right_m, range_m, around) < soon_m
+        way_m < soon_m
         and math.fabs(path.miss(right_m, range_m, around)) < around.half_width_m
         and (
             edges.rebel[i]
-            or path.way_to(right_m, range_m, around) < SWERVE_SHARE * reach_m
+            or way_m < SWERVE_SHARE * reach_m
             or math.fabs(path.miss_at(around.lasting_yaw_radps, right_m, range_m, around))
             < NEAR_PATH * around.half_width_m
         )

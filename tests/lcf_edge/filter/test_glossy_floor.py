@@ -11,6 +11,7 @@ import pytest
 
 from lcf_edge.config import Camera, Config
 from lcf_edge.filter import LineCircleFilter
+from lcf_edge.messages import Cause
 
 Drive = Callable[..., Any]
 Landmarks = Callable[..., npt.NDArray[np.float64]]
@@ -67,6 +68,28 @@ def test_people_who_walk_ahead_are_no_mirror(dull: Any, drive: Drive, box: Landm
     """They are near, though they flow as what is far."""
     people = drive(box((0.0, 0.0, 3.0), (1.2, 0.5, 0.3), landmarks=40), np.array([0.0, 0.0, 1.5]))
     assert not any(verdicts(dull + people))
+
+
+def leads(way: Any, *, glossy: bool) -> bool:
+    """Whether a circle ever leads, if the floor is taken for glossy, or for dull."""
+    tables, led = LineCircleFilter(Config(), way.lens), False
+    for corners, motion in way:
+        tables.floor.is_glossy = glossy
+        tables.floor.under_s, tables.floor.seen_s = (1e9, 1e9) if glossy else (0.0, 1e9)
+        tables.step(corners, motion)
+        led |= Cause.LEADING in tables.rebel.cause[tables.rebel.active & (tables.rebel.trust >= 3)]
+    return led
+
+
+@pytest.mark.parametrize(("height_share", "on_glossy"), [(0.4, False), (0.9, True)], ids=["low", "high"])
+def test_above_a_glossy_floor_what_is_less_than_half_as_high_as_the_camera_does_not_lead(
+    dull: Any, drive: Drive, box: Landmarks, height_share: float, on_glossy: bool
+) -> None:
+    """It may be a mirrored lamp. Above a dull floor it leads if it shows enough edges."""
+    height_m = height_share * HEIGHT_M
+    thing = drive(box((0.0, HEIGHT_M - height_m / 2, 1.5), (0.5, height_m, 0.0), landmarks=40), np.array([0, 0, 2.2]))
+    assert leads(dull + thing, glossy=False)
+    assert leads(dull + thing, glossy=True) == on_glossy
 
 
 @pytest.mark.parametrize("share", [0.65, 1.5])
