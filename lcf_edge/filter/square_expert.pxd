@@ -95,11 +95,13 @@ cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(at_rest=bint, other=bint)
 cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(reach_x=double, reach_y=double)
+cdef bint is_near(ObjectColumns objects, Py_ssize_t o, double x, double y) noexcept nogil
 @cython.locals(beside=bint)
 cdef int square_of(ObjectColumns objects, CircleColumns circles, EdgeColumns edges, Py_ssize_t i) noexcept nogil
 @cython.locals(share=double)
 cdef void count_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(share=double)
+@cython.locals(share=double, is_own=bint)
 cdef void take_members(ObjectColumns objects, Squares squares, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
 cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Situation around, Settings settings) noexcept nogil
 cdef void measure(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, int place, Situation around) noexcept nogil

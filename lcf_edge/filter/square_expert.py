@@ -650,6 +650,12 @@ def see_through(
                 squares.through[o] += 1
 
 
+def is_near(objects: ObjectColumns, o: int, x: float, y: float) -> bool:
+    """Whether a point is in the box of an object, or little beside it."""
+    reach_x, reach_y = (0.5 + SIDE_REACH) * objects.width[o], (0.5 + STACK_REACH) * objects.height[o]
+    return math.fabs(x - objects.x[o]) < reach_x and math.fabs(y - objects.y[o]) < reach_y
+
+
 def square_of(objects: ObjectColumns, circles: CircleColumns, edges: EdgeColumns, i: int) -> int:
     """Returns the object that an edge belongs to, by its circle or as before; -1: none.
 
@@ -715,7 +721,8 @@ def take_members(
         o = edges.square[i]
         if o < 0:
             continue
-        if squares.members[o] == ALL or squares.obedient[j]:
+        is_own = squares.members[o] == ALL and is_near(objects, o, edges.x[i], edges.y[i])
+        if is_own or squares.obedient[j]:
             group_motion.add_edge(squares.wholes, o, verdicts, j, edges, baselines, around)
         else:
             edges.square[i] = -1
