@@ -20,6 +20,7 @@ cdef double COMING_S
 cdef double NEAR_S
 cdef double LINGERS_S
 cdef double SAME_PLACE_M
+cdef double STARTS_S
 cdef double THROUGH_S
 cdef int MIN_THROUGH
 cdef double THROUGH_SHARE
@@ -70,10 +71,14 @@ cdef int fixed_behind(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) no
 @cython.locals(across=bint)
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(apart_m=double, across=bint)
-cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o) noexcept nogil
+cdef bint is_in_place_of(ObjectColumns objects, Py_ssize_t o, Py_ssize_t other) noexcept nogil
+@cython.locals(since_s=double, moves=double, aside_m=double, ahead_m=double, own_m=double, other_m=double, half_m=double, right_m=double, sigma_m=double, is_as_far=bint)
+cdef bint has_left(ObjectColumns objects, Py_ssize_t o, Py_ssize_t other, Situation around) noexcept nogil
+cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept nogil
 @cython.locals(hidden=bint, patience_s=double)
 cdef bint is_remnant(ObjectColumns objects, Py_ssize_t o, int count, ImagePlane plane, Situation around) noexcept nogil
+cdef bint is_left_over(ObjectColumns objects, Py_ssize_t o, int own, Situation around) noexcept nogil
 cdef double near_s(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 @cython.locals(is_trusted=bint, is_large=bint, is_soon=bint)
 cdef bint is_met_soon(ObjectColumns objects, Py_ssize_t o, Settings settings) noexcept nogil

@@ -28,6 +28,7 @@ LEAVES_S = 0.5  # unless it leaves the image within this time
 RESTING_S = 2.0  # stationary, or near and seen through, before a stationary vehicle,
 LINGERS_S = 6.0  # and near, not seen through;
 SAME_PLACE_M = 0.5  # two objects this near to each other in range, and in one place of the image, are one
+STARTS_S = 0.3  # for so long, as somebody starts to walk, some edges still show that he stands
 THROUGH_S = 0.5  # it is seen through where edges that have not moved for this long,
 MIN_THROUGH = 3  # at least so many, and before a vehicle at rest more than it lately had of its own,
 THROUGH_SHARE = 0.3  # lie this near to the centre of its box, as a share of its width and height
@@ -280,22 +281,43 @@ def is_behind(objects: ObjectColumns, o: int) -> bool:
     return False
 
 
-def object_in_place_of(objects: ObjectColumns, o: int) -> int:
-    """Returns the object that is seen, by more than a few edges, in the place of an unseen one; -1: none.
+def is_in_place_of(objects: ObjectColumns, o: int, other: int) -> bool:
+    """Whether a seen object is where an unseen one is taken to be."""
+    apart_m = math.fabs(objects.range[o] - objects.range[other])
+    if not apart_m < min(lengths.of(objects.range_sigma[o], objects.range_sigma[other]), SAME_PLACE_M):
+        return False
+    across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * objects.width[other]
+    return across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * objects.height[other]
 
-    Somebody who stops or turns at once breaks the motion of his object, and another one is founded on him. Two things
-    cannot be in one place, so they are one.
+
+def has_left(objects: ObjectColumns, o: int, other: int, around: Situation) -> bool:
+    """Whether a seen object, founded as another was lost, was then in its place: it stood and walks on, or turned."""
+    if objects.age_s[other] > objects.unseen_s[o] + STARTS_S:
+        return False
+    since_s = max(objects.age_s[other], objects.unseen_s[o])
+    moves = 0.0 if lingers(objects, o, around) else 1.0
+    aside_m = (objects.right[other] - moves * objects.right[o]) * since_s
+    ahead_m = (objects.forward[other] - moves * objects.forward[o]) * since_s
+    own_m, other_m = objects.range[o] / around.pinhole.fx, objects.range[other] / around.pinhole.fx  # of a pixel there
+    half_m = 0.5 * (objects.width[o] * own_m + objects.width[other] * other_m)
+    right_m = (objects.x[other] - around.focus_x) * other_m - (objects.x[o] - around.focus_x) * own_m
+    sigma_m = objects.range_sigma[o] + objects.range_sigma[other]
+    is_as_far = math.fabs(objects.range[other] - objects.range[o] - ahead_m) < min(sigma_m, SAME_PLACE_M)
+    return is_as_far and math.fabs(right_m - aside_m) < half_m
+
+
+def object_in_place_of(objects: ObjectColumns, o: int, around: Situation) -> int:
+    """Returns the object that is seen, by more than a few edges, in the place of a lost one, or left it; -1: none.
+
+    Somebody who stops, turns or walks on at once breaks the motion of his object, and another one is founded on him.
+    Two things cannot be in one place, so they are one.
     """
     for other in range(objects.capacity):
         if other == o or not objects.active[other] or objects.unseen_s[other] > 0:
             continue
         if objects.support[other] < SURE_EDGES:
             continue
-        apart_m = math.fabs(objects.range[o] - objects.range[other])
-        if not apart_m < min(lengths.of(objects.range_sigma[o], objects.range_sigma[other]), SAME_PLACE_M):
-            continue
-        across = math.fabs(objects.x[o] - objects.x[other]) < 0.5 * objects.width[other]
-        if across and math.fabs(objects.y[o] - objects.y[other]) < 0.5 * objects.height[other]:
+        if is_in_place_of(objects, o, other) or has_left(objects, o, other, around):
             return other
     return -1
 
@@ -321,6 +343,21 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
         return False
     way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
     return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
+
+
+def is_left_over(objects: ObjectColumns, o: int, own: int, around: Situation) -> bool:
+    """Whether so few members of something near a vehicle at rest are left that they may lie on what it hid.
+
+    Who walks on leaves a few corners beside him behind, which stand still, as he did: another object is founded on him,
+    or he was not seen since. ``own``: number of its members.
+    """
+    if not situation.is_at_rest(around) or not objects.range[o] < NEAR_M:
+        return False
+    if own >= REMNANT_SHARE * objects.recent_edges[o]:
+        return False
+    if objects.unseen_s[o] > 0 and objects.log_odds[o] > 0:
+        return True
+    return object_in_place_of(objects, o, around) >= 0
 
 
 def near_s(objects: ObjectColumns, o: int, around: Situation) -> float:
@@ -359,7 +396,7 @@ def go_on(
     that move differently: then its corners are not lost, but it has stopped or turned.
     """
     objects.unseen_s[o] += around.dt_s
-    by = object_in_place_of(objects, o)
+    by = object_in_place_of(objects, o, around)
     if by >= 0:
         take_over(objects, o, by)
         return

@@ -107,5 +107,5 @@ cdef double belief_in(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, Si
 cdef void measure(ObjectColumns objects, Py_ssize_t o, MotionSums wholes, int place, Situation around) noexcept nogil
 cdef void see_at_rest(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void renew_numbers(ObjectColumns objects, Py_ssize_t o, Squares squares, bint unmeasured, ImagePlane plane, Situation around) noexcept nogil
-@cython.locals(remnant=bint, gone=bint, count=int, own=int, through=int, place=int)
+@cython.locals(remnant=bint, gone=bint, shown=bint, count=int, own=int, through=int, place=int)
 cpdef int update(Squares squares, ObjectColumns objects, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, ImagePlane plane, Situation around, Settings settings, Ids ids) noexcept nogil

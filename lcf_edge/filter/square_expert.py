@@ -811,10 +811,11 @@ def update(
         if place == object_prediction.CHANGED and count >= MIN_EDGES:
             observe(objects, o, squares.wholes, around)
         gone = place == object_prediction.CHANGED and object_belief.is_still(objects, o)
+        shown = not gone and not object_prediction.is_left_over(objects, o, own, around)
         remnant = False
-        if place == object_prediction.SAME or (squares.resting[o] >= MIN_EDGES and count < MIN_EDGES and not gone):
+        if place == object_prediction.SAME or (squares.resting[o] >= MIN_EDGES and count < MIN_EDGES and shown):
             see_at_rest(objects, o, around)
-        elif count >= MIN_EDGES and not gone:
+        elif count >= MIN_EDGES and shown:
             objects.recent_edges[o] = max(objects.recent_edges[o] * math.exp(-around.dt_s / RECENT_S), count)
             remnant = object_prediction.is_remnant(objects, o, count, plane, around)
             objects.unseen_s[o], objects.state[o], objects.left[o] = 0.0, SEEN, 0

@@ -598,6 +598,93 @@ def test_who_stops_going_ahead_and_turns_aside_at_once_stays_one_object(
     assert tables.objects.right[published(tables.objects)] * right_mps > 0
 
 
+@pytest.mark.parametrize("speed_mps", [0.0, 0.4])
+@pytest.mark.parametrize("right_mps", [0.9, -0.9])
+@pytest.mark.parametrize("range_m", [1.6, 2.0])
+def test_who_stood_right_before_a_vehicle_and_walks_on_stays_one_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, right_mps: float, speed_mps: float
+) -> None:
+    """Nobody is left behind where he stood."""
+    stands = drive(box((0.05, -0.3, range_m), (0.35, 1.5, 0.15), landmarks=80))
+    way = replace(drive(clutter(150)) + stands, frames=30, speed_mps=0.6)
+    velocity = np.concatenate([np.zeros((150, 3)), np.tile([right_mps, 0, 0.2], (80, 1))])
+    walks = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30, speed_mps=speed_mps)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (before,) = tables.objects.id[published(tables.objects)]
+    for corners, motion in list(walks)[1:]:
+        tables.step(corners, motion)
+        assert tables.objects.id[published(tables.objects)].tolist() == [before]
+    assert tables.objects.right[published(tables.objects)] * right_mps > 0
+
+
+@pytest.mark.parametrize("then_mps", [(-0.9, 0.0), (0.0, 0.9)], ids=["turns round", "turns away"])
+@pytest.mark.parametrize("speed_mps", [0.0, 0.6])
+def test_who_crosses_and_turns_at_once_is_soon_one_object_again(
+    drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, then_mps: tuple[float, float]
+) -> None:
+    walker = drive(box((-1.35, -0.3, 2.6), (0.35, 1.5, 0.15), landmarks=80), np.array([0.9, 0, 0]))
+    way = replace(drive(clutter(150)) + walker, frames=30, speed_mps=speed_mps)
+    velocity = np.concatenate([np.zeros((150, 3)), np.tile([then_mps[0], 0, then_mps[1]], (80, 1))])
+    turned = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (before,) = tables.objects.id[published(tables.objects)]
+    two = 0
+    for corners, motion in list(turned)[1:]:
+        tables.step(corners, motion)
+        ids = tables.objects.id[published(tables.objects)].tolist()
+        assert before in ids
+        two += len(ids) > 1
+    assert two <= 2
+
+
+def test_a_few_edges_do_not_bring_back_who_was_lost_right_before_a_vehicle_at_rest(
+    drive: Drive, box: Landmarks, clutter: Landmarks
+) -> None:
+    """They lay beside him, and would show for ever that he is there."""
+    thing = drive(box((0.0, -0.2, 2.0), (0.4, 0.9, 0.0), landmarks=60))
+    way = replace(drive(clutter(400)) + thing, frames=24, speed_mps=1.0)
+    tables, his = LineCircleFilter(Config(), way.lens), looks_of(way, slice(400, None))
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (row,) = published(tables.objects)
+    stayed = 0
+    while row in published(tables.objects) and stayed < 10 * FPS:
+        tables.step(without(corners, his), replace(motion, speed_mps=0.0))
+        if stayed > 2:
+            beside = np.abs(tables.edges.x[: tables.edges.count] - tables.objects.x[row])
+            tables.edges.square[np.argsort(beside)[:3]] = row
+        stayed += 1
+    assert stayed / FPS < 7.0
+
+
+def test_who_slows_down_is_not_shown_by_edges_beside_him(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    """Most of his edges then contradict his motion, and all of them tell the new one, but none that he left behind."""
+    walker = drive(box((-0.9, -0.3, 2.6), (0.35, 1.5, 0.15), landmarks=80), np.array([0.6, 0, 0]))
+    way = replace(drive(clutter(600)) + walker, frames=30, speed_mps=0.0)
+    velocity = np.concatenate([np.zeros((600, 3)), np.tile([0.1, 0, 0], (80, 1))])
+    slower = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=12)
+    shown: list[list[tuple[int, float]]] = [[], []]
+    for leaves_some in (0, 1):
+        tables = LineCircleFilter(Config(), way.lens)
+        for corners, motion in way:
+            tables.step(corners, motion)
+        (row,) = published(tables.objects)
+        for corners, motion in list(slower)[1:]:
+            edges = tables.edges
+            beside = np.abs(edges.x[: edges.count] - tables.objects.x[row]) / tables.objects.width[row]
+            behind = np.flatnonzero((beside > 0.7) & (beside < 0.95))
+            assert len(behind)
+            edges.square[behind[: leaves_some * len(behind)]] = row
+            tables.step(corners, motion)
+            shown[leaves_some].append((int(tables.objects.support[row]), float(tables.objects.width[row])))
+    assert max(support for support, _ in shown[1]) > 10
+    assert shown[1] == shown[0]
+
+
 @pytest.mark.parametrize(("range_m", "about_s"), [(1.3, 1.8), (3.5, 0.4)], ids=["near", "farther off"])
 def test_who_is_lost_on_the_way_is_remembered_longer_where_he_is_near(
     drive: Drive, box: Landmarks, clutter: Landmarks, range_m: float, about_s: float
