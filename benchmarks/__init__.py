@@ -4,7 +4,8 @@
 ``methods``  the filter and its peers behind one interface; ``peers`` holds the peers
 ``playing``  feeds drives and recordings to methods
 ``closed_loop``  a planner drives on the results of a method (``python -m benchmarks.closed_loop``), with ``drivers``
-                 and ``drive_video``; ``calibration``  accuracy of objects' numbers and their sigmas
+                 and ``drive_video``; ``calibration``  accuracy of objects' numbers and their sigmas; ``mounting``  of
+                 the learnt mounting
 ``quality``, ``speed``, ``memory``  what is measured; ``report`` makes tables of it
 """
 
