@@ -72,7 +72,7 @@ cdef int fixed_behind(ObjectColumns objects, Py_ssize_t o, EdgeColumns edges) no
 cdef bint is_behind(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(apart_m=double, across=bint)
 cdef bint is_in_place_of(ObjectColumns objects, Py_ssize_t o, Py_ssize_t other) noexcept nogil
-@cython.locals(since_s=double, moves=double, aside_m=double, ahead_m=double, own_m=double, other_m=double, half_m=double, right_m=double, sigma_m=double, is_as_far=bint)
+@cython.locals(since_s=double, moves=double, aside_m=double, ahead_m=double, own_m=double, other_m=double, half_m=double, right_m=double, apart_m=double)
 cdef bint has_left(ObjectColumns objects, Py_ssize_t o, Py_ssize_t other, Situation around) noexcept nogil
 cdef int object_in_place_of(ObjectColumns objects, Py_ssize_t o, Situation around) noexcept nogil
 cdef void take_over(ObjectColumns objects, Py_ssize_t o, Py_ssize_t by) noexcept nogil

@@ -301,9 +301,8 @@ def has_left(objects: ObjectColumns, o: int, other: int, around: Situation) -> b
     own_m, other_m = objects.range[o] / around.pinhole.fx, objects.range[other] / around.pinhole.fx  # of a pixel there
     half_m = 0.5 * (objects.width[o] * own_m + objects.width[other] * other_m)
     right_m = (objects.x[other] - around.focus_x) * other_m - (objects.x[o] - around.focus_x) * own_m
-    sigma_m = objects.range_sigma[o] + objects.range_sigma[other]
-    is_as_far = math.fabs(objects.range[other] - objects.range[o] - ahead_m) < min(sigma_m, SAME_PLACE_M)
-    return is_as_far and math.fabs(right_m - aside_m) < half_m
+    apart_m = math.fabs(objects.range[other] - objects.range[o] - ahead_m)
+    return apart_m < objects.range_sigma[o] + objects.range_sigma[other] and math.fabs(right_m - aside_m) < half_m
 
 
 def object_in_place_of(objects: ObjectColumns, o: int, around: Situation) -> int:
