@@ -578,6 +578,25 @@ def test_who_walks_out_of_the_image_before_a_vehicle_at_rest_is_not_waited_for(
     assert remembered_s(way, slice(150, None), 0.0) == pytest.approx(1.0, abs=0.15)
 
 
+def ids_after(way: Any, velocity_mps: Any, speed_mps: float) -> tuple[LineCircleFilter, int, list[list[int]]]:
+    """The filter, the id of the only object of a drive, and those of each image after somebody moves on otherwise.
+
+    Somebody: the landmarks after the first 150.
+    """
+    velocity = np.zeros_like(way.points_m)
+    velocity[150:] = velocity_mps
+    after = replace(way, points_m=way.in_camera(way.frames - 1), velocity_mps=velocity, frames=30, speed_mps=speed_mps)
+    tables = LineCircleFilter(Config(), way.lens)
+    for corners, motion in way:
+        tables.step(corners, motion)
+    (before,) = tables.objects.id[published(tables.objects)].tolist()
+    ids = []
+    for corners, motion in list(after)[1:]:
+        tables.step(corners, motion)
+        ids.append(tables.objects.id[published(tables.objects)].tolist())
+    return tables, before, ids
+
+
 @pytest.mark.parametrize("speed_mps", [0.0, 0.5])
 @pytest.mark.parametrize("right_mps", [0.5, -0.5])
 def test_who_stops_going_ahead_and_turns_aside_at_once_stays_one_object(
@@ -586,15 +605,8 @@ def test_who_stops_going_ahead_and_turns_aside_at_once_stays_one_object(
     """His edges break the motion of his object, and found another one: nobody is left behind where he was."""
     leads = drive(box((0.05, -0.3, 1.2), (0.35, 1.5, 0.15), landmarks=80), np.array([0, 0, 0.25]))
     way = replace(drive(clutter(150)) + leads, frames=30, speed_mps=0.5)
-    velocity = np.concatenate([np.zeros((150, 3)), np.tile([right_mps, 0, 0.33], (80, 1))])
-    turned = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30, speed_mps=speed_mps)
-    tables = LineCircleFilter(Config(), way.lens)
-    for corners, motion in way:
-        tables.step(corners, motion)
-    (before,) = tables.objects.id[published(tables.objects)]
-    for corners, motion in list(turned)[1:]:
-        tables.step(corners, motion)
-        assert tables.objects.id[published(tables.objects)].tolist() == [before]
+    tables, before, ids = ids_after(way, (right_mps, 0, 0.33), speed_mps)
+    assert ids == [[before]] * 29
     assert tables.objects.right[published(tables.objects)] * right_mps > 0
 
 
@@ -607,38 +619,21 @@ def test_who_stood_right_before_a_vehicle_and_walks_on_stays_one_object(
     """Nobody is left behind where he stood."""
     stands = drive(box((0.05, -0.3, range_m), (0.35, 1.5, 0.15), landmarks=80))
     way = replace(drive(clutter(150)) + stands, frames=30, speed_mps=0.6)
-    velocity = np.concatenate([np.zeros((150, 3)), np.tile([right_mps, 0, 0.2], (80, 1))])
-    walks = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30, speed_mps=speed_mps)
-    tables = LineCircleFilter(Config(), way.lens)
-    for corners, motion in way:
-        tables.step(corners, motion)
-    (before,) = tables.objects.id[published(tables.objects)]
-    for corners, motion in list(walks)[1:]:
-        tables.step(corners, motion)
-        assert tables.objects.id[published(tables.objects)].tolist() == [before]
+    tables, before, ids = ids_after(way, (right_mps, 0, 0.2), speed_mps)
+    assert ids == [[before]] * 29
     assert tables.objects.right[published(tables.objects)] * right_mps > 0
 
 
-@pytest.mark.parametrize("then_mps", [(-0.9, 0.0), (0.0, 0.9)], ids=["turns round", "turns away"])
+@pytest.mark.parametrize("then_mps", [(-0.9, 0.0, 0.0), (0.0, 0.0, 0.9)], ids=["turns round", "turns away"])
 @pytest.mark.parametrize("speed_mps", [0.0, 0.6])
 def test_who_crosses_and_turns_at_once_is_soon_one_object_again(
-    drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, then_mps: tuple[float, float]
+    drive: Drive, box: Landmarks, clutter: Landmarks, speed_mps: float, then_mps: tuple[float, float, float]
 ) -> None:
     walker = drive(box((-1.35, -0.3, 2.6), (0.35, 1.5, 0.15), landmarks=80), np.array([0.9, 0, 0]))
     way = replace(drive(clutter(150)) + walker, frames=30, speed_mps=speed_mps)
-    velocity = np.concatenate([np.zeros((150, 3)), np.tile([then_mps[0], 0, then_mps[1]], (80, 1))])
-    turned = replace(way, points_m=way.in_camera(29), velocity_mps=velocity, frames=30)
-    tables = LineCircleFilter(Config(), way.lens)
-    for corners, motion in way:
-        tables.step(corners, motion)
-    (before,) = tables.objects.id[published(tables.objects)]
-    two = 0
-    for corners, motion in list(turned)[1:]:
-        tables.step(corners, motion)
-        ids = tables.objects.id[published(tables.objects)].tolist()
-        assert before in ids
-        two += len(ids) > 1
-    assert two <= 2
+    _, before, ids = ids_after(way, then_mps, speed_mps)
+    assert all(before in each for each in ids)
+    assert sum(len(each) > 1 for each in ids) <= 2
 
 
 def test_a_few_edges_do_not_bring_back_who_was_lost_right_before_a_vehicle_at_rest(
