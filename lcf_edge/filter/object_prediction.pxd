@@ -52,6 +52,8 @@ cpdef void derotate(ObjectColumns objects, Homography h) noexcept nogil
 cdef double looming_at(ObjectColumns objects, Py_ssize_t o, double speed_mps) noexcept nogil
 cdef double velocity_x(ObjectColumns objects, Py_ssize_t o, double x, double looming, Situation around) noexcept nogil
 cdef double velocity_y(double y, double looming, Situation around) noexcept nogil
+@cython.locals(looming=double)
+cdef double x_in(ObjectColumns objects, Py_ssize_t o, double time_s, Situation around) noexcept nogil
 cdef double bounded(double change) noexcept nogil
 cdef void forget_motion(ObjectColumns objects, Py_ssize_t o) noexcept nogil
 @cython.locals(inverse=double)

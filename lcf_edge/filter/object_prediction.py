@@ -70,6 +70,12 @@ def velocity_y(y: float, looming: float, around: Situation) -> float:
     return looming * (y - around.horizon_y)
 
 
+def x_in(objects: ObjectColumns, o: int, time_s: float, around: Situation) -> float:
+    """Returns where its motion would take the centre of an object, px."""
+    looming = looming_at(objects, o, around.speed_mps)
+    return objects.x[o] + velocity_x(objects, o, objects.x[o], looming, around) * time_s
+
+
 def bounded(change: float) -> float:
     """Returns a relative change, at most ``MAX_LAG`` either way."""
     return min(max(change, -MAX_LAG), MAX_LAG)
@@ -340,8 +346,7 @@ def is_remnant(objects: ObjectColumns, o: int, count: int, plane: ImagePlane, ar
         return False
     if situation.is_at_rest(around):
         return False
-    way_px = velocity_x(objects, o, objects.x[o], looming_at(objects, o, around.speed_mps), around) * LEAVES_S
-    return image_plane.project(plane, objects.x[o] + way_px, objects.y[o])
+    return image_plane.project(plane, x_in(objects, o, LEAVES_S, around), objects.y[o])
 
 
 def is_left_over(objects: ObjectColumns, o: int, own: int, around: Situation) -> bool:
@@ -402,7 +407,8 @@ def go_on(
     hidden = is_behind(objects, o)
     objects.state[o] = HIDDEN if hidden else COASTING
     patience_s = HIDDEN_S if hidden else COAST_S
-    if objects.unseen_s[o] <= COAST_S and not is_in_image(objects, o, objects.x[o], plane):
+    coasts_s = COAST_S - objects.unseen_s[o]
+    if coasts_s >= 0 and not is_in_image(objects, o, x_in(objects, o, coasts_s, around), plane):
         objects.left[o] = 1
     if not is_in_sight(objects, o, plane) or (objects.left[o] and not comes(objects, o, around)):
         patience_s = outside_s(objects, o, around)
