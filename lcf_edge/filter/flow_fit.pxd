@@ -41,6 +41,7 @@ cdef double SLOT_WIDTH_PX
 cdef double SLOT_NARROWING
 cdef double SLOT_SHARE
 cdef double SLOT_SIGMA_RAD
+cdef double DOUBTED_PX
 cdef double SCALE_SHARE
 cdef double SCALE_SIGMAS
 cdef int BINS
@@ -56,7 +57,7 @@ cdef class FlowFit:
     cdef readonly double[::1] drift, pitch, yaw, roll, elapsed_s, share, turned, rest
     cdef double[::1] on_x, on_y
     cdef readonly int[::1] slot, cells
-    cdef int[::1] cell
+    cdef int[::1] cell, row
     cdef double[::1] bins
     cdef NormalEquations equations
 
@@ -71,9 +72,13 @@ cdef void set_row(FlowFit fit, Py_ssize_t k) noexcept nogil
 cdef double explained(FlowFit fit) noexcept nogil
 cdef double rate_sigma(FlowFit fit, Baselines baselines, double focal) noexcept nogil
 cdef void solve(FlowFit fit, double sigma_radps) noexcept nogil
-cdef void turn_slot(FlowFit fit, int k, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad, double width) noexcept nogil
+@cython.locals(count=int, better=int, asked=int, turned=double)
+cdef bint suits_older(FlowFit fit, int k, EdgeColumns edges, Baselines baselines, Pinhole pinhole) noexcept nogil
+@cython.locals(is_large=bint)
+cdef void turn_slot(FlowFit fit, int k, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_rad, double width) noexcept nogil
 cdef int slot_edges(FlowFit fit, int k) noexcept nogil
-cdef void apply(FlowFit fit, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
+@cython.locals(width=double)
+cdef void apply(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Pinhole pinhole, double sigma_radps) noexcept nogil
 cdef void learn_turn_share(FlowFit fit, double dt_s) noexcept nogil
 cdef void learn_corner_noise(FlowFit fit, Situation around) noexcept nogil
 cpdef void measure(FlowFit fit, EdgeColumns edges, KeyFrames keys, Baselines baselines, Situation around, Settings settings) noexcept nogil

@@ -57,6 +57,7 @@ SLOT_WIDTH_PX = 1.0  # outlier width in the end,
 SLOT_NARROWING = 0.5  # and its factor from round to round
 SLOT_SHARE = 0.3  # prior sigma of a key frame's own rotation, as a share of that of ω,
 SLOT_SIGMA_RAD = 0.002  # plus this
+DOUBTED_PX = 1.5  # image motion by it from which older edges are asked
 SCALE_SHARE = 0.35  # quantile of the residuals that gives the scale: movers do not reach it;
 SCALE_SIGMAS = 0.4538  # of a normal distribution it lies at this many sigmas
 BINS = 256  # of the histogram of residuals,
@@ -76,18 +77,19 @@ class FlowFit:
 
     One row per edge: ``drift``, px; ``turned``: image motion across the flow by the turn, px; ``pitch``, ``yaw``,
     ``roll``: a; ``elapsed_s``; ``on_x``, ``on_y``: derivative of the drift by ΔO; ``share``: weight by its cell;
-    ``slot``; ``cell``; ``rest``: residual, px.
+    ``slot``; ``cell``; ``rest``: residual, px; ``row``: of the table of edges.
     """
 
     def __init__(self) -> None:
         self.count = 0
         self.focus_x = self.focus_y = self.scale_px = self.place_var = 0.0
         self.focus_sigma_x = self.focus_sigma_y = self.prior_x = self.prior_y = 0.0
-        self.drift, self.pitch, self.yaw, self.roll = [doubles(MAX_EDGES) for _ in range(4)]
-        self.elapsed_s, self.on_x, self.on_y, self.share = [doubles(MAX_EDGES) for _ in range(4)]
-        self.turned, self.rest = [doubles(MAX_EDGES) for _ in range(2)]
+        rows = MAX_EDGES + 1  # the last to try
+        self.drift, self.pitch, self.yaw, self.roll = [doubles(rows) for _ in range(4)]
+        self.elapsed_s, self.on_x, self.on_y, self.share = [doubles(rows) for _ in range(4)]
+        self.turned, self.rest = [doubles(rows) for _ in range(2)]
         self.turn_share = TURN_SHARE
-        self.slot, self.cell = [integers(MAX_EDGES) for _ in range(2)]
+        self.slot, self.cell, self.row = [integers(rows) for _ in range(3)]
         self.cells = integers(COLUMNS * ROWS)
         self.bins = doubles(BINS)
         self.equations = NormalEquations()
@@ -126,12 +128,14 @@ def gather(
                 place_var += edges.variance_across[i] + around.corner_var
             telling += 1
     for k in range(fit.count):
+        fit.cells[fit.cell[k]] += 1
+    for k in range(fit.count):
         fit.share[k] = min(1.0, CELL_EDGES / fit.cells[fit.cell[k]])
     fit.place_var = place_var * stride / max(telling, 1)
 
 
 def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselines, pinhole: Pinhole) -> None:
-    """Add one edge: its drift since the key frame in ``slot``, and its derivative by each unknown."""
+    """Add edge ``i`` in the next row: its drift since the key frame in ``slot``, and its derivative by each unknown."""
     x = lines.then_x(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     y = lines.then_y(baselines, slot, edges.key_x[i, slot], edges.key_y[i, slot])
     dx, dy = x - baselines.focus_x[slot], y - baselines.focus_y[slot]
@@ -148,12 +152,11 @@ def note(fit: FlowFit, edges: EdgeColumns, i: int, slot: int, baselines: Baselin
     fit.pitch[k] = lines.turn_px(pinhole, 0, x, y, -sin, cos)
     fit.yaw[k] = lines.turn_px(pinhole, 1, x, y, -sin, cos)
     fit.roll[k] = lines.turn_px(pinhole, 2, x, y, -sin, cos)
-    fit.elapsed_s[k], fit.slot[k] = baselines.elapsed_s[slot], slot
+    fit.elapsed_s[k], fit.slot[k], fit.row[k] = baselines.elapsed_s[slot], slot, i
     fit.on_x[k], fit.on_y[k] = mu * sin, -mu * cos
     column = min(max(0.5 * x / pinhole.cx * COLUMNS, 0.0), COLUMNS - 1.0)
     row = min(max(0.5 * y / pinhole.cy * ROWS, 0.0), ROWS - 1.0)
     fit.cell[k] = rounding.whole(row) * COLUMNS + rounding.whole(column)
-    fit.cells[fit.cell[k]] += 1
     fit.count += 1
 
 
@@ -242,8 +245,33 @@ def solve(fit: FlowFit, sigma_radps: float) -> None:
         fit.rest[k] = fit.drift[k] - explained(fit)
 
 
+def suits_older(fit: FlowFit, k: int, edges: EdgeColumns, baselines: Baselines, pinhole: Pinhole) -> bool:
+    """Whether the solution, as key frame ``k``'s own rotation, suits most of the edges that are older than that, too.
+
+    Those seen since then alone may all lie on one body that moves.
+    """
+    count, better, asked = fit.count, 0, 0
+    for j in range(count):
+        if fit.elapsed_s[j] > baselines.elapsed_s[k]:
+            note(fit, edges, fit.row[j], k, baselines, pinhole)
+            if fit.count > count:
+                fit.count = count
+                asked += 1
+                turned = fit.equations.solution[0] * fit.pitch[count] + fit.equations.solution[1] * fit.yaw[count]
+                turned += fit.equations.solution[2] * fit.roll[count]
+                better += 1 if math.fabs(fit.drift[count] - turned) < math.fabs(fit.drift[count]) else -1
+    return 2 * better >= -asked
+
+
 def turn_slot(
-    fit: FlowFit, k: int, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_rad: float, width: float
+    fit: FlowFit,
+    k: int,
+    edges: EdgeColumns,
+    keys: KeyFrames,
+    baselines: Baselines,
+    pinhole: Pinhole,
+    sigma_rad: float,
+    width: float,
 ) -> None:
     """Fit key frame ``k``'s own rotation to the residuals, and keep it there. ``width``: first outlier width, px."""
     fit.equations.solution[0] = fit.equations.solution[1] = fit.equations.solution[2] = 0.0
@@ -260,6 +288,9 @@ def turn_slot(
         least_squares.solve(fit.equations)
         width = max(SLOT_WIDTH_PX, SLOT_NARROWING * width)
     turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
+    is_large = max(math.fabs(turn_x), math.fabs(turn_y)) * pinhole.focal > DOUBTED_PX
+    if is_large and not suits_older(fit, k, edges, baselines, pinhole):
+        return
     for j in range(fit.count):
         if fit.slot[j] == k:
             fit.rest[j] -= turn_x * fit.pitch[j] + turn_y * fit.yaw[j] + turn_z * fit.roll[j]
@@ -279,7 +310,9 @@ def slot_edges(fit: FlowFit, k: int) -> int:
     return edges
 
 
-def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_radps: float) -> None:
+def apply(
+    fit: FlowFit, edges: EdgeColumns, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole, sigma_radps: float
+) -> None:
     """Correct the baselines by ω and ΔO, and set their remaining uncertainty."""
     turn_x, turn_y, turn_z = fit.equations.solution[0], fit.equations.solution[1], fit.equations.solution[2]
     fit.focus_x, fit.focus_y = fit.equations.solution[FOCUS_X], fit.equations.solution[FOCUS_Y]
@@ -302,7 +335,8 @@ def apply(fit: FlowFit, keys: KeyFrames, baselines: Baselines, pinhole: Pinhole,
         if slot_edges(fit, k) >= (UNSURE_SLOT_EDGES if unsure_px > UNSURE_PX else SLOT_EDGES):
             own_rad = max(baselines.sigma_px[k] / pinhole.focal, unsure_rad if unsure_px > UNSURE_PX else 0.0)
             sigma_rad = max(SLOT_SHARE * sigma_radps * t + SLOT_SIGMA_RAD, own_rad)
-            turn_slot(fit, k, keys, baselines, pinhole, sigma_rad, max(SLOT_WIDTH_PX, UNSURE_SIGMAS * unsure_px))
+            width = max(SLOT_WIDTH_PX, UNSURE_SIGMAS * unsure_px)
+            turn_slot(fit, k, edges, keys, baselines, pinhole, sigma_rad, width)
     fit.scale_px = quantile(fit, SCALE_SHARE, False, fit.turn_share) / SCALE_SIGMAS
 
 
@@ -348,6 +382,6 @@ def measure(
         return
     sigma_radps = rate_sigma(fit, baselines, around.pinhole.focal)
     solve(fit, sigma_radps)
-    apply(fit, keys, baselines, around.pinhole, sigma_radps)
+    apply(fit, edges, keys, baselines, around.pinhole, sigma_radps)
     learn_turn_share(fit, around.dt_s)
     learn_corner_noise(fit, around)

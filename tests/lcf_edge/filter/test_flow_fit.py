@@ -48,6 +48,7 @@ class Seen:
     known_radps: float = 0.0  # at which the camera turns to the left, by the gyro
     distortion: float = 0.0  # of a lens that is taken for a pinhole: r is seen at r·(1 + distortion·r²)
     youngest: bool = False  # nothing was seen in the older half of the key frames
+    body_since: int = -1  # key frame since which the body was seen, and all else since the oldest; then it moves slowly
     fit: FlowFit = field(default_factory=FlowFit)
     baselines: Baselines = field(default_factory=Baselines)
     keys: KeyFrames = field(default_factory=KeyFrames)
@@ -76,6 +77,8 @@ class Seen:
             now[moves] = random.uniform([400, 200], [560, 360], (np.count_nonzero(moves), 2))
         rays = np.column_stack([(now - (PINHOLE.cx, PINHOLE.cy)) / PINHOLE.fx, np.ones(n)])
         own_pxps = np.where(moves[:, None], random.uniform(20, 80, (n, 2)) * random.choice([-1, 1], (n, 2)), 0)
+        if self.body_since >= 0:
+            own_pxps[moves] = 10.0, 0.0
         for slot in range(KEY_FRAMES):
             elapsed_s = KEY_S * (KEY_FRAMES - slot)
             way_m = SPEED_MPS * elapsed_s
@@ -95,6 +98,8 @@ class Seen:
             keys.displacement[slot, 2] = way_m
         edges.x[:n], edges.y[:n] = (self.bent(now) + random.normal(0, self.noise_px, (n, 2))).T
         edges.born_key[:n] = random.integers(KEY_FRAMES // 2 if self.youngest else 0, KEY_FRAMES, n)
+        if self.body_since >= 0:
+            edges.born_key[:n] = np.where(moves, self.body_since, 0)
         edges.trust[:n], edges.matched[:n] = SETTINGS.tr_max, True
 
     def bent(self, at: Floats) -> Floats:
@@ -172,6 +177,11 @@ def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation() -> None:
     seen.measured(14)  # too few for a fit: those of the last one are gone
     assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
     assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
+
+
+def test_a_body_that_moves_does_not_show_the_rotation_of_the_key_frame_it_is_seen_since() -> None:
+    """What is older is at rest."""
+    assert Seen(body=0.2, body_since=5).measured().rotation_px(5) < 0.5
 
 
 @pytest.mark.parametrize(("bias_sigma_radps", "turned_rad"), [(0.05, -0.02), (0.0, 0.0)])
