@@ -13,6 +13,9 @@ cdef double CHANGES_MPS
 cdef double FOOT_SHARE
 cdef double HIDDEN_FOOT
 cdef double LIFTED_M
+cdef int MAX_GROUNDS
+cdef double SEEN_BENEATH
+cdef double LEAST_SEEN
 cdef double MEMORY_SHARE
 cdef double JUMPS_HZ
 cdef double ODDS
@@ -53,6 +56,8 @@ cdef class Evidence:
     cdef public double looming, sideways, mm, qq, mq, across, across_sigma, half_width, foot, foot_sigma, log_odds, reference, hidden, range_before, range_doubt, inverse, inverse_var
     cdef public double half_extent
     cdef public bint is_cut
+    cdef int grounds
+    cdef double[::1] ground
 
 cdef class Belief:
     cdef public double stands, met, middle
@@ -61,6 +66,7 @@ cdef class Belief:
     cdef double[::1] weight
     cdef double inner_forward, inner_right, inner_forward_var, inner_right_var, inner_rate, inner_rate_var
 
+cpdef void see_ground(Evidence evidence, double inverse) noexcept nogil
 cdef double log_normal2(double dm, double dq, double mm, double qq, double mq) noexcept nogil
 cdef double foot_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil
 cdef double memory_likelihood(Evidence evidence, double inverse, Situation around) noexcept nogil

@@ -25,6 +25,9 @@ CHANGES_MPS = 0.08  # 1 sigma of the change of a mover's velocity while it is me
 FOOT_SHARE = 0.08  # 1 sigma of the lowest edge about the foot, as a share of 1/Z, where the foot shows;
 HIDDEN_FOOT = 0.25  # probability that it shows no edge; then the lowest edge is higher
 LIFTED_M = 0.5  # by this, 1 sigma
+MAX_GROUNDS = 16  # edges of the ground beneath it that count
+SEEN_BENEATH = 0.5  # likelihood of each of those that it would hide: legs, overhang,
+LEAST_SEEN = 1e-3  # and of all, at least
 SMALL_M = 0.2  # smaller things are unlikely,
 SMALL_RATIO = 0.5  # 1 sigma of ln(size) below that
 SUNK_FOOT = 1e-9  # likelihood of a foot deep under the ground
@@ -64,7 +67,8 @@ class Evidence:
     vehicle's speed at which they were measured, which may differ now; ``across``, tan of the bearing from O;
     ``across_sigma``; ``half_width``, tan of half its width; ``half_extent``, of half its width or height, whichever is
     more; ``foot``, 1/Z of the ground under it, 1/m, with ``foot_sigma``; ``hidden``: probability that the foot shows no
-    edge; ``is_cut``: it is below the image. Of the last frame, propagated to now: ``log_odds`` of standing;
+    edge; ``is_cut``: it is below the image; ``ground``: 1/Z of the first ``grounds`` edges of the ground
+    beneath it, 1/m. Of the last frame, propagated to now: ``log_odds`` of standing;
     ``range_before``, m, NaN: none, with ``range_doubt``, 1 sigma of its logarithm.
     """
 
@@ -73,6 +77,7 @@ class Evidence:
         self.reference = self.across = self.across_sigma = self.half_width = self.half_extent = 0.0
         self.foot = self.foot_sigma = self.log_odds = self.inverse = self.inverse_var = 0.0
         self.hidden, self.is_cut = HIDDEN_FOOT, False
+        self.grounds, self.ground = 0, doubles(MAX_GROUNDS)
         self.range_before = self.range_doubt = NAN
 
 
@@ -97,6 +102,13 @@ class Belief:
         self.inner_rate = self.inner_rate_var = 0.0
 
 
+def see_ground(evidence: Evidence, inverse: float) -> None:
+    """Note an edge of the ground beneath the object, and its 1/Z."""
+    if evidence.grounds < MAX_GROUNDS:
+        evidence.ground[evidence.grounds] = inverse
+        evidence.grounds += 1
+
+
 def log_normal2(dm: float, dq: float, mm: float, qq: float, mq: float) -> float:
     """Log density of a bivariate normal distribution, without its constant."""
     determinant = max(mm * qq - mq * mq, 1e-18)
@@ -117,12 +129,16 @@ def foot_likelihood(evidence: Evidence, inverse: float, around: Situation) -> fl
         ratio = apart / sigma
         sunk = max(math.exp(-0.5 * ratio * ratio), SUNK_FOOT)
         return sunk if evidence.is_cut else sunk * ((1 - evidence.hidden) / sigma + evidence.hidden / lifted)
+    unseen = 1.0
+    for n in range(evidence.grounds):
+        if evidence.ground[n] + sigma < inverse:
+            unseen *= SEEN_BENEATH
+    unseen = max(unseen, LEAST_SEEN)
     if evidence.is_cut:
-        return 1.0
+        return unseen
     near, far = apart / sigma, apart / lifted
-    return (1 - evidence.hidden) / sigma * math.exp(-0.5 * near * near) + evidence.hidden / lifted * math.exp(
-        -0.5 * far * far
-    )
+    lifts = evidence.hidden / lifted * math.exp(-0.5 * far * far) * unseen
+    return (1 - evidence.hidden) / sigma * math.exp(-0.5 * near * near) + lifts
 
 
 def memory_likelihood(evidence: Evidence, inverse: float, around: Situation) -> float:

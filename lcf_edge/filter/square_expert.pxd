@@ -1,7 +1,7 @@
 cimport cython
 from libc cimport math
 from lcf_edge.filter cimport circles as shared
-from lcf_edge.filter cimport edge_equations, group_motion, lengths, object_belief, object_prediction, range_belief, situation, speed_change, turmoil
+from lcf_edge.filter cimport edge_equations, group_motion, lengths, object_belief, object_prediction, range_belief, rebel_detection, situation, speed_change, turmoil
 from lcf_edge.filter.baselines cimport Baselines
 from lcf_edge.filter.circles cimport Ids
 from lcf_edge.filter.coarse_circles cimport CoarseGroups
@@ -30,6 +30,10 @@ cdef double STRAY_SHARE
 cdef double JOIN_SHARE
 cdef double SIDE_REACH
 cdef double STACK_REACH
+cdef double INNER_SHARE
+cdef double GROUND_SIGMAS
+cdef double GROUND_SHARE
+cdef int MAX_BENEATH
 cdef int ALL
 cdef double NOISE_GAIN
 cdef double NEWS_SIGMAS
@@ -51,6 +55,8 @@ cdef class Squares:
     cdef int[::1] resting
     cdef int[::1] through
     cdef unsigned char[::1] obedient
+    cdef double[::1] rows
+    cdef int[::1] sides
     cdef Evidence evidence
     cdef Belief belief
 
@@ -95,6 +101,13 @@ cdef double still_px(Verdicts verdicts, Py_ssize_t j) noexcept nogil
 cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(at_rest=bint, other=bint)
 cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+cdef bint flows_as_ground(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(listed=int)
+cdef int list_beneath(ObjectColumns objects, Py_ssize_t o, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(foot=int, least=int, wrong=int)
+cdef void find_foot(Squares squares, Py_ssize_t o, int listed, Situation around) noexcept nogil
+@cython.locals(listed=int)
+cdef void find_ground(ObjectColumns objects, Py_ssize_t o, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(reach_x=double, reach_y=double)
 cdef bint is_near(ObjectColumns objects, Py_ssize_t o, double x, double y) noexcept nogil
 @cython.locals(beside=bint)

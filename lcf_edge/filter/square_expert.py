@@ -14,6 +14,7 @@ from lcf_edge.filter import (
     object_belief,
     object_prediction,
     range_belief,
+    rebel_detection,
     situation,
     speed_change,
     turmoil,
@@ -25,7 +26,7 @@ from lcf_edge.filter.coarse_motion import CoarseMotion
 from lcf_edge.filter.columns import CircleColumns, EdgeColumns, ObjectColumns
 from lcf_edge.filter.group_motion import MotionSums
 from lcf_edge.filter.image_plane import ImagePlane
-from lcf_edge.filter.memory import integers, octets
+from lcf_edge.filter.memory import doubles, integers, octets
 from lcf_edge.filter.patches import Patches
 from lcf_edge.filter.range_belief import Belief, Evidence
 from lcf_edge.filter.rebel_detection import Verdicts
@@ -48,6 +49,10 @@ STRAY_SHARE = 0.35  # this share of its speed: tolerance for the motion of an ob
 JOIN_SHARE = 0.1  # less for one that is no rebel
 SIDE_REACH = 0.1  # margin in which edges that break the flow may join, as a share of the box of its edges,
 STACK_REACH = 0.3  # and above and below; the ground before it moves much as it does, so others join only inside
+INNER_SHARE = 0.4  # of its width, from its middle: there it hides the ground, if that is seen beneath it
+GROUND_SIGMAS = 2.5  # by which an edge of the ground may differ from it, plus
+GROUND_SHARE = 0.25  # this share of its motion: pitch and height of the camera are known no better
+MAX_BENEATH = 128  # edges by which an object is told from the ground beneath it
 ALL = -1  # all edges of an object measure its motion
 NOISE_GAIN = 1.7  # corners wander more than their noise suggests: they are not fixed points of the object
 NEWS_SIGMAS = 4.0  # beyond this an innovation is an outlier and is down-weighted
@@ -68,13 +73,14 @@ class Squares:
     ``parts``: the motion of each circle; ``wholes``: of each object; ``members``: its edges; ``resting``: those of
     them that are matched while the vehicle is at rest; ``through``: of other edges that are then seen in its
     middle; ``bounds``: within which edges may join it. ``obedient``: whether the edge of a verdict moves as its object
-    does.
+    does. ``rows``, px, and ``sides``, 1: of the object, -1: of the ground, of the edges that show where it ends.
     """
 
     def __init__(self, circles: int, objects: int, edges: int) -> None:
         self.parts, self.wholes, self.bounds = MotionSums(circles), MotionSums(objects), MotionSums(objects)
         self.members, self.resting, self.through = [integers(objects) for _ in range(3)]
         self.obedient = octets(edges)
+        self.rows, self.sides = doubles(MAX_BENEATH), integers(MAX_BENEATH)
         self.evidence, self.belief = Evidence(), Belief()
 
 
@@ -650,6 +656,85 @@ def see_through(
                 squares.through[o] += 1
 
 
+def flows_as_ground(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: Baselines, around: Situation) -> bool:
+    """Whether an edge moves as the ground at its image row."""
+    inverse = situation.ground_inverse(around, edges.y[verdicts.row[j]])
+    expected = rebel_detection.lever_of(verdicts, j, baselines) * inverse
+    most = GROUND_SIGMAS * verdicts.along[j] + GROUND_SHARE * expected
+    aside = GROUND_SIGMAS * verdicts.across[j]
+    return math.fabs(verdicts.outward[j] - expected) < most and math.fabs(verdicts.drift[j]) < aside
+
+
+def list_beneath(
+    objects: ObjectColumns,
+    o: int,
+    squares: Squares,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> int:
+    """List the members of an object below the horizon, and the edges of the ground there; returns how many."""
+    listed = 0
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        y, aside = edges.y[i], math.fabs(edges.x[i] - objects.x[o])
+        if y <= around.horizon_y or listed == MAX_BENEATH:
+            continue
+        if edges.square[i] == o:
+            squares.rows[listed], squares.sides[listed] = y, 1
+            listed += 1
+        elif (
+            aside < INNER_SHARE * objects.width[o]
+            and flows_as_ground(verdicts, j, edges, baselines, around)
+            and not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around)
+        ):
+            squares.rows[listed], squares.sides[listed] = y, -1
+            listed += 1
+    return listed
+
+
+def find_foot(squares: Squares, o: int, listed: int, around: Situation) -> None:
+    """Set where an object ends and the ground beneath it begins, by the edges listed: its lowest one there.
+
+    What stands on the ground hides that behind it: as few edges of the ground as possible lie higher than that, and as
+    few of the object lower, which lie on the ground where it moves just so.
+    """
+    foot = -1
+    least = listed + 1
+    for k in range(listed):
+        if squares.sides[k] < 0:
+            continue
+        wrong = 0
+        for n in range(listed):
+            if (squares.rows[n] - squares.rows[k]) * squares.sides[n] > 0:
+                wrong += 1
+        if wrong < least or (wrong == least and squares.rows[k] > squares.rows[foot]):
+            foot, least = k, wrong
+    if foot < 0:
+        return
+    squares.wholes.bottom[o] = min(squares.wholes.bottom[o], squares.rows[foot])
+    for n in range(listed):
+        if squares.sides[n] < 0 and squares.rows[n] > squares.rows[foot]:
+            range_belief.see_ground(squares.evidence, situation.ground_inverse(around, squares.rows[n]))
+
+
+def find_ground(
+    objects: ObjectColumns,
+    o: int,
+    squares: Squares,
+    verdicts: Verdicts,
+    edges: EdgeColumns,
+    baselines: Baselines,
+    around: Situation,
+) -> None:
+    """Find the ground beneath an object, which is evidence of its range."""
+    squares.evidence.grounds = 0
+    if squares.wholes.count[o] >= MIN_EDGES and around.camera_height_m > 0 and math.isfinite(around.speed_mps):
+        listed = list_beneath(objects, o, squares, verdicts, edges, baselines, around)
+        find_foot(squares, o, listed, around)
+
+
 def is_near(objects: ObjectColumns, o: int, x: float, y: float) -> bool:
     """Whether a point is in the box of an object, or little beside it."""
     reach_x, reach_y = (0.5 + SIDE_REACH) * objects.width[o], (0.5 + STACK_REACH) * objects.height[o]
@@ -805,6 +890,7 @@ def update(
     for o in range(objects.capacity):
         if not objects.active[o]:
             continue
+        find_ground(objects, o, squares, verdicts, edges, baselines, around)
         count = squares.wholes.count[o]
         own, through = squares.resting[o], squares.through[o]
         place = object_prediction.watch(objects, o, count, own, through, coarse, plane, around)

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from lcf_edge.filter.range_belief import Belief, Evidence, consider
+from lcf_edge.filter.range_belief import Belief, Evidence, consider, see_ground
 
 HEIGHT_M = 0.3
 RANGE, FORWARD, RIGHT, RATE, LATERAL, CLOSEST = range(6)
@@ -98,6 +98,20 @@ def test_nothing_stands_deep_under_the_ground(situation: Situation) -> None:
     belief = belief_of(evidence, situation(speed_mps=2.0))
     assert belief.stands < 0.05
     assert belief.mean[RANGE] == pytest.approx(3.0, rel=0.3)
+
+
+@pytest.mark.parametrize(("ground_m", "hidden"), [(2.5, True), (1.0, False)], ids=["behind", "before"])
+def test_nothing_stands_where_it_would_hide_the_ground_that_is_seen(
+    situation: Situation, ground_m: float, hidden: bool
+) -> None:
+    """Somebody comes, of whom nothing below the knee is seen. He looms as what stands at 1.33 m."""
+    evidence, around = evidence_of(4.0, -0.8, 0.0, 0.1, 0.4, foot=1 / 8), situation(speed_mps=0.4)
+    stands = belief_of(evidence, around).stands
+    for _ in range(8):
+        see_ground(evidence, 1 / ground_m)
+    belief = belief_of(evidence, around)
+    assert stands > 0.5
+    assert belief.stands == pytest.approx(0.02 if hidden else stands, abs=0.02)
 
 
 @pytest.mark.parametrize(("is_cut", "nearer"), [(False, False), (True, True)])

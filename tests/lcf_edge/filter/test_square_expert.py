@@ -658,6 +658,43 @@ def test_a_few_edges_do_not_bring_back_who_was_lost_right_before_a_vehicle_at_re
     assert stayed / FPS < 7.0
 
 
+def ground_before(metres: float, points: int) -> npt.NDArray[np.float64]:
+    """Landmarks on the ground, up to so far."""
+    random = np.random.default_rng(1)
+    across, away = random.uniform(-1.2, 1.2, points), random.uniform(0.6, metres, points)
+    return np.stack([across, np.full(points, 0.3), away], axis=1)
+
+
+@pytest.mark.parametrize("hidden_m", [0.0, 0.1])
+def test_who_comes_is_not_near_enough_to_stand_where_the_ground_is_seen_beneath_him(
+    drive: Drive, box: Landmarks, clutter: Landmarks, hidden_m: float
+) -> None:
+    """He looms as what stands at a third of his range; of his legs, a part shows no corner."""
+    walker = drive(
+        box((0.3, -0.55 - hidden_m / 2, 5.0), (0.4, 1.7 - hidden_m, 0.1), landmarks=60), np.array([0, 0, -0.8])
+    )
+    way = drive(ground_before(3.7, 600)) + drive(clutter(150)) + walker
+    *_, tables = steps(replace(way, frames=30, speed_mps=0.4))
+    (row,) = published(tables.objects)
+    assert tables.objects.class_id[row] == ObjectClass.ONCOMING
+    assert tables.objects.range[row] > 3.0
+    assert tables.objects.ttc[row] == pytest.approx(3.26 / 1.2, rel=0.15)
+
+
+def test_an_object_ends_where_the_ground_begins(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
+    """Where what looms as he does would stand, the ground moves just so, and a few edges there are taken for his."""
+    walker = drive(box((0.3, -0.55, 5.0), (0.4, 1.7, 0.1), landmarks=60), np.array([0, 0, -0.8]))
+    way = replace(drive(ground_before(3.7, 600)) + drive(clutter(150)) + walker, frames=30, speed_mps=0.4)
+    for tables in steps(way):
+        edges, bottom_y = tables.edges, 0.0
+        for row in published(tables.objects):
+            bottom_y = float(tables.objects.y[row] + tables.objects.height[row] / 2)
+            beneath = np.abs(edges.x - tables.objects.x[row]) < tables.objects.width[row] / 2
+            beneath &= np.abs(edges.y - (way.lens.cy + 40 / tables.objects.looming[row])) < 15
+            edges.square[: edges.count][beneath[: edges.count]] = row
+    assert 0 < bottom_y < way.lens.cy + way.lens.fy * 0.3 / 3.26 + 5
+
+
 def test_who_slows_down_is_not_shown_by_edges_beside_him(drive: Drive, box: Landmarks, clutter: Landmarks) -> None:
     """Most of his edges then contradict his motion, and all of them tell the new one, but none that he left behind."""
     walker = drive(box((-0.9, -0.3, 2.6), (0.35, 1.5, 0.15), landmarks=80), np.array([0.6, 0, 0]))
