@@ -44,7 +44,8 @@ class Seen:
     noise_px: float = 0.4
     number: int = 300
     seed: int = 0
-    slot_turn_rad: float = 0.0  # error of the rotation since the oldest key frame alone
+    slot_turn_rad: float = 0.0  # error of the rotation since one key frame alone,
+    turned_slot: int = 0  # the oldest, or this one
     known_radps: float = 0.0  # at which the camera turns to the left, by the gyro
     distortion: float = 0.0  # of a lens that is taken for a pinhole: r is seen at r·(1 + distortion·r²)
     youngest: bool = False  # nothing was seen in the older half of the key frames
@@ -89,7 +90,7 @@ class Seen:
                 turned = np.array([0.0, self.known_radps * elapsed_s, 0.0])
                 np.asarray(keys.rotation)[slot] = cv2.Rodrigues(turned)[0]
                 x, y, z = (np.stack([x, y, z], axis=1) @ np.asarray(keys.rotation)[slot]).T
-            if slot == 0:
+            if slot == self.turned_slot:
                 x, z = x + self.slot_turn_rad * z, z - self.slot_turn_rad * x
             then = np.stack([PINHOLE.cx + PINHOLE.fx * x / z, PINHOLE.cy + PINHOLE.fy * y / z], axis=1)
             then = self.bent(then) + random.normal(0, self.noise_px, (n, 2)) - own_pxps * elapsed_s
@@ -166,17 +167,19 @@ def test_the_rotation_since_every_key_frame_is_put_right() -> None:
         assert right.rotation_px(slot) < 0.2 * wrong.rotation_px(slot)
 
 
-def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation() -> None:
-    seen = Seen(slot_turn_rad=0.02)
-    seen.keys.sigma_rad[0] = 0.02
+@pytest.mark.parametrize("slot", [0, 5])
+def test_a_key_frame_keeps_what_the_flow_showed_of_its_rotation(slot: int) -> None:
+    """Older edges, if there are any, show the same."""
+    seen = Seen(slot_turn_rad=0.02, turned_slot=slot)
+    seen.keys.sigma_rad[slot] = 0.02
     rotation = np.asarray(seen.measured().keys.rotation)
-    assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
-    assert rotation[0] @ rotation[0].T == pytest.approx(np.eye(3), abs=1e-3)
-    assert np.abs(rotation[1:] - np.eye(3)).max() < 0.005
-    assert seen.keys.sigma_rad[0] < 0.002
+    assert rotation[slot, 0, 2] == pytest.approx(-0.02, abs=0.003)
+    assert rotation[slot] @ rotation[slot].T == pytest.approx(np.eye(3), abs=1e-3)
+    assert np.abs(np.delete(rotation, slot, axis=0) - np.eye(3)).max() < 0.005
+    assert seen.keys.sigma_rad[slot] < 0.002
     seen.measured(14)  # too few for a fit: those of the last one are gone
-    assert rotation[0, 0, 2] == pytest.approx(-0.02, abs=0.003)
-    assert lines.then_x(seen.baselines, 0, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
+    assert rotation[slot, 0, 2] == pytest.approx(-0.02, abs=0.003)
+    assert lines.then_x(seen.baselines, slot, PINHOLE.cx, PINHOLE.cy) - PINHOLE.cx == pytest.approx(-10, abs=2)
 
 
 def test_a_body_that_moves_does_not_show_the_rotation_of_the_key_frame_it_is_seen_since() -> None:
