@@ -102,11 +102,9 @@ cdef void take_others(ObjectColumns objects, Squares squares, Verdicts verdicts,
 @cython.locals(at_rest=bint, other=bint)
 cdef void see_through(ObjectColumns objects, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 cdef bint flows_as_ground(Verdicts verdicts, Py_ssize_t j, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
-@cython.locals(listed=int)
-cdef int list_beneath(ObjectColumns objects, Py_ssize_t o, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(foot=int, least=int, wrong=int)
 cdef void find_foot(Squares squares, Py_ssize_t o, int listed, Situation around) noexcept nogil
-@cython.locals(listed=int)
+@cython.locals(listed=int, is_own=bint)
 cdef void find_ground(ObjectColumns objects, Py_ssize_t o, Squares squares, Verdicts verdicts, EdgeColumns edges, Baselines baselines, Situation around) noexcept nogil
 @cython.locals(reach_x=double, reach_y=double)
 cdef bint is_near(ObjectColumns objects, Py_ssize_t o, double x, double y) noexcept nogil

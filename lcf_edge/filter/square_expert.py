@@ -665,35 +665,6 @@ def flows_as_ground(verdicts: Verdicts, j: int, edges: EdgeColumns, baselines: B
     return math.fabs(verdicts.outward[j] - expected) < most and math.fabs(verdicts.drift[j]) < aside
 
 
-def list_beneath(
-    objects: ObjectColumns,
-    o: int,
-    squares: Squares,
-    verdicts: Verdicts,
-    edges: EdgeColumns,
-    baselines: Baselines,
-    around: Situation,
-) -> int:
-    """List the members of an object below the horizon, and the edges of the ground there; returns how many."""
-    listed = 0
-    for j in range(verdicts.count):
-        i = verdicts.row[j]
-        y, aside = edges.y[i], math.fabs(edges.x[i] - objects.x[o])
-        if y <= around.horizon_y or listed == MAX_BENEATH:
-            continue
-        if edges.square[i] == o:
-            squares.rows[listed], squares.sides[listed] = y, 1
-            listed += 1
-        elif (
-            aside < INNER_SHARE * objects.width[o]
-            and flows_as_ground(verdicts, j, edges, baselines, around)
-            and not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around)
-        ):
-            squares.rows[listed], squares.sides[listed] = y, -1
-            listed += 1
-    return listed
-
-
 def find_foot(squares: Squares, o: int, listed: int, around: Situation) -> None:
     """Set where an object ends and the ground beneath it begins, by the edges listed: its lowest one there.
 
@@ -728,11 +699,25 @@ def find_ground(
     baselines: Baselines,
     around: Situation,
 ) -> None:
-    """Find the ground beneath an object, which is evidence of its range."""
+    """Find the ground beneath an object, by its edges below the horizon and those of the ground there."""
     squares.evidence.grounds = 0
-    if squares.wholes.count[o] >= MIN_EDGES and around.camera_height_m > 0 and math.isfinite(around.speed_mps):
-        listed = list_beneath(objects, o, squares, verdicts, edges, baselines, around)
-        find_foot(squares, o, listed, around)
+    if squares.wholes.count[o] < MIN_EDGES or not around.camera_height_m > 0 or not math.isfinite(around.speed_mps):
+        return
+    listed = 0
+    for j in range(verdicts.count):
+        i = verdicts.row[j]
+        y, aside = edges.y[i], math.fabs(edges.x[i] - objects.x[o])
+        if y <= around.horizon_y or listed == MAX_BENEATH:
+            continue
+        is_own = edges.square[i] == o
+        if is_own or (
+            aside < INNER_SHARE * objects.width[o]
+            and flows_as_ground(verdicts, j, edges, baselines, around)
+            and not obeys(objects, o, verdicts, j, edges, baselines, JOIN_SHARE, around)
+        ):
+            squares.rows[listed], squares.sides[listed] = y, 1 if is_own else -1
+            listed += 1
+    find_foot(squares, o, listed, around)
 
 
 def is_near(objects: ObjectColumns, o: int, x: float, y: float) -> bool:

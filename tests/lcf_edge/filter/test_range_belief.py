@@ -114,6 +114,16 @@ def test_nothing_stands_where_it_would_hide_the_ground_that_is_seen(
     assert belief.stands == pytest.approx(0.02 if hidden else stands, abs=0.02)
 
 
+def test_ground_that_is_seen_between_legs_makes_it_no_less_likely_than_one_in_a_thousand(situation: Situation) -> None:
+    evidence, around = evidence_of(4.0, -0.8, 0.0, 0.1, 0.4, foot=1 / 8), situation(speed_mps=0.4)
+    stands = []
+    for _ in range(16):
+        see_ground(evidence, 1 / 2.5)
+        stands.append(belief_of(evidence, around).stands)
+    assert max(np.diff(stands[:10])) < 0
+    assert stands[10] == stands[15] > 0
+
+
 @pytest.mark.parametrize(("is_cut", "nearer"), [(False, False), (True, True)])
 def test_a_foot_beyond_the_image_says_only_that_the_thing_is_no_farther(
     situation: Situation, is_cut: bool, nearer: bool
