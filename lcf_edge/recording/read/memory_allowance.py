@@ -13,16 +13,20 @@ _DATA = 5  # its field: pages of memory that can be written
 class MemoryAllowance:
     """Bytes for all that is called within ``limited`` together; memory beyond is refused.
 
-    For work in the calling thread, by code that copes with failing allocations.
+    What the process gives back in between counts as given back by it: images are freed by whoever was given them. For
+    work in the calling thread, by code that copes with failing allocations.
     """
 
     def __init__(self, allowed_bytes: int) -> None:
-        self._left_bytes = allowed_bytes
+        self._allowed_bytes = self._left_bytes = allowed_bytes
+        self._after_bytes = 0  # of the process, when ``limited`` was left
 
     @contextmanager
     def limited(self) -> Iterator[None]:
         """Within, limit the process to what is left."""
         before_bytes = _data_bytes()
+        given_back_bytes = max(self._after_bytes - before_bytes, 0)
+        self._left_bytes = min(self._left_bytes + given_back_bytes, self._allowed_bytes)
         soft, hard = resource.getrlimit(resource.RLIMIT_DATA)
         limits = [before_bytes + max(self._left_bytes, 0), *(one for one in (soft, hard) if one >= 0)]
         resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))
@@ -30,7 +34,8 @@ class MemoryAllowance:
             yield
         finally:
             resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
-            self._left_bytes -= _data_bytes() - before_bytes
+            self._after_bytes = _data_bytes()
+            self._left_bytes -= self._after_bytes - before_bytes
 
 
 def _data_bytes() -> int:
