@@ -30,6 +30,7 @@ cdef double SWING_SIGMAS
 cdef double SPREAD_SHARE
 cdef double MIN_EXTENT2_PX
 cdef double FASTEST_EXPANSION
+cdef double TURN_SHARE
 cdef double LINK_SHARE
 cdef double FAR_LINK_SHARE
 cdef double FAR_LINK_RAD
@@ -58,7 +59,7 @@ cdef class RebelGroups:
 
 cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
 cdef double noise_between(RebelGroups groups, Py_ssize_t a, Py_ssize_t b) noexcept nogil
-cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around, Settings settings) noexcept nogil
+cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double dx, double dy, Situation around, Settings settings) noexcept nogil
 cdef bint stand_together(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around) noexcept nogil
 cdef int lowest_label(RebelGroups groups, int k) noexcept nogil
 cdef void join(RebelGroups groups, int a, int b) noexcept nogil

@@ -33,7 +33,8 @@ SWING_SIGMAS = 4.0  # or, of what moves and has limbs that swing, these,
 SPREAD_SHARE = 0.5  # a group may spread less than this share of its expansion
 MIN_EXTENT2_PX = 1.0  # px², least squared extent in a fit of an expansion
 # Times are shares of the horizon, so that they hold for any speed.
-FASTEST_EXPANSION = 4.0  # of one object, per horizon
+FASTEST_EXPANSION = 4.0  # of one object, per horizon,
+TURN_SHARE = 0.25  # of that, by which its parts may turn or come together
 LINK_SHARE = 0.03  # rebels link over what the faster moves in this share of the horizon: near things are large;
 FAR_LINK_SHARE = 0.08  # or in this share, where they move almost the same,
 FAR_LINK_RAD = 0.35  # but no farther
@@ -111,15 +112,17 @@ def noise_between(groups: RebelGroups, a: int, b: int) -> float:
     return VELOCITY_NOISE_PX / groups.elapsed_s[a] + VELOCITY_NOISE_PX / groups.elapsed_s[b]
 
 
-def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Situation, settings: Settings) -> bool:
-    """Whether two rebels, ``distance`` px apart, move together (eq. EdgeErcompareER, and by position).
+def are_linked(
+    groups: RebelGroups, a: int, b: int, dx: float, dy: float, around: Situation, settings: Settings
+) -> bool:
+    """Whether two rebels, ``a`` at ``dx``, ``dy`` px from ``b``, move together (eq. EdgeErcompareER, and by position).
 
     Near each other they must have a similar direction and speed, or differ no more than parts of an object that expands
-    in the image. The few corners on something large and plain that passes fast lie farther apart: these must move
-    almost the same, beyond noise.
+    in the image: these move apart, and hardly turn about each other or come together. The few corners on something
+    large and plain that passes fast lie farther apart: these must move almost the same, beyond noise.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
-    one, other = lengths.of(ax, ay), lengths.of(bx, by)
+    one, other, distance = lengths.of(ax, ay), lengths.of(bx, by), lengths.of(dx, dy)
     slower, faster = min(one, other), max(one, other)
     near = max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster)
     far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
@@ -129,7 +132,10 @@ def are_linked(groups: RebelGroups, a: int, b: int, distance: float, around: Sit
     noise = noise_between(groups, a, b)
     if distance >= near:
         return max(difference, noise) < FAR_LIKE_SPEED * faster
-    if difference < noise + FASTEST_EXPANSION / around.horizon_s * distance:
+    fastest = FASTEST_EXPANSION / around.horizon_s * distance
+    apart = ((ax - bx) * dx + (ay - by) * dy) / max(distance, 1.0)
+    aside = math.sqrt(max(difference * difference - apart * apart, 0.0))
+    if apart < noise + fastest and max(-apart, aside) < noise + TURN_SHARE * fastest:
         return True
     return (
         ax * bx + ay * by > math.cos(settings.eps_beta_rebel_rad) * one * other
@@ -191,8 +197,10 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
         i = verdicts.row[groups.verdict[a]]
         for b in range(a):
             k = verdicts.row[groups.verdict[b]]
-            distance = lengths.of(edges.x[i] - edges.x[k], edges.y[i] - edges.y[k])
-            if are_linked(groups, a, b, distance, around, settings) or stand_together(groups, a, b, distance, around):
+            dx, dy = edges.x[i] - edges.x[k], edges.y[i] - edges.y[k]
+            if are_linked(groups, a, b, dx, dy, around, settings) or stand_together(
+                groups, a, b, lengths.of(dx, dy), around
+            ):
                 join(groups, a, b)
 
 
@@ -404,8 +412,10 @@ def is_flat(groups: RebelGroups, g: int, members: Members, around: Situation) ->
 
     A leader stands on the ground: from its foot it reaches up to a share of the camera's height. Where the ground
     itself does not flow, the vehicle is slower than measured, or its own parts are in view, and nothing there leads.
+    Before a vehicle at rest nothing flows: what moves towards O is neither. Other edges may seem to have fallen short,
+    since it was at rest earlier than it knew.
     """
-    if 2 * groups.inwards[g] <= members.size[g]:
+    if 2 * groups.inwards[g] <= members.size[g] or (situation.is_at_rest(around) and groups.focus_rate[g] < 0):
         return False
     lowest = around.horizon_y + around.pinhole.focal * around.pitch_sigma_rad
     if is_mirrored(groups, g, members) or (around.ground_is_still and members.y[g] > lowest):

@@ -51,22 +51,27 @@ cdef double NAN
 cdef class Squares:
     cdef readonly MotionSums parts, bounds
     cdef MotionSums wholes
+    cdef int[::1] agreeing
     cdef readonly int[::1] members
     cdef int[::1] resting
     cdef int[::1] through
-    cdef unsigned char[::1] obedient
+    cdef unsigned char[::1] odd, obedient
     cdef double[::1] rows
     cdef int[::1] sides
     cdef Evidence evidence
     cdef Belief belief
 
 cpdef bint belongs(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, MotionSums parts, Situation around, Settings settings) noexcept nogil
+cdef double extent_of(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c) noexcept nogil
+cdef bint is_within(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, double side_px, double stack_px) noexcept nogil
+cdef bint is_beside(ObjectColumns objects, Py_ssize_t o, CircleColumns circles, Py_ssize_t c, Settings settings) noexcept nogil
 @cython.locals(weight=double)
 cdef bint is_moving(MotionSums parts, Py_ssize_t c, Settings settings) noexcept nogil
 cdef bint shows_object(MotionSums parts, Py_ssize_t c, Situation around, Settings settings) noexcept nogil
 cdef bint expands_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double looming) noexcept nogil
 cdef bint moves_alike(ObjectColumns objects, Py_ssize_t o, MotionSums parts, Py_ssize_t c, double share, Situation around, Settings settings) noexcept nogil
 cdef void measure_circles(MotionSums parts, CircleColumns circles, Verdicts verdicts, EdgeColumns edges, Patches patches, CoarseMotion coarse, CoarseGroups coarse_groups, Baselines baselines, Situation around) noexcept nogil
+@cython.locals(agrees=bint)
 cdef void keep_members(ObjectColumns objects, Squares squares, CircleColumns circles, Situation around, Settings settings) noexcept nogil
 @cython.locals(nearest=int, least=double, meets=bint)
 cdef int object_in_turmoil(ObjectColumns objects, CircleColumns circles, Py_ssize_t c) noexcept nogil

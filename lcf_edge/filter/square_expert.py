@@ -70,7 +70,8 @@ NAN = float("nan")
 class Squares:
     """Scratch memory of one frame.
 
-    ``parts``: the motion of each circle; ``wholes``: of each object; ``members``: its edges; ``resting``: those of
+    ``parts``: the motion of each circle; ``odd``: whether it is not that of its object; ``agreeing``: how many circles
+    of each object move as it does; ``wholes``: the motion of each object; ``members``: its edges; ``resting``: those of
     them that are matched while the vehicle is at rest; ``through``: of other edges that are then seen in its
     middle; ``bounds``: within which edges may join it. ``obedient``: whether the edge of a verdict moves as its object
     does. ``rows``, px, and ``sides``, 1: of the object, -1: of the ground, of the edges that show where it ends.
@@ -78,8 +79,8 @@ class Squares:
 
     def __init__(self, circles: int, objects: int, edges: int) -> None:
         self.parts, self.wholes, self.bounds = MotionSums(circles), MotionSums(objects), MotionSums(objects)
-        self.members, self.resting, self.through = [integers(objects) for _ in range(3)]
-        self.obedient = octets(edges)
+        self.agreeing, self.members, self.resting, self.through = [integers(objects) for _ in range(4)]
+        self.odd, self.obedient = octets(circles), octets(edges)
         self.rows, self.sides = doubles(MAX_BENEATH), integers(MAX_BENEATH)
         self.evidence, self.belief = Evidence(), Belief()
 
@@ -101,16 +102,30 @@ def belongs(
     A large object may have few corners, so a wider gap is allowed if the circle moves, and closely as the object does;
     whatever stands still in the image agrees with everything else that does.
     """
-    width, tall = max(objects.width[o], circles.width[c]), max(objects.height[o], circles.height[c])
-    extent = max(width, tall)
+    if is_beside(objects, o, circles, c, settings):
+        return moves_alike(objects, o, parts, c, LIKE_SHARE, around, settings)
+    width = max(objects.width[o], circles.width[c])
+    if is_within(objects, o, circles, c, WIDE_GAP * width, TOWER_GAP * extent_of(objects, o, circles, c)):
+        return is_moving(parts, c, settings) and moves_alike(objects, o, parts, c, VERY_LIKE_SHARE, around, settings)
+    return False
+
+
+def extent_of(objects: ObjectColumns, o: int, circles: CircleColumns, c: int) -> float:
+    """Returns the larger extent of an object and a circle, px."""
+    return max(objects.width[o], circles.width[c], objects.height[o], circles.height[c])
+
+
+def is_within(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, side_px: float, stack_px: float) -> bool:
+    """Whether the boxes of an object and a circle are less than this apart."""
     side = math.fabs(objects.x[o] - circles.x[c]) - 0.5 * (objects.width[o] + circles.width[c])
     stack = math.fabs(objects.y[o] - circles.y[c]) - 0.5 * (objects.height[o] + circles.height[c])
-    near_px = settings.rebel_link_px
-    if side < max(near_px, SIDE_GAP * extent) and stack < max(near_px, STACK_GAP * extent):
-        return moves_alike(objects, o, parts, c, LIKE_SHARE, around, settings)
-    if side < WIDE_GAP * width and stack < TOWER_GAP * extent and is_moving(parts, c, settings):
-        return moves_alike(objects, o, parts, c, VERY_LIKE_SHARE, around, settings)
-    return False
+    return side < side_px and stack < stack_px
+
+
+def is_beside(objects: ObjectColumns, o: int, circles: CircleColumns, c: int, settings: Settings) -> bool:
+    """Whether a circle is as near to an object as circles of one thing are."""
+    near_px, extent = settings.rebel_link_px, extent_of(objects, o, circles, c)
+    return is_within(objects, o, circles, c, max(near_px, SIDE_GAP * extent), max(near_px, STACK_GAP * extent))
 
 
 def is_moving(parts: MotionSums, c: int, settings: Settings) -> bool:
@@ -201,19 +216,25 @@ def measure_circles(
 def keep_members(
     objects: ObjectColumns, squares: Squares, circles: CircleColumns, around: Situation, settings: Settings
 ) -> None:
-    """Detach circles that have ended, or no longer move as their object does."""
+    """Detach circles that have ended, and those that no longer move as their object does, or are elsewhere.
+
+    If no circle of an object moves as it did, it moves otherwise now, and those that are still near it stay.
+    """
+    for o in range(objects.capacity):
+        squares.agreeing[o] = 0
     for c in range(circles.capacity):
         o = circles.square[c]
-        if o < 0:
-            continue
-        if (
-            not circles.active[c]
-            or not objects.active[o]
-            or (
-                squares.parts.count[c] >= MIN_EDGES
-                and not belongs(objects, o, circles, c, squares.parts, around, settings)
-            )
-        ):
+        if o >= 0 and (not circles.active[c] or not objects.active[o]):
+            circles.square[c] = o = -1
+        if o >= 0 and squares.parts.count[c] >= MIN_EDGES:
+            agrees = belongs(objects, o, circles, c, squares.parts, around, settings)
+            squares.agreeing[o] += agrees
+            squares.odd[c] = not agrees
+        else:
+            squares.odd[c] = 0
+    for c in range(circles.capacity):
+        o = circles.square[c]
+        if squares.odd[c] and (squares.agreeing[o] > 0 or not is_beside(objects, o, circles, c, settings)):
             circles.square[c] = -1
 
 

@@ -186,6 +186,24 @@ def test_what_crosses_on_a_collision_course_is_no_paint(situation: Situation, le
     assert rebel_groups.is_flat(groups, 0, groups.members, around) == flat
 
 
+@pytest.mark.parametrize(
+    ("speed_mps", "down_pxps", "flat"),
+    [(1.0, -60.0, True), (0.0, -60.0, False), (0.0, 10.0, True)],
+    ids=["driving", "at rest", "at rest earlier than it knew"],
+)
+def test_before_a_vehicle_at_rest_nothing_is_flat_that_moves_towards_the_focus(
+    situation: Situation, speed_mps: float, down_pxps: float, flat: bool
+) -> None:
+    """Paint and reflections on the floor do not."""
+    around = situation(speed_mps=1.0)
+    x, y = np.linspace(300, 340, 12).astype(np.float32), np.linspace(390, 400, 12).astype(np.float32)
+    seen = Seen(EdgeTable(50, 50, 10), x, y, np.zeros(12), np.full(12, down_pxps), around)
+    groups = seen.as_one_group(around)
+    around.speed_mps = speed_mps
+    assert groups.inwards[0] == 12
+    assert rebel_groups.is_flat(groups, 0, groups.members, around) == flat
+
+
 # Grouping
 
 CROSSING = (300.0, 150.0, 0.0, 120.0)
@@ -284,6 +302,19 @@ def lowest(groups: RebelGroups, row: int) -> int:
 def test_parts_of_an_object_that_grows_are_linked_though_they_fly_apart(situation: Situation) -> None:
     x, y = (part.astype(np.float32) for part in np.random.default_rng(1).uniform(-30, 30, (2, 25)))
     assert len(set(linked(300 + x, 150 + y, 0.8 * x, 0.8 * y, situation()))) == 1
+
+
+@pytest.mark.parametrize(
+    ("way", "groups"),
+    [((1.0, 0.0), 1), ((-1.0, 0.0), 2), ((0.0, 1.0), 2)],
+    ids=["apart", "towards each other", "past each other"],
+)
+def test_two_of_which_one_comes_towards_the_other_are_two_though_something_could_grow_as_fast(
+    situation: Situation, way: tuple[float, float], groups: int
+) -> None:
+    x, y = np.array([300.0, 336.0], np.float32), np.full(2, 150.0, np.float32)
+    side = 22 * np.array([-1.0, 1.0], np.float32)
+    assert len(set(linked(x, y, way[0] * side, way[1] * side, situation()))) == groups
 
 
 def test_links_reach_through_neighbours_and_no_farther_than_they_do(situation: Situation) -> None:

@@ -638,6 +638,36 @@ def test_who_crosses_and_turns_at_once_is_soon_one_object_again(
     assert sum(len(each) > 1 for each in ids) <= 2
 
 
+def wandering(way: Any, his: set[bytes], sigma_px: float, seed: int) -> Iterator[tuple[Corners, Motion]]:
+    """A drive in which the corners of somebody wander about their places, as on clothes and limbs."""
+    random = np.random.default_rng(seed)
+    off: dict[bytes, npt.NDArray[np.float64]] = {looks: np.zeros(2) for looks in sorted(his)}
+    for corners, motion in way:
+        position = corners.position.copy()
+        for row, looks in enumerate(corners.appearance):
+            if looks.tobytes() in his:
+                off[looks.tobytes()] = 0.8 * off[looks.tobytes()] + random.normal(0, 0.6 * sigma_px, 2)
+                position[row] += off[looks.tobytes()]
+        pixel = np.rint(position).clip(0, (way.lens.width - 1, way.lens.height - 1)).astype(corners.pixel.dtype)
+        yield Corners(pixel, position, corners.appearance), motion
+
+
+@pytest.mark.parametrize("speed_mps", [0.0, 0.6])
+@pytest.mark.parametrize("seed", range(4))
+def test_a_walker_far_off_whose_corners_wander_by_two_px_stays_one_object(
+    drive: Drive, box: Landmarks, clutter: Landmarks, seed: int, speed_mps: float
+) -> None:
+    """His circle does not always move as his object did, and founds no other one."""
+    walker = drive(box((-2.5, -0.6, 8.0), (0.45, 1.7, 0.15), landmarks=12), np.array([0.8, 0, 0]))
+    way = replace(drive(clutter(300)) + walker, frames=90, speed_mps=speed_mps)
+    tables, ids = LineCircleFilter(Config(), way.lens), []
+    for corners, motion in wandering(way, looks_of(way, slice(300, None)), 2.0, seed):
+        tables.step(corners, motion)
+        ids.append(tables.objects.id[published(tables.objects)].tolist())
+    assert ids[20:] == [ids[20]] * 70
+    assert len(ids[20]) == 1
+
+
 def test_a_few_edges_do_not_bring_back_who_was_lost_right_before_a_vehicle_at_rest(
     drive: Drive, box: Landmarks, clutter: Landmarks
 ) -> None:
