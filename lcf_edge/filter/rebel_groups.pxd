@@ -59,12 +59,13 @@ cdef class RebelGroups:
 
 cpdef void take_rebels(RebelGroups groups, Py_ssize_t rebels, int[::1] breaking, Verdicts verdicts, EdgeColumns edges, Baselines baselines) noexcept nogil
 cdef double noise_between(RebelGroups groups, Py_ssize_t a, Py_ssize_t b) noexcept nogil
-cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double dx, double dy, Situation around, Settings settings) noexcept nogil
+cdef bint are_linked(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double dx, double dy, double distance, Situation around, Settings settings) noexcept nogil
 cdef bint stand_together(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, double distance, Situation around) noexcept nogil
 cdef int lowest_label(RebelGroups groups, int k) noexcept nogil
 cdef void join(RebelGroups groups, int a, int b) noexcept nogil
 @cython.locals(n=Py_ssize_t, reach=double, most=double, x=double, y=double, flows=bint)
 cdef bint are_on_body(RebelGroups groups, Py_ssize_t a, Py_ssize_t b, EdgeColumns edges, Py_ssize_t i, Py_ssize_t k, Situation around, Settings settings) noexcept nogil
+@cython.locals(linked=bint)
 cpdef void cluster(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef void join_sparse(RebelGroups groups, Verdicts verdicts, EdgeColumns edges, Situation around, Settings settings) noexcept nogil
 cdef double near_link_px(double y, Situation around) noexcept nogil

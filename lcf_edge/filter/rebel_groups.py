@@ -113,7 +113,14 @@ def noise_between(groups: RebelGroups, a: int, b: int) -> float:
 
 
 def are_linked(
-    groups: RebelGroups, a: int, b: int, dx: float, dy: float, around: Situation, settings: Settings
+    groups: RebelGroups,
+    a: int,
+    b: int,
+    dx: float,
+    dy: float,
+    distance: float,
+    around: Situation,
+    settings: Settings,
 ) -> bool:
     """Whether two rebels, ``a`` at ``dx``, ``dy`` px from ``b``, move together (eq. EdgeErcompareER, and by position).
 
@@ -122,7 +129,7 @@ def are_linked(
     large and plain that passes fast lie farther apart: these must move almost the same, beyond noise.
     """
     ax, ay, bx, by = groups.vx[a], groups.vy[a], groups.vx[b], groups.vy[b]
-    one, other, distance = lengths.of(ax, ay), lengths.of(bx, by), lengths.of(dx, dy)
+    one, other = lengths.of(ax, ay), lengths.of(bx, by)
     slower, faster = min(one, other), max(one, other)
     near = max(settings.rebel_link_px, LINK_SHARE * around.horizon_s * faster)
     far = min(FAR_LINK_SHARE * around.horizon_s * faster, FAR_LINK_RAD * around.pinhole.focal)
@@ -198,9 +205,9 @@ def cluster(groups: RebelGroups, verdicts: Verdicts, edges: EdgeColumns, around:
         for b in range(a):
             k = verdicts.row[groups.verdict[b]]
             dx, dy = edges.x[i] - edges.x[k], edges.y[i] - edges.y[k]
-            if are_linked(groups, a, b, dx, dy, around, settings) or stand_together(
-                groups, a, b, lengths.of(dx, dy), around
-            ):
+            distance = lengths.of(dx, dy)
+            linked = are_linked(groups, a, b, dx, dy, distance, around, settings)
+            if linked or stand_together(groups, a, b, distance, around):
                 join(groups, a, b)
 
 

@@ -72,9 +72,9 @@ class Squares:
 
     ``parts``: the motion of each circle; ``odd``: whether it is not that of its object; ``agreeing``: how many circles
     of each object move as it does; ``wholes``: the motion of each object; ``members``: its edges; ``resting``: those of
-    them that are matched while the vehicle is at rest; ``through``: of other edges that are then seen in its
-    middle; ``bounds``: within which edges may join it. ``obedient``: whether the edge of a verdict moves as its object
-    does. ``rows``, px, and ``sides``, 1: of the object, -1: of the ground, of the edges that show where it ends.
+    them that are matched while the vehicle is at rest; ``through``: of other edges that are then seen in its middle;
+    ``bounds``: within which edges may join it. ``obedient``: whether the edge of a verdict moves as its object does.
+    ``rows``, px, and ``sides``, 1: of the object, -1: of the ground, of the edges that show where it ends.
     """
 
     def __init__(self, circles: int, objects: int, edges: int) -> None:
