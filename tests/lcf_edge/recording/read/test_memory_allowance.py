@@ -10,6 +10,7 @@ MIB = 2**20
 
 
 def private(size: int) -> mmap.mmap:
+    """Memory of this process alone, which its limit counts; freed when it is closed."""
     return mmap.mmap(-1, size, flags=mmap.MAP_PRIVATE | mmap.MAP_ANONYMOUS)
 
 
